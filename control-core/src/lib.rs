@@ -1,1 +1,36 @@
-//! control-core
+//! What the device computes ten thousand times a second: encoder count in, DAC code out.
+//!
+//! A tick, as data: count → [`kinematics`] (depth, speed) → [`tissue`] (layers, their state, the force law) → torque →
+//! [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
+//! operating mode; [`config`] turns what a person wrote into a validated [`config::Plan`] or refuses it with the reason.
+//!
+//! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board and the simulator run
+//! the very same code.
+#![no_std]
+// The tick has no floating point and cannot panic: lints hold the crate to it.
+#![deny(
+    clippy::float_arithmetic,
+    clippy::panic,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::indexing_slicing
+)]
+
+pub mod config;
+pub mod controller;
+pub mod event;
+pub mod friction;
+pub mod jog;
+pub mod kinematics;
+mod math;
+pub mod plan;
+pub mod safety;
+pub mod tissue;
+pub mod units;
+
+pub use config::Config;
+pub use controller::{Controller, Order, TickInput, TickOutput};
+pub use plan::{Plan, Refusal};
+
+/// Ticks of the control law in a second.
+pub const TICK_HZ: u32 = 10_000;

@@ -1,0 +1,226 @@
+//! What a person configures, in physical units. It travels over the link and is kept in flash; it says nothing about
+//! whether it is safe: only [`crate::plan::Plan::new`] does.
+
+use crate::units::{
+    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+};
+use fixed::types::I16F16;
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Layers of a tissue at the most.
+pub const MAX_LAYERS: usize = 6;
+
+/// All that the control law needs to know.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Config {
+    /// Roller, encoder and converter.
+    pub device: Device,
+    /// What the device never exceeds.
+    pub limits: SafetyConfig,
+    /// How speed is estimated.
+    pub speed: SpeedMethod,
+    /// Damping added everywhere, for stability.
+    pub damping: Damping,
+    /// The law of friction inside tissue.
+    pub friction: FrictionLaw,
+    /// The tissue, outermost layer first.
+    pub layers: Vec<Layer, MAX_LAYERS>,
+}
+
+/// Roller, encoder and converter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Device {
+    /// Radius of the roller on the motor shaft, 4–25 mm.
+    pub roller_radius: Millimetres,
+    /// Encoder counts a turn after quadrature, 256–65,535.
+    pub counts_per_turn: u16,
+    /// Torque at the converter's full scale, from the amplifier's gain and the motor's torque constant. A calibration value.
+    pub full_scale_torque: MillinewtonMetres,
+    /// The converter.
+    pub dac: DacWidth,
+}
+
+/// Resolution of the converter that drives the amplifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DacWidth {
+    /// DAC0800, as in seed 001.
+    Bits8,
+    /// The microcontroller's own.
+    Bits12,
+}
+
+impl DacWidth {
+    /// The code of zero torque.
+    pub const fn mid_scale(self) -> u16 {
+        match self {
+            DacWidth::Bits8 => 128,
+            DacWidth::Bits12 => 2048,
+        }
+    }
+
+    /// The largest step away from mid-scale, the same both ways.
+    pub const fn span(self) -> u16 {
+        self.mid_scale() - 1
+    }
+}
+
+/// What the device never exceeds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SafetyConfig {
+    /// Largest torque.
+    pub torque: MillinewtonMetres,
+    /// Largest change of torque in one tick.
+    pub slew_per_tick: MillinewtonMetres,
+    /// Time over which torque fades in after a start, 10–5,000 ms.
+    pub fade_in_ms: u16,
+    /// Largest movement in one tick, in counts; more is an encoder fault. 2–1,000.
+    pub max_counts_per_tick: u16,
+    /// Largest depth; beyond it is a fault. 1–500 mm.
+    pub travel: Millimetres,
+    /// Largest slope of any force law, at most 7 N/mm: the limit with one tick of delay (30 g, 0.02 N·s/m, 0.06 N dry).
+    pub stiffness: Stiffness,
+    /// Largest silence of the PC while powered, 20–5,000 ms.
+    pub heartbeat_ms: u16,
+}
+
+/// How speed is estimated. One count a tick is 157 mm/s at a 10 mm roller: counts are never differenced tick by tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SpeedMethod {
+    /// Counts over the last [`crate::kinematics::WINDOW_TICKS`] ticks.
+    Window,
+    /// Counts over the time between the edges that delimit them; finer at low speed.
+    EdgeTiming,
+}
+
+/// The law of friction inside tissue (seed 001, eq. 2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FrictionLaw {
+    /// Equation 2 as printed. It lets go of a resting needle within a second.
+    Paper {
+        /// S_f1: depth in tissue over which the friction level grows by e.
+        level_length: Millimetres,
+        /// Largest friction level L_f, 1–32.
+        level_cap: I16F16,
+        /// Time constant τ of the anchor, 5–1,000 ms: `S_f2 = 1 − e^{−T/τ}`.
+        anchor_ms: u16,
+        /// K_f: force for each mm between needle and anchor at level 1.
+        stiffness: Stiffness,
+        /// T_f_max = −T_f_min.
+        limit: Newtons,
+    },
+    /// A clamped proxy: holds a resting needle, slips at the friction limit.
+    Cone {
+        /// Stiffness of the hold below the limit.
+        stiffness: Stiffness,
+    },
+}
+
+/// One layer of tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Layer {
+    /// What it is, for events and pictures.
+    pub tissue: Tissue,
+    /// Depth of its outer face along the needle.
+    pub top: Millimetres,
+    /// Its wall, where it has one that gives way.
+    pub wall: Option<Wall>,
+    /// Friction limit gained for each mm of needle inside it.
+    pub friction: FrictionPerMillimetre,
+}
+
+/// What a layer is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum Tissue {
+    /// Skin.
+    Skin = 0,
+    /// Subcutaneous fat.
+    Fat = 1,
+    /// Muscle.
+    Muscle = 2,
+    /// A blood vessel: its puncture is the aim.
+    Vessel = 3,
+    /// Anything else.
+    Other = 4,
+}
+
+/// The jog effect of a wall: it rises along one parabola and, once punctured, falls along another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Wall {
+    /// Force against travel past contact until it gives way; its vertex is at or before contact.
+    pub elastic: Parabola,
+    /// Travel past contact at which it gives way, up to 30 mm.
+    pub puncture_travel: Millimetres,
+    /// Force against travel past contact once it has given way; its vertex is beyond `puncture_travel`, and past it the
+    /// force is `base`.
+    pub relief: Parabola,
+    /// Slope with which the relief force lets go when the needle is drawn back.
+    pub unload: Stiffness,
+}
+
+/// `f(T) = (T − vertex)²/compliance + base` (seed 001, eq. 1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Parabola {
+    /// n: travel past contact at which the parabola turns.
+    pub vertex: Millimetres,
+    /// a, 0.05–1,000 mm²/N.
+    pub compliance: JogCompliance,
+    /// b: force at the vertex.
+    pub base: Newtons,
+}
+
+impl Default for Config {
+    /// An adult's antecubital vein at a 10 mm roller and a 12-bit converter, as `force-models` in the design notes gives
+    /// it: skin 9 mm²/N to 1.0 N at 3 mm, vein 4 mm²/N to 0.56 N at 1.5 mm, 4.8 mm deep along the needle.
+    fn default() -> Self {
+        let mm = |bits: i32| Millimetres(I16F16::from_bits(bits));
+        let wall = |compliance: i32, puncture: i32, vertex: i32, relief: i32| Wall {
+            elastic: Parabola {
+                vertex: mm(0),
+                compliance: JogCompliance(I16F16::from_bits(compliance)),
+                base: Newtons::default(),
+            },
+            puncture_travel: mm(puncture),
+            relief: Parabola {
+                vertex: mm(vertex),
+                compliance: JogCompliance(I16F16::from_bits(relief)),
+                base: Newtons::default(),
+            },
+            unload: Stiffness(I16F16::from_bits(65_536)),
+        };
+        let layer = |tissue, top: i32, wall, friction: i32| Layer {
+            tissue,
+            top: mm(top),
+            wall,
+            friction: FrictionPerMillimetre(I16F16::from_bits(friction)),
+        };
+        // Bits of Q16: 65,536 is one.
+        let layers = [
+            layer(Tissue::Skin, 0, Some(wall(9 << 16, 3 << 16, 4 << 16, 163_840)), 1_311),
+            layer(Tissue::Muscle, 2 << 16, None, 1_311),
+            layer(Tissue::Vessel, 314_573, Some(wall(4 << 16, 98_304, 147_456, 147_456)), 1_311),
+        ];
+        Self {
+            device: Device {
+                roller_radius: mm(10 << 16),
+                counts_per_turn: 4000,
+                full_scale_torque: MillinewtonMetres(I16F16::from_bits(1_887_437)),
+                dac: DacWidth::Bits12,
+            },
+            limits: SafetyConfig {
+                torque: MillinewtonMetres(I16F16::from_bits(1_887_437)),
+                slew_per_tick: MillinewtonMetres(I16F16::from_bits(65_536)),
+                fade_in_ms: 300,
+                max_counts_per_tick: 16,
+                travel: mm(60 << 16),
+                stiffness: Stiffness(I16F16::from_bits(2 << 16)),
+                heartbeat_ms: 200,
+            },
+            speed: SpeedMethod::EdgeTiming,
+            damping: Damping::default(),
+            friction: FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(65_536)) },
+            layers: layers.into_iter().collect(),
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The tick: strings the stages together and holds the operating mode. The device and the simulator call this and
+//! nothing else.
+
+use crate::event::{Fault, Limits, State, Transitions};
+use crate::kinematics::{SpeedEstimator, moved};
+use crate::math::times;
+use crate::plan::Plan;
+use crate::safety::Limiter;
+use crate::tissue::Tissue;
+use crate::units::{
+    Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
+};
+use fixed::types::I16F16;
+use serde::{Deserialize, Serialize};
+
+/// What the tick reads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TickInput {
+    /// The encoder's absolute count; it may wrap.
+    pub count: Counts,
+    /// The latest inclination.
+    pub tilt: Milliradians,
+}
+
+/// What the tick gives.
+#[derive(Clone, Copy, Debug)]
+pub struct TickOutput {
+    /// What to write to the converter.
+    pub dac: DacCode,
+    /// Whether the amplifier may be on.
+    pub enable: bool,
+    /// What is streamed.
+    pub sample: Sample,
+    /// What changed in the tissue.
+    pub transitions: Transitions,
+    /// What holds torque back.
+    pub limits: Limits,
+    /// The fault that latched in this tick.
+    pub tripped: Option<Fault>,
+    /// Depth past the zero.
+    pub depth: Millimetres,
+    /// Estimated speed.
+    pub speed: MillimetresPerSecond,
+    /// The force that the law asked for, before limits.
+    pub force: Newtons,
+}
+
+/// One tick as it is streamed and recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Counts past the zero.
+    pub count: i32,
+    /// What was written to the converter.
+    pub dac: u16,
+    /// [`State`] as a number.
+    pub state: u8,
+    /// Inclination in mrad.
+    pub tilt_mrad: i16,
+}
+
+/// What a person or the supervisor asks of the control law, between ticks.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
+pub enum Order {
+    /// Power up and fade in; clears a latched fault.
+    Start,
+    /// Zero torque, amplifier off.
+    Stop,
+    /// The needle is at depth 0 now; only while torque is off.
+    Zero,
+    /// The PC is alive.
+    Heartbeat,
+    /// Another plan; only while torque is off.
+    Configure(Plan),
+    /// Something outside the tick went wrong: torque off, latched.
+    Trip(Fault),
+}
+
+/// The control law with its memory.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    plan: Plan,
+    mode: Mode,
+    origin: Counts,
+    previous: Option<Counts>,
+    speed: SpeedEstimator,
+    tissue: Tissue,
+    limiter: Limiter,
+    silent_ticks: u32,
+    tripped: Option<Fault>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Idle,
+    Running,
+    Faulted,
+}
+
+impl Controller {
+    /// Torque off, waiting to be started.
+    pub fn new(plan: Plan) -> Self {
+        Self {
+            speed: SpeedEstimator::new(plan.config.speed, Counts(0)),
+            plan,
+            mode: Mode::Idle,
+            origin: Counts(0),
+            previous: None,
+            tissue: Tissue::default(),
+            limiter: Limiter::default(),
+            silent_ticks: 0,
+            tripped: None,
+        }
+    }
+
+    /// The plan in force.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
+    pub fn order(&mut self, order: Order) {
+        match order {
+            Order::Start if self.mode != Mode::Running => {
+                self.limiter.restart();
+                self.silent_ticks = 0;
+                self.mode = Mode::Running;
+            }
+            Order::Stop if self.mode == Mode::Running => self.mode = Mode::Idle,
+            Order::Zero if self.mode != Mode::Running => {
+                self.origin = self.previous.unwrap_or_default();
+                self.tissue = Tissue::default();
+                self.speed = SpeedEstimator::new(self.plan.config.speed, Counts(0));
+            }
+            Order::Heartbeat => self.silent_ticks = 0,
+            Order::Configure(plan) if self.mode != Mode::Running => {
+                let count = self.previous.map_or(Counts(0), |p| moved(self.origin, p));
+                self.speed = SpeedEstimator::new(plan.config.speed, count);
+                self.tissue = Tissue::default();
+                self.plan = plan;
+            }
+            Order::Trip(fault) => self.trip(fault),
+            Order::Start | Order::Stop | Order::Zero | Order::Configure(_) => {}
+        }
+    }
+
+    /// One tick, 100 µs after the one before.
+    pub fn tick(&mut self, input: TickInput) -> TickOutput {
+        let count = self.count(input.count);
+        let depth = self.plan.scale.depth(count);
+        let speed = self.speed.tick(&self.plan.scale, count);
+        let tissue = self.tissue.tick(&self.plan.layers, count, depth, speed);
+        self.watch_host();
+        let (torque, limits) = match self.mode {
+            Mode::Running => self.limiter.tick(&self.plan.torque_limits, self.torque(tissue.force, speed)),
+            Mode::Idle | Mode::Faulted => (MillinewtonMetres::default(), Limits::default()),
+        };
+        let dac = self.plan.dac.code(torque);
+        let state = match self.mode {
+            Mode::Running => tissue.state,
+            Mode::Idle => State::Idle,
+            Mode::Faulted => State::Fault,
+        };
+        TickOutput {
+            dac,
+            enable: self.mode == Mode::Running,
+            sample: Sample { count: count.0, dac: dac.0, state: state as u8, tilt_mrad: input.tilt.0 },
+            transitions: tissue.transitions,
+            limits,
+            tripped: self.tripped.take(),
+            depth,
+            speed,
+            force: tissue.force,
+        }
+    }
+
+    /// Counts past the zero; a jump or a needle beyond its travel trips.
+    fn count(&mut self, absolute: Counts) -> Counts {
+        let step = self.previous.map_or(0, |previous| moved(previous, absolute).0);
+        self.previous = Some(absolute);
+        let count = moved(self.origin, absolute);
+        if self.mode == Mode::Running {
+            if step.unsigned_abs() > u32::from(self.plan.config.limits.max_counts_per_tick) {
+                self.trip(Fault::EncoderJump);
+            } else if count.0.unsigned_abs() > self.plan.travel_counts.unsigned_abs() {
+                self.trip(Fault::Travel);
+            }
+        }
+        count
+    }
+
+    fn watch_host(&mut self) {
+        if self.mode != Mode::Running {
+            return;
+        }
+        self.silent_ticks = self.silent_ticks.saturating_add(1);
+        if self.silent_ticks > self.plan.heartbeat_ticks {
+            self.trip(Fault::HostSilent);
+        }
+    }
+
+    fn trip(&mut self, fault: Fault) {
+        if self.mode != Mode::Faulted {
+            self.tripped = Some(fault);
+        }
+        self.mode = Mode::Faulted;
+    }
+
+    /// Motor torque against the tissue's force and the damping. N times mm is mN·m.
+    fn torque(&self, force: Newtons, speed: MillimetresPerSecond) -> MillinewtonMetres {
+        let damping = fixed::types::I2F30::saturating_from_num(self.plan.config.damping.0);
+        let resisting = force.0.saturating_add(times(speed.0, damping));
+        let torque: I16F16 = resisting.saturating_mul(self.plan.config.device.roller_radius.0);
+        MillinewtonMetres(I16F16::ZERO.saturating_sub(torque))
+    }
+}

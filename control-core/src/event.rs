@@ -1,0 +1,133 @@
+//! What a person or a program wants to know of a run: tissue events, faults, limits in force.
+
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// What the needle and the device are doing, once a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum State {
+    /// Amplifier off, zero torque; waiting for a person to start.
+    #[default]
+    Idle = 0,
+    /// Powered, the tip touches nothing.
+    Approach = 1,
+    /// Pressing a layer that has not given way.
+    Elastic = 2,
+    /// A layer has just given way and its relief is felt.
+    Puncture = 3,
+    /// Moving or resting inside tissue.
+    Friction = 4,
+    /// Moving out of tissue.
+    Withdrawal = 5,
+    /// Playing an excitation signal.
+    Excitation = 6,
+    /// A fault has latched; amplifier off.
+    Fault = 7,
+}
+
+impl State {
+    /// The state behind its number on the wire.
+    pub fn from_code(code: u8) -> Option<Self> {
+        use State::*;
+        [Idle, Approach, Elastic, Puncture, Friction, Withdrawal, Excitation, Fault]
+            .get(usize::from(code))
+            .copied()
+    }
+
+    /// Whether the amplifier may be on.
+    pub fn is_powered(self) -> bool {
+        !matches!(self, State::Idle | State::Fault)
+    }
+}
+
+/// Why torque was taken away. It latches: a person has to start again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum Fault {
+    /// More counts in one tick than the needle can move.
+    EncoderJump = 0,
+    /// Deeper than the travel of the needle.
+    Travel = 1,
+    /// The PC has been silent for longer than the heartbeat time-out.
+    HostSilent = 2,
+    /// The tilt sensor is absent, stuck or answers nonsense.
+    Tilt = 3,
+    /// The tick took longer than its period.
+    Overrun = 4,
+    /// The USB link was suspended or pulled.
+    LinkLost = 5,
+    /// The watchdog reset the device.
+    Watchdog = 6,
+    /// The program panicked or took a hard fault.
+    Crash = 7,
+    /// The supply dipped.
+    Brownout = 8,
+    /// The stored configuration was damaged; the default is in use.
+    StoredConfig = 9,
+    /// The encoder stands still although torque should move the motor.
+    EncoderFrozen = 10,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Fault::EncoderJump => "the encoder jumped further in one tick than the needle can move",
+            Fault::Travel => "the needle is beyond its travel",
+            Fault::HostSilent => "the PC went silent",
+            Fault::Tilt => "the tilt sensor is absent, stuck or answers nonsense",
+            Fault::Overrun => "a control tick took longer than its period",
+            Fault::LinkLost => "the USB link was suspended or pulled",
+            Fault::Watchdog => "the watchdog reset the device",
+            Fault::Crash => "the program panicked or took a hard fault",
+            Fault::Brownout => "the supply dipped",
+            Fault::StoredConfig => "the stored configuration was damaged and the default is in use",
+            Fault::EncoderFrozen => "the encoder stands still although torque should move the motor",
+        })
+    }
+}
+
+/// Limits in force: the device works, but gives less than the law asks for. A set, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Limits(pub u8);
+
+impl Limits {
+    /// Torque is held at its limit.
+    pub const TORQUE: Self = Self(1);
+    /// Torque changes as fast as it may.
+    pub const SLEW: Self = Self(2);
+    /// Torque is still fading in.
+    pub const FADE_IN: Self = Self(4);
+    /// The motor's thermal model holds torque down.
+    pub const THERMAL: Self = Self(8);
+    /// The passivity observer adds damping.
+    pub const PASSIVITY: Self = Self(16);
+
+    /// Both sets together.
+    pub fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether all of `other` are in force.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+/// What changed in the tissue in one tick: a bit a layer, bit 0 the outermost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Transitions {
+    /// The tip has touched the layer.
+    pub contact: u8,
+    /// The layer has given way.
+    pub puncture: u8,
+    /// The tip has left the layer, which is whole again.
+    pub exit: u8,
+}
+
+impl Transitions {
+    /// Whether nothing changed.
+    pub fn is_empty(self) -> bool {
+        self == Self::default()
+    }
+}

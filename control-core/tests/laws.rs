@@ -1,0 +1,151 @@
+//! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
+
+use control_core::config::FrictionLaw;
+use control_core::event::{Fault, State};
+use control_core::units::{Counts, Millimetres, Newtons, Stiffness};
+use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
+use fixed::types::I16F16;
+
+fn paper() -> FrictionLaw {
+    FrictionLaw::Paper {
+        level_length: Millimetres(I16F16::from_num(23)),
+        level_cap: I16F16::from_num(2),
+        anchor_ms: 60,
+        stiffness: Stiffness(I16F16::from_num(0.5)),
+        limit: Newtons(I16F16::from_num(1)),
+    }
+}
+
+fn started(config: &Config) -> Controller {
+    let mut controller = Controller::new(Plan::new(config).expect("the configuration is sound"));
+    controller.tick(TickInput::default());
+    controller.order(Order::Start);
+    controller
+}
+
+/// Moves to `mm` at `mm_per_s`, heartbeats included; gives every tick to `see`.
+fn travel(c: &mut Controller, from: &mut f64, mm: f64, mm_per_s: f64, mut see: impl FnMut(&TickOutput)) {
+    let per_count = c.plan().mm_per_count().to_num::<f64>();
+    let step = mm_per_s / 10_000.0 * (mm - *from).signum();
+    while (mm - *from).abs() > step.abs() {
+        *from += step;
+        see(&tick_at(c, (*from / per_count).round() as i32));
+    }
+}
+
+fn hold(c: &mut Controller, mm: f64, seconds: f64) -> TickOutput {
+    let per_count = c.plan().mm_per_count().to_num::<f64>();
+    let count = (mm / per_count).round() as i32;
+    (0..(seconds * 10_000.0) as usize).map(|_| tick_at(c, count)).last().expect("at least one tick")
+}
+
+fn tick_at(c: &mut Controller, count: i32) -> TickOutput {
+    c.order(Order::Heartbeat);
+    c.tick(TickInput { count: Counts(count), ..TickInput::default() })
+}
+
+#[test]
+fn the_default_is_a_venepuncture_with_two_punctures() {
+    let mut c = started(&Config::default());
+    let (mut at, mut punctures, mut peak) = (0.0, Vec::new(), 0.0_f64);
+    travel(&mut c, &mut at, 10.0, 10.0, |out| {
+        if out.transitions.puncture != 0 {
+            punctures.push((out.transitions.puncture, out.depth.0.to_num::<f64>()));
+        }
+        peak = peak.max(out.force.0.to_num());
+    });
+    assert_eq!(punctures.iter().map(|p| p.0).collect::<Vec<_>>(), [0b001, 0b100]);
+    assert!((punctures[0].1 - 3.0).abs() < 0.02 && (punctures[1].1 - 6.3).abs() < 0.02, "{punctures:?}");
+    assert!((0.95..1.05).contains(&peak), "peak force {peak} N");
+}
+
+#[test]
+fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
+    for (law, held) in [(Config::default().friction, true), (paper(), false)] {
+        let mut c = started(&Config { friction: law, ..Config::default() });
+        let mut at = 0.0;
+        let mut moving = 0.0;
+        travel(&mut c, &mut at, 4.5, 10.0, |out| moving = out.force.0.to_num::<f64>());
+        let rest = hold(&mut c, at, 1.0).force.0.to_num::<f64>();
+        assert!(moving > 0.05, "{law:?}: {moving} N while moving");
+        if held {
+            assert!(
+                (rest - moving).abs() < 0.002,
+                "cone: {moving} N moving, {rest} N after a second of rest"
+            );
+        } else {
+            assert!(rest.abs() < 0.000_5, "as printed: {rest} N after a second of rest");
+        }
+    }
+}
+
+#[test]
+fn friction_opposes_withdrawal() {
+    for law in [Config::default().friction, paper()] {
+        let mut c = started(&Config { friction: law, ..Config::default() });
+        let (mut at, mut inwards, mut outwards) = (0.0, 0.0, 0.0);
+        travel(&mut c, &mut at, 5.0, 10.0, |o| inwards = o.force.0.to_num::<f64>());
+        let mut state = State::Idle as u8;
+        travel(&mut c, &mut at, 4.4, 10.0, |o| {
+            outwards = o.force.0.to_num::<f64>();
+            state = o.sample.state;
+        });
+        assert!(inwards > 0.03 && outwards < -0.03, "{law:?}: {inwards} N in, {outwards} N out");
+        assert_eq!(state, State::Withdrawal as u8);
+    }
+}
+
+#[test]
+fn a_wall_stays_open_until_the_tip_has_left_it() {
+    let mut c = started(&Config::default());
+    let (mut at, mut punctures, mut exits) = (0.0, 0, 0);
+    let mut see = |o: &TickOutput| {
+        punctures += u32::from(o.transitions.puncture & 1);
+        exits += u32::from(o.transitions.exit & 1);
+    };
+    for target in [4.0, 0.1, 4.0, -1.0, 4.0] {
+        travel(&mut c, &mut at, target, 20.0, &mut see);
+    }
+    assert_eq!((punctures, exits), (2, 1));
+}
+
+#[test]
+fn every_fault_takes_torque_away_within_the_tick_and_latches() {
+    let pressed = || {
+        let mut c = started(&Config::default());
+        let mut at = 0.0;
+        travel(&mut c, &mut at, 2.5, 10.0, |_| {});
+        c
+    };
+    let zero = pressed().plan().zero_torque_code();
+    let deep = (2.5 / pressed().plan().mm_per_count().to_num::<f64>()) as i32;
+
+    let mut c = pressed();
+    let out = tick_at(&mut c, deep + 500);
+    assert_eq!((out.tripped, out.enable, out.dac), (Some(Fault::EncoderJump), false, zero));
+    let later = tick_at(&mut c, deep);
+    assert_eq!((later.tripped, later.enable, later.dac), (None, false, zero), "it latches");
+
+    let mut c = pressed();
+    let silent = (0..2_100).map(|_| c.tick(TickInput { count: Counts(deep), ..TickInput::default() }));
+    let tripped = silent.filter_map(|o| o.tripped.map(|f| (f, o.enable, o.dac))).collect::<Vec<_>>();
+    assert_eq!(tripped, [(Fault::HostSilent, false, zero)]);
+
+    c.order(Order::Start);
+    let again = tick_at(&mut c, deep);
+    assert!(again.enable);
+    assert!(again.dac.0.abs_diff(zero.0) <= 1, "torque fades in: {:?}", again.dac);
+}
+
+#[test]
+fn orders_that_do_not_fit_the_mode_change_nothing() {
+    let mut c = started(&Config::default());
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 2.5, 10.0, |_| {});
+    let before = hold(&mut c, at, 0.1);
+    c.order(Order::Zero);
+    c.order(Order::Configure(Plan::new(&Config::default()).expect("sound")));
+    c.order(Order::Start);
+    let after = hold(&mut c, at, 0.000_1);
+    assert_eq!((before.sample, before.force), (after.sample, after.force));
+}
