@@ -1,0 +1,89 @@
+//! What stands between the command as recorded and the command that makes torque.
+
+use super::{Effect, EffectName};
+use std::collections::VecDeque;
+
+/// An effect on the command, with its state. Steps may be of any length: each answer is the mean over its step.
+#[derive(Debug, Clone)]
+pub enum CommandLaw {
+    /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass whole.
+    #[allow(missing_docs)]
+    Deadband { half_width: f64, shift: bool },
+    /// Commands beyond the limit are held at `limit · ratio`.
+    #[allow(missing_docs)]
+    Clip { limit: f64, ratio: f64 },
+    /// A transport delay, s; the queue holds (length, command) of what is under way.
+    #[allow(missing_docs)]
+    Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },
+    /// A first-order lag, s.
+    #[allow(missing_docs)]
+    Lag { time_constant: f64, state: Option<f64> },
+}
+
+impl CommandLaw {
+    /// The law of an effect on the command; none where the effect acts elsewhere.
+    pub fn new(effect: &Effect) -> Option<Self> {
+        let get = |key: &str| effect.shape_or(key, 0.0);
+        Some(match effect.name {
+            EffectName::CommandDeadband => {
+                Self::Deadband { half_width: get("half_width"), shift: get("shift") > 0.5 }
+            }
+            EffectName::CommandSaturation => Self::Clip { limit: get("limit"), ratio: 1.0 },
+            EffectName::RollerSlip => Self::Clip { limit: get("limit"), ratio: effect.shape_or("ratio", 1.0) },
+            EffectName::CommandDelay => Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 },
+            EffectName::ElectricalLag => Self::Lag { time_constant: get("time_constant"), state: None },
+            _ => return None,
+        })
+    }
+
+    /// The mean effective command over a step of `dt` s during which `command` is held.
+    pub fn step(&mut self, command: f64, dt: f64) -> f64 {
+        match self {
+            Self::Deadband { half_width, shift } => {
+                if command.abs() <= *half_width {
+                    0.0
+                } else if *shift {
+                    command - command.signum() * *half_width
+                } else {
+                    command
+                }
+            }
+            Self::Clip { limit, ratio } => {
+                if command.abs() > *limit {
+                    command.signum() * *limit * *ratio
+                } else {
+                    command
+                }
+            }
+            Self::Delay { delay, queue, waiting } => {
+                if queue.is_empty() {
+                    // Before the first row the command is taken to have stood still.
+                    queue.push_back((*delay, command));
+                    *waiting = *delay;
+                }
+                queue.push_back((dt, command));
+                *waiting += dt;
+                let (mut left, mut sum) = (dt, 0.0);
+                while left > 0.0 {
+                    let Some((length, value)) = queue.front_mut() else { break };
+                    let taken = left.min(*length);
+                    sum += taken * *value;
+                    left -= taken;
+                    *length -= taken;
+                    if *length <= 0.0 {
+                        queue.pop_front();
+                    }
+                }
+                if dt > 0.0 { sum / dt } else { command }
+            }
+            Self::Lag { time_constant, state } => {
+                let before = state.unwrap_or(command);
+                let ratio = dt / time_constant.max(1e-12);
+                let rest = (-ratio).exp();
+                *state = Some(command + (before - command) * rest);
+                let mean = if ratio > 1e-9 { (1.0 - rest) / ratio } else { 1.0 };
+                command + (before - command) * mean
+            }
+        }
+    }
+}

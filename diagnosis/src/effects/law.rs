@@ -1,0 +1,265 @@
+//! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
+
+use super::{Effect, EffectName};
+use std::f64::consts::TAU;
+
+/// Where the plant is during one step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct State {
+    /// Position from the start of the recording or simulation, rad or m.
+    pub position: f64,
+    /// rad/s or m/s.
+    pub velocity: f64,
+    /// Force that the command asks for: gain · effective command, N·m or N.
+    pub drive: f64,
+    /// Inclination below the horizontal, rad.
+    pub tilt: f64,
+    /// External load on the coordinate, N·m or N.
+    pub external: f64,
+    /// Since the start, s.
+    pub time: f64,
+    /// Length of the step, s.
+    pub dt: f64,
+}
+
+/// Sign with `sgn(0) = 0`.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// An effect with its internal state. The force is the sum of coefficient times term; sensor effects give travel instead.
+#[derive(Debug, Clone)]
+pub struct Law {
+    name: EffectName,
+    a: f64,
+    b: f64,
+    waves: Vec<f64>,
+    times: Vec<f64>,
+    /// Names of the terms, in the order of [`Law::terms`].
+    names: Vec<String>,
+    /// Internal state: bristle deflection, play, resonator.
+    state: [f64; 3],
+    /// Transition of the resonator for a step of `dt`: kept because steps repeat.
+    resonator: Option<(f64, [f64; 6])>,
+}
+
+impl Law {
+    /// The law of an effect on force or sensor; none where it acts on the command.
+    pub fn new(effect: &Effect) -> Option<Self> {
+        use EffectName as N;
+        let get = |key: &str, otherwise: f64| effect.shape_or(key, otherwise);
+        let mut waves = Vec::new();
+        let mut times = Vec::new();
+        let (mut a, mut b) = (0.0, 0.0);
+        let names: Vec<String> = match effect.name {
+            N::ViscousFriction => vec!["viscous".into()],
+            N::CoulombFriction => vec!["coulomb".into()],
+            N::AsymmetricFriction => vec!["coulomb_difference".into(), "viscous_difference".into()],
+            N::StribeckFriction => {
+                (a, b) = (get("speed", 1.0), get("exponent", 2.0));
+                vec!["peak".into()]
+            }
+            N::PreslidingFriction => {
+                a = get("deflection", 1.0);
+                vec!["coulomb".into()]
+            }
+            N::QuadraticDrag | N::LoadDependentFriction => vec!["coefficient".into()],
+            N::PositionDependentFriction | N::PositionDependentDamping => {
+                (a, b) = (get("low", -1.0), get("high", 1.0));
+                (1..=get("degree", 3.0) as usize).map(|k| format!("legendre_{k}")).collect()
+            }
+            N::FrictionDrift => {
+                a = get("time_constant", 1.0);
+                vec!["coulomb".into(), "viscous".into()]
+            }
+            N::GainDrift => {
+                a = get("time_constant", 1.0);
+                vec!["change".into()]
+            }
+            N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => {
+                let mut found = effect.waves();
+                if found.is_empty() {
+                    found.push(("1".into(), TAU / get("turn", TAU)));
+                }
+                waves = found.iter().map(|wave| wave.1).collect();
+                found.iter().flat_map(|(n, _)| [format!("cos_{n}"), format!("sin_{n}")]).collect()
+            }
+            N::TiltGravity => vec!["weight".into()],
+            N::PositionSpring => {
+                (a, b) = (get("from", 0.0), get("one_sided", 0.0));
+                vec!["stiffness".into()]
+            }
+            N::Backlash => {
+                a = get("gap", 1.0);
+                vec!["release".into(), "drive".into()]
+            }
+            N::DriveCompliance => {
+                (a, b) = (TAU * get("resonance_hz", 1.0), get("damping", 0.05));
+                vec!["inertia_ratio".into()]
+            }
+            N::MissedCounts => {
+                for (key, value) in &effect.shape {
+                    if key.starts_with("time_") {
+                        times.push(*value);
+                    }
+                }
+                effect
+                    .shape
+                    .keys()
+                    .filter_map(|key| key.strip_prefix("time_").map(|n| format!("step_{n}")))
+                    .collect()
+            }
+            N::CommandDeadband
+            | N::CommandSaturation
+            | N::CommandDelay
+            | N::ElectricalLag
+            | N::RollerSlip => return None,
+        };
+        let state = [0.0; 3];
+        Some(Self { name: effect.name, a, b, waves, times, names, state, resonator: None })
+    }
+
+    /// Names of the terms, in order.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Whether the terms are travel added to what the encoder reads, rather than force.
+    pub fn in_sensor(&self) -> bool {
+        matches!(self.name, EffectName::EncoderEccentricity | EffectName::MissedCounts)
+    }
+
+    /// Whether the force is dry friction, which holds an axis at rest rather than moving it.
+    pub fn is_dry(&self) -> bool {
+        use EffectName as N;
+        matches!(
+            self.name,
+            N::CoulombFriction
+                | N::AsymmetricFriction
+                | N::StribeckFriction
+                | N::PositionDependentFriction
+                | N::LoadDependentFriction
+                | N::FrictionDrift
+        )
+    }
+
+    /// The terms for this step; `out` has one place per name.
+    pub fn terms(&mut self, s: &State, out: &mut [f64]) {
+        use EffectName as N;
+        let way = sign(s.velocity);
+        match self.name {
+            N::ViscousFriction => out[0] = -s.velocity,
+            N::CoulombFriction => out[0] = -way,
+            N::AsymmetricFriction => {
+                out[0] = -way.abs();
+                out[1] = -s.velocity.abs();
+            }
+            N::StribeckFriction => out[0] = -way * (-(s.velocity.abs() / self.a).powf(self.b)).exp(),
+            N::PreslidingFriction => {
+                // Dahl with exponent 1: dz/dq = (1 − z·sgn v)/deflection, so z relaxes towards the sign of motion.
+                let z = way + (self.state[0] - way) * (-(s.velocity * s.dt).abs() / self.a).exp();
+                let mean = 0.5 * (z + self.state[0]);
+                self.state[0] = if way == 0.0 { self.state[0] } else { z };
+                out[0] = if way == 0.0 { -self.state[0] } else { way - mean };
+            }
+            N::QuadraticDrag => out[0] = -s.velocity * s.velocity.abs(),
+            N::LoadDependentFriction => out[0] = -way * s.external.abs(),
+            N::PositionDependentFriction => legendre(self.along(s.position), -way, out),
+            N::PositionDependentDamping => legendre(self.along(s.position), -s.velocity, out),
+            N::FrictionDrift => {
+                let settled = 1.0 - (-s.time / self.a).exp();
+                out[0] = -way * settled;
+                out[1] = -s.velocity * settled;
+            }
+            N::GainDrift => out[0] = s.drive * (1.0 - (-s.time / self.a).exp()),
+            N::Cogging | N::MassImbalance | N::EncoderEccentricity => self.harmonics(s.position, 1.0, out),
+            N::TorqueRipple => self.harmonics(s.position, s.drive, out),
+            N::TiltGravity => out[0] = s.tilt.sin(),
+            N::PositionSpring => {
+                let x = s.position - self.a;
+                out[0] = if self.b > 0.5 { -x.max(0.0) } else { -x };
+            }
+            N::Backlash => {
+                // The play follows the position within the gap; the load is free while the play moves through it.
+                let slack = s.position - self.state[0];
+                let half = 0.5 * self.a;
+                let free = slack.abs() < half;
+                self.state[0] = s.position - slack.clamp(-half, half);
+                out[0] = if free { way } else { 0.0 };
+                out[1] = if free { s.drive } else { 0.0 };
+            }
+            N::DriveCompliance => out[0] = self.resonate(s.drive, s.dt),
+            N::MissedCounts => {
+                for (term, time) in out.iter_mut().zip(&self.times) {
+                    *term = if s.time >= *time { 1.0 } else { 0.0 };
+                }
+            }
+            _ => out.fill(0.0),
+        }
+    }
+
+    fn along(&self, position: f64) -> f64 {
+        let (low, high) = (self.a, self.b);
+        let half = 0.5 * (high - low);
+        if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.2, 1.2) } else { 0.0 }
+    }
+
+    fn harmonics(&self, position: f64, times: f64, out: &mut [f64]) {
+        for (pair, wave) in out.chunks_exact_mut(2).zip(&self.waves) {
+            let (sin, cos) = (wave * position).sin_cos();
+            pair[0] = times * cos;
+            pair[1] = times * sin;
+        }
+    }
+
+    /// Mean over the step of s²/(s² + 2ζωs + ω²) applied to a held force: what a rigid model misses of two masses on a
+    /// spring seen from the motor, per unit of the ratio of load to motor inertia.
+    fn resonate(&mut self, force: f64, dt: f64) -> f64 {
+        if dt <= 0.0 {
+            return 0.0;
+        }
+        let m = match self.resonator {
+            Some((known, m)) if known == dt => m,
+            _ => {
+                let m = transition(self.a, self.b, dt);
+                self.resonator = Some((dt, m));
+                m
+            }
+        };
+        if self.state[2] == 0.0 {
+            // At the start the spring carries the standing force.
+            self.state = [force / (self.a * self.a), 0.0, 1.0];
+        }
+        let [x, v, _] = self.state;
+        let next = m[2] * x + m[3] * v + m[5] * force;
+        self.state[0] = m[0] * x + m[1] * v + m[4] * force;
+        self.state[1] = next;
+        (next - v) / dt
+    }
+}
+
+/// Exact transition of x″ + 2ζωx′ + ω²x = f over `dt` with `f` held: [a11 a12 a21 a22 b1 b2].
+fn transition(omega: f64, zeta: f64, dt: f64) -> [f64; 6] {
+    let zeta = zeta.clamp(1e-4, 0.99);
+    let decay = zeta * omega;
+    let damped = omega * (1.0 - zeta * zeta).sqrt();
+    let e = (-decay * dt).exp();
+    let (sin, cos) = (damped * dt).sin_cos();
+    let k = decay / damped;
+    let a11 = e * (cos + k * sin);
+    let a12 = e * sin / damped;
+    let a21 = -omega * omega * a12;
+    let a22 = e * (cos - k * sin);
+    [a11, a12, a21, a22, (1.0 - a11) / (omega * omega), -a21 / (omega * omega)]
+}
+
+/// Legendre polynomials of degree 1 and up, times a factor.
+fn legendre(x: f64, times: f64, out: &mut [f64]) {
+    let (mut before, mut now) = (1.0, x);
+    for (k, term) in out.iter_mut().enumerate() {
+        *term = times * now;
+        let n = (k + 1) as f64;
+        let next = ((2.0 * n + 1.0) * x * now - n * before) / (n + 1.0);
+        (before, now) = (now, next);
+    }
+}
