@@ -38,7 +38,6 @@ mod tests {
     use fixed::traits::ToFixed as _;
 
     #[test]
-    #[expect(clippy::float_arithmetic, reason = "the floating-point twin")]
     fn exp_follows_its_twin() {
         for step in 0..=8 * 256 {
             let x = f64::from(step) / 256.0;

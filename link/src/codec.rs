@@ -1,0 +1,89 @@
+//! From frames to bytes and back. A frame ends at a zero byte, whatever came before it.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use serde::{Serialize, de::DeserializeOwned};
+
+/// Bytes of the longest frame, its delimiter included.
+pub const MAX_FRAME: usize = 768;
+/// CRC-32 as in Ethernet.
+const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+const CRC_BYTES: usize = 4;
+/// COBS adds a byte, and one more for every 254; the delimiter is one.
+const OVERHEAD: usize = 2 + MAX_FRAME / 254;
+
+/// A frame that does not fit [`MAX_FRAME`] or the room given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLong;
+
+/// Writes `frame` to the beginning of `out`; the number of bytes. Nothing longer than [`MAX_FRAME`] is written.
+pub fn encode<F: Serialize>(frame: &F, out: &mut [u8]) -> Result<usize, TooLong> {
+    let mut plain = [0; MAX_FRAME - OVERHEAD];
+    let room = plain.get_mut(..MAX_FRAME - OVERHEAD - CRC_BYTES).ok_or(TooLong)?;
+    let length = postcard::to_slice(frame, room).map_err(|_| TooLong)?.len();
+    let check = CRC.checksum(plain.get(..length).ok_or(TooLong)?);
+    plain.get_mut(length..length + CRC_BYTES).ok_or(TooLong)?.copy_from_slice(&check.to_le_bytes());
+    let plain = plain.get(..length + CRC_BYTES).ok_or(TooLong)?;
+    let room = out.len().checked_sub(1).ok_or(TooLong)?;
+    let coded = cobs::try_encode(plain, out.get_mut(..room).ok_or(TooLong)?).map_err(|_| TooLong)?;
+    *out.get_mut(coded).ok_or(TooLong)? = 0;
+    Ok(coded + 1)
+}
+
+/// CRC-32 of anything that can be a frame: names a configuration.
+pub fn hash<F: Serialize>(value: &F) -> u32 {
+    let mut plain = [0; MAX_FRAME];
+    postcard::to_slice(value, &mut plain).map_or(0, |bytes| CRC.checksum(bytes))
+}
+
+/// What lies between two zero bytes and is no frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Garbage;
+
+/// Collects bytes until a frame is whole.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    buffer: [u8; MAX_FRAME],
+    filled: usize,
+    overflown: bool,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self { buffer: [0; MAX_FRAME], filled: 0, overflown: false }
+    }
+}
+
+impl Decoder {
+    /// Takes a byte; at the end of a frame, the frame or the word that it was none. Empty frames are passed over.
+    pub fn push<F: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<F, Garbage>> {
+        if byte != 0 {
+            match self.buffer.get_mut(self.filled) {
+                Some(place) => {
+                    *place = byte;
+                    self.filled += 1;
+                }
+                None => self.overflown = true,
+            }
+            return None;
+        }
+        let filled = core::mem::take(&mut self.filled);
+        if core::mem::take(&mut self.overflown) {
+            return Some(Err(Garbage));
+        }
+        let coded = self.buffer.get_mut(..filled).filter(|coded| !coded.is_empty())?;
+        Some(decode(coded))
+    }
+}
+
+fn decode<F: DeserializeOwned>(coded: &mut [u8]) -> Result<F, Garbage> {
+    let length = cobs::decode_in_place(coded).map_err(|_| Garbage)?;
+    let plain = coded.get(..length).ok_or(Garbage)?;
+    let (body, check) = plain.split_last_chunk::<CRC_BYTES>().ok_or(Garbage)?;
+    if CRC.checksum(body) != u32::from_le_bytes(*check) {
+        return Err(Garbage);
+    }
+    match postcard::take_from_bytes(body) {
+        Ok((frame, [])) => Ok(frame),
+        _ => Err(Garbage),
+    }
+}

@@ -1,0 +1,338 @@
+//! The device's end: commands in, orders for the control law out; ticks in, frames out. The board and the virtual device
+//! share it. It never waits: what the PC does not take in time is dropped, oldest block first, and counted.
+
+use crate::codec::{self, Decoder, MAX_FRAME};
+use crate::frames::{
+    Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
+    PROTOCOL_VERSION, Pose, Rejection, SampleBlock, Timing,
+};
+use control_core::config::Tissue;
+use control_core::event::{Fault, Limits};
+use control_core::{Order, Plan, TICK_HZ, TickOutput};
+use heapless::{Deque, HistoryBuf};
+
+/// Blocks that wait for the PC: 77 ms of samples.
+const WAITING_BLOCKS: usize = 24;
+const WAITING_EVENTS: usize = 32;
+const WAITING_ACKS: usize = 16;
+const WAITING_ORDERS: usize = 4;
+/// Commands whose answer is remembered.
+const REMEMBERED: usize = 16;
+/// Ticks from one pose to the next.
+const POSE_TICKS: u64 = (TICK_HZ / POSE_HZ as u32) as u64;
+/// Ticks from one timing frame to the next.
+const TIMING_TICKS: u64 = TICK_HZ as u64;
+
+/// Who the device is.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// The microcontroller's unique number.
+    pub serial: [u8; 12],
+    /// Version of the firmware.
+    pub firmware: [u8; 3],
+}
+
+/// The device's end of the link.
+pub struct Endpoint {
+    identity: Identity,
+    plan_hash: u32,
+    plan: Plan,
+    decoder: Decoder,
+    answered: HistoryBuf<Ack, REMEMBERED>,
+    in_session: bool,
+    powered: bool,
+    start_ordered: bool,
+    limits: Limits,
+    fault: Option<Fault>,
+    sequence: u32,
+    acks: Deque<Ack, WAITING_ACKS>,
+    hello_due: bool,
+    events: Deque<Event, WAITING_EVENTS>,
+    filling: SampleBlock,
+    blocks: Deque<SampleBlock, WAITING_BLOCKS>,
+    pose: Option<Pose>,
+    timing: Timing,
+    timing_due: bool,
+    orders: Deque<Order, WAITING_ORDERS>,
+}
+
+impl Endpoint {
+    /// `plan` is the one that the control law starts with; `reset_cause` is reported until a person starts again.
+    pub fn new(identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
+        Self {
+            identity,
+            plan_hash: codec::hash(plan.config()),
+            plan: plan.clone(),
+            decoder: Decoder::default(),
+            answered: HistoryBuf::new(),
+            in_session: false,
+            powered: false,
+            start_ordered: false,
+            limits: Limits::default(),
+            fault: reset_cause,
+            sequence: 0,
+            acks: Deque::new(),
+            hello_due: false,
+            events: Deque::new(),
+            filling: SampleBlock::default(),
+            blocks: Deque::new(),
+            pose: None,
+            timing: Timing::default(),
+            timing_due: false,
+            orders: Deque::new(),
+        }
+    }
+
+    /// Takes bytes from the PC, in pieces of any size.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            match self.decoder.push::<HostFrame>(byte) {
+                Some(Ok(frame)) => self.command(frame),
+                Some(Err(_)) => self.timing.garbage_frames = self.timing.garbage_frames.saturating_add(1),
+                None => {}
+            }
+        }
+    }
+
+    /// The next order for the control law.
+    pub fn next_order(&mut self) -> Option<Order> {
+        self.orders.pop_front()
+    }
+
+    /// The PC is gone: nothing waits for it any longer, and half a command is forgotten.
+    pub fn disconnect(&mut self) {
+        self.in_session = false;
+        self.decoder = Decoder::default();
+        self.forget_waiting();
+    }
+
+    /// Whether a PC has said hello and is listening.
+    pub fn in_session(&self) -> bool {
+        self.in_session
+    }
+
+    /// Takes what a tick gave. `tick` counts from power-on without a gap.
+    pub fn record(&mut self, tick: u64, output: &TickOutput) {
+        self.note_events(tick, output);
+        if !self.in_session {
+            return;
+        }
+        if self.filling.samples.is_empty() {
+            self.filling.first_tick = tick;
+        }
+        let _ = self.filling.samples.push(output.sample);
+        if self.filling.samples.len() == BLOCK_SAMPLES {
+            self.queue_block();
+        }
+        if tick.is_multiple_of(POSE_TICKS) {
+            self.pose = Some(Pose {
+                tick,
+                depth: output.depth,
+                speed: output.speed,
+                force: output.force,
+                tilt: control_core::units::Milliradians(output.sample.tilt_mrad),
+                state: output.sample.state,
+                limits: output.limits,
+            });
+        }
+        self.timing_due |= tick.is_multiple_of(TIMING_TICKS);
+    }
+
+    /// Ticks that never reached [`Self::record`], because the queue between was full.
+    pub fn note_dropped(&mut self, samples: u32) {
+        self.timing.dropped_samples = self.timing.dropped_samples.saturating_add(samples);
+        // The block in hand must not span the gap.
+        if !self.filling.samples.is_empty() {
+            self.queue_block();
+        }
+    }
+
+    /// Times and counts that the next timing frame reports; the endpoint's own counts are kept.
+    pub fn set_timing(&mut self, timing: Timing) {
+        self.timing = Timing {
+            dropped_samples: self.timing.dropped_samples,
+            garbage_frames: self.timing.garbage_frames,
+            ..timing
+        };
+    }
+
+    /// Writes the next frame to `out`, which has room for [`MAX_FRAME`]; 0 where nothing waits.
+    pub fn transmit(&mut self, out: &mut [u8; MAX_FRAME]) -> usize {
+        let Some(frame) = self.next_frame() else { return 0 };
+        let numbered = Numbered { sequence: self.sequence, frame };
+        self.sequence = self.sequence.wrapping_add(1);
+        // No frame is longer than MAX_FRAME (a test holds it); were one, its missing number would be counted as lost.
+        codec::encode(&numbered, out).unwrap_or(0)
+    }
+
+    fn next_frame(&mut self) -> Option<DeviceFrame> {
+        if core::mem::take(&mut self.hello_due) {
+            return Some(DeviceFrame::Hello(self.hello()));
+        }
+        if let Some(ack) = self.acks.pop_front() {
+            return Some(DeviceFrame::Ack(ack));
+        }
+        if !self.in_session {
+            return None;
+        }
+        if let Some(event) = self.events.pop_front() {
+            return Some(DeviceFrame::Event(event));
+        }
+        if let Some(pose) = self.pose.take() {
+            return Some(DeviceFrame::Pose(pose));
+        }
+        if let Some(block) = self.blocks.pop_front() {
+            return Some(DeviceFrame::Samples(block));
+        }
+        core::mem::take(&mut self.timing_due).then_some(DeviceFrame::Timing(self.timing))
+    }
+
+    fn hello(&self) -> Hello {
+        let plan = &self.plan;
+        let device = plan.config().device;
+        Hello {
+            version: PROTOCOL_VERSION,
+            identity: self.identity.serial,
+            firmware: self.identity.firmware,
+            config_hash: self.plan_hash,
+            tick_hz: TICK_HZ,
+            pose_hz: POSE_HZ,
+            mm_per_count: plan.mm_per_count(),
+            roller_radius: device.roller_radius,
+            full_scale_torque: device.full_scale_torque,
+            dac: device.dac,
+            fault: self.fault,
+        }
+    }
+
+    fn command(&mut self, frame: HostFrame) {
+        if matches!(frame.command, Command::Hello { .. }) {
+            // A PC that starts anew may use old ids again.
+            self.answered.clear();
+        } else if let Some(ack) = self.answered.oldest_ordered().find(|ack| ack.id == frame.id) {
+            let _ = self.acks.push_back(*ack);
+            return;
+        }
+        let result = self.carry_out(frame.command);
+        let ack = Ack { id: frame.id, result };
+        if result != Err(Rejection::Full) {
+            self.answered.write(ack);
+        }
+        // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered again.
+        let _ = self.acks.push_back(ack);
+    }
+
+    fn carry_out(&mut self, command: Command) -> Result<(), Rejection> {
+        let powered = self.powered || self.start_ordered;
+        match command {
+            Command::Hello { version } if version != PROTOCOL_VERSION => Err(Rejection::Version),
+            Command::Hello { .. } => {
+                self.forget_waiting();
+                self.in_session = true;
+                self.hello_due = true;
+                self.sequence = 0;
+                self.order(Order::Heartbeat)
+            }
+            Command::Heartbeat => self.order(Order::Heartbeat),
+            Command::Stop => {
+                self.start_ordered = false;
+                // A stop must not wait behind other orders.
+                self.orders.clear();
+                self.order(Order::Stop)
+            }
+            Command::Start => {
+                self.order(Order::Start)?;
+                self.start_ordered = true;
+                self.fault = None;
+                Ok(())
+            }
+            Command::Configure(_) | Command::Zero if powered => Err(Rejection::Powered),
+            Command::Zero => self.order(Order::Zero),
+            Command::Configure(config) => {
+                let plan = Plan::new(&config).map_err(Rejection::Config)?;
+                self.order(Order::Configure(plan.clone()))?;
+                self.plan_hash = codec::hash(&config);
+                self.plan = plan;
+                self.hello_due = true;
+                Ok(())
+            }
+        }
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), Rejection> {
+        self.orders.push_back(order).map_err(|_| Rejection::Full)
+    }
+
+    fn note_events(&mut self, tick: u64, output: &TickOutput) {
+        if output.enable != self.powered {
+            self.powered = output.enable;
+            self.start_ordered = false;
+            match (output.enable, output.tripped) {
+                (true, _) => self.event(tick, EventKind::Started),
+                (false, None) => self.event(tick, EventKind::Stopped),
+                (false, Some(_)) => {}
+            }
+        }
+        if let Some(cause) = output.tripped {
+            self.fault = Some(cause);
+            self.start_ordered = false;
+            self.event(tick, EventKind::Fault { cause });
+        }
+        // A slew limit of a tick or two at each puncture is no news; the pose shows it.
+        let in_force = Limits(output.limits.0 & !Limits::SLEW.0);
+        if in_force != self.limits {
+            self.limits = in_force;
+            self.event(tick, EventKind::Limits { in_force });
+        }
+        if !output.transitions.is_empty() {
+            self.tissue_events(tick, output);
+        }
+    }
+
+    fn tissue_events(&mut self, tick: u64, output: &TickOutput) {
+        for layer in 0..8_u8 {
+            let has = |mask: u8| mask & (1 << layer) != 0;
+            if has(output.transitions.contact) {
+                self.event(tick, EventKind::Contact { layer });
+            }
+            if has(output.transitions.puncture) {
+                self.event(tick, EventKind::Puncture { layer });
+                if self.plan.tissue(layer) == Some(Tissue::Vessel) {
+                    self.event(tick, EventKind::Vessel { layer });
+                }
+            }
+            if has(output.transitions.exit) {
+                self.event(tick, EventKind::Exit { layer });
+            }
+        }
+    }
+
+    fn event(&mut self, tick: u64, kind: EventKind) {
+        if self.events.is_full() {
+            // The missing number tells the PC that a frame was lost.
+            self.events.pop_front();
+            self.sequence = self.sequence.wrapping_add(1);
+        }
+        let _ = self.events.push_back(Event { tick, kind });
+    }
+
+    fn queue_block(&mut self) {
+        let block = core::mem::take(&mut self.filling);
+        if self.blocks.is_full()
+            && let Some(oldest) = self.blocks.pop_front()
+        {
+            let dropped = oldest.samples.len() as u32;
+            self.timing.dropped_samples = self.timing.dropped_samples.saturating_add(dropped);
+        }
+        let _ = self.blocks.push_back(block);
+    }
+
+    fn forget_waiting(&mut self) {
+        self.acks.clear();
+        self.events.clear();
+        self.blocks.clear();
+        self.filling = SampleBlock::default();
+        self.pose = None;
+        self.timing_due = false;
+    }
+}

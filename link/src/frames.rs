@@ -1,0 +1,242 @@
+//! What is said. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
+
+use control_core::config::{Config, DacWidth};
+use control_core::controller::Sample;
+use control_core::event::{Fault, Limits};
+use control_core::plan::Refusal;
+use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
+use fixed::types::I2F30;
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Version of what follows; a PC refuses another.
+pub const PROTOCOL_VERSION: u16 = 1;
+/// Samples in a full block: 3.2 ms.
+pub const BLOCK_SAMPLES: usize = 32;
+/// Pose frames a second.
+pub const POSE_HZ: u16 = 1_000;
+/// Stages whose time is reported.
+pub const STAGES: usize = 8;
+
+/// Device to PC: a frame with its number, one more than the last, from 0 at a hello.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Numbered {
+    /// Wraps.
+    pub sequence: u32,
+    /// What is said.
+    pub frame: DeviceFrame,
+}
+
+/// Device to PC.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nothing allocates here, and blocks of samples are most frames"
+)]
+pub enum DeviceFrame {
+    /// Who speaks and in which scale; the answer to a hello and to a new configuration.
+    Hello(Hello),
+    /// Samples at 10 kHz.
+    Samples(SampleBlock),
+    /// Where the needle is, at 1 kHz.
+    Pose(Pose),
+    /// Something happened.
+    Event(Event),
+    /// Times of the stages, once a second.
+    Timing(Timing),
+    /// The answer to a command.
+    Ack(Ack),
+}
+
+/// Who speaks and in which scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hello {
+    /// [`PROTOCOL_VERSION`] of the device.
+    pub version: u16,
+    /// The microcontroller's unique number, or all zeros on the virtual device.
+    pub identity: [u8; 12],
+    /// Version of the firmware.
+    pub firmware: [u8; 3],
+    /// CRC-32 of the configuration in force.
+    pub config_hash: u32,
+    /// Samples a second.
+    pub tick_hz: u32,
+    /// Poses a second.
+    pub pose_hz: u16,
+    /// Length of one count along the needle in mm.
+    pub mm_per_count: I2F30,
+    /// Radius of the roller.
+    pub roller_radius: Millimetres,
+    /// Torque at full scale of the converter.
+    pub full_scale_torque: MillinewtonMetres,
+    /// The converter.
+    pub dac: DacWidth,
+    /// The fault that has latched, or the cause of the last reset where it was one.
+    pub fault: Option<Fault>,
+}
+
+/// Consecutive samples.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SampleBlock {
+    /// Tick of the first one; the others follow without a gap.
+    pub first_tick: u64,
+    /// The samples.
+    pub samples: Vec<Sample, BLOCK_SAMPLES>,
+}
+
+/// Where the needle is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// When.
+    pub tick: u64,
+    /// Depth of the tip past the zero, along the needle.
+    pub depth: Millimetres,
+    /// Its speed.
+    pub speed: MillimetresPerSecond,
+    /// The force that the law computed, before limits.
+    pub force: Newtons,
+    /// Inclination below the horizontal.
+    pub tilt: Milliradians,
+    /// [`control_core::event::State`] as a number.
+    pub state: u8,
+    /// What holds torque back.
+    pub limits: Limits,
+}
+
+/// Something happened.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// When.
+    pub tick: u64,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What can happen. Layers count from 0, the outermost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "each field is the layer or the cause that the variant names")]
+pub enum EventKind {
+    /// The tip has touched a layer.
+    Contact { layer: u8 },
+    /// A layer has given way.
+    Puncture { layer: u8 },
+    /// A vessel's wall has given way: the aim.
+    Vessel { layer: u8 },
+    /// The tip has left a layer.
+    Exit { layer: u8 },
+    /// Torque was taken away, latched.
+    Fault { cause: Fault },
+    /// Other limits are in force than before.
+    Limits { in_force: Limits },
+    /// Powered; torque fades in.
+    Started,
+    /// Torque off at a person's wish.
+    Stopped,
+}
+
+/// Times of the stages, in cycles of the device's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Clock of the device in Hz; 0 on the virtual device, whose times are in ns.
+    pub clock_hz: u32,
+    /// By [`Stage`].
+    pub stages: [StageTime; STAGES],
+    /// Ticks that came late or not at all.
+    pub missed_ticks: u32,
+    /// Samples that the device had to drop because the PC did not take them.
+    pub dropped_samples: u32,
+    /// Frames from the PC that could not be read.
+    pub garbage_frames: u32,
+}
+
+/// Last and longest time of a stage since the hello.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StageTime {
+    /// The last time.
+    pub last: u32,
+    /// The longest.
+    pub longest: u32,
+}
+
+/// Place of a stage in [`Timing::stages`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Stage {
+    /// The whole tick.
+    Tick = 0,
+    /// From the timer's edge to the write of the converter.
+    TickToDac = 1,
+    /// Reading the tilt sensor.
+    Tilt = 2,
+    /// Packing and sending.
+    Telemetry = 3,
+    /// Serving USB.
+    Usb = 4,
+    /// The supervisor.
+    Supervisor = 5,
+}
+
+/// The answer to a command.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ack {
+    /// The command's.
+    pub id: u32,
+    /// Done, or why not.
+    pub result: Result<(), Rejection>,
+}
+
+/// Why a command was not carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Rejection {
+    /// The configuration may not run.
+    Config(Refusal),
+    /// Not while torque is on: stop first.
+    Powered,
+    /// The PC speaks another version.
+    Version,
+    /// The device has no room for another command; send it again.
+    Full,
+}
+
+impl core::fmt::Display for Rejection {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Rejection::Config(refusal) => refusal.fmt(f),
+            Rejection::Powered => f.write_str("torque is on; stop the device first"),
+            Rejection::Version => {
+                write!(f, "the device speaks protocol {PROTOCOL_VERSION}; update the older side")
+            }
+            Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
+        }
+    }
+}
+
+/// PC to device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HostFrame {
+    /// Another one for each command; a repeated id is answered again and not carried out again.
+    pub id: u32,
+    /// What to do.
+    pub command: Command,
+}
+
+/// What the PC may ask. Each is acknowledged and safe to repeat.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::large_enum_variant, reason = "nothing allocates here")]
+pub enum Command {
+    /// Begin a session: the device answers with [`Hello`] and starts to stream. Numbers begin again.
+    Hello {
+        /// [`PROTOCOL_VERSION`] of the PC.
+        version: u16,
+    },
+    /// Use this configuration from now on; only while torque is off.
+    Configure(Config),
+    /// Power up and fade in.
+    Start,
+    /// Torque off.
+    Stop,
+    /// The needle is at depth 0 now; only while torque is off.
+    Zero,
+    /// Still here.
+    Heartbeat,
+}
