@@ -1,1 +1,6 @@
-//! host-sim
+//! The PC's side of the needle device, as a library: plant and virtual device, serial device, recordings, the visualizer,
+//! scoring. The program `host-sim` is its command line.
+//!
+//! It speaks to any device, virtual or not, through the same `link` bytes, and leaves force laws to `control-core`.
+
+pub mod session;

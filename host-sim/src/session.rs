@@ -1,0 +1,382 @@
+//! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what arrives, in batches, and
+//! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
+
+use control_core::config::Tissue;
+use control_core::controller::Sample;
+use link::frames::{Event, Hello, Pose, Timing};
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak, mpsc};
+
+/// Samples that wait for a slow subscriber: 2 s.
+const WAITING_SAMPLES: usize = 20_000;
+/// Poses that wait for a slow subscriber: 2 s.
+const WAITING_POSES: usize = 2_000;
+/// Events that wait for a slow subscriber, and that a new one is told of.
+const WAITING_EVENTS: usize = 256;
+
+/// What a picture needs to know before anything moves. Lengths along the needle.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scene {
+    /// Where the samples come from.
+    pub source: Source,
+    /// Name of the profile.
+    pub profile: String,
+    /// Name of the scripted procedure, where a hand follows one.
+    pub procedure: Option<String>,
+    /// The tissue, outermost layer first.
+    pub layers: Vec<SceneLayer>,
+    /// Radius of the roller in mm.
+    pub roller_radius_mm: f64,
+    /// Largest depth in mm.
+    pub travel_mm: f64,
+    /// Largest force at the roller in N.
+    pub largest_force_n: f64,
+    /// Inclination below the horizontal that the procedure begins with, in rad.
+    pub tilt_rad: f64,
+    /// Whether [`Control::Drag`], [`Control::Tilt`] and [`Control::Script`] do anything: only with the virtual device.
+    pub hand: bool,
+}
+
+/// Where samples come from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Source {
+    /// The control core against the plant.
+    Virtual,
+    /// A device behind a serial port.
+    Serial {
+        /// The port.
+        path: String,
+    },
+    /// A recording.
+    Recording {
+        /// The file.
+        file: String,
+    },
+}
+
+/// One layer of tissue.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneLayer {
+    /// What it is called.
+    pub name: String,
+    /// Whether it is the vessel that the procedure aims at.
+    pub is_vessel: bool,
+    /// Depth of its outer face in mm.
+    pub top_mm: f64,
+    /// Depth at which its wall gives way in mm, where it has one.
+    pub puncture_depth_mm: Option<f64>,
+    /// Force at which its wall gives way in N, friction not counted.
+    pub puncture_force_n: Option<f64>,
+    /// Friction gained for each mm inside it, in N/mm.
+    pub friction_n_per_mm: f64,
+}
+
+/// What people call a tissue.
+pub fn tissue_name(tissue: Tissue) -> &'static str {
+    match tissue {
+        Tissue::Skin => "skin",
+        Tissue::Fat => "fat",
+        Tissue::Muscle => "muscle",
+        Tissue::Vessel => "vessel",
+        Tissue::Other => "other",
+    }
+}
+
+/// How the link is doing, in totals since the session began.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LinkStatus {
+    /// Whether the device has answered lately.
+    pub connected: bool,
+    /// Frames that arrived whole.
+    pub frames: u64,
+    /// Frames whose number is missing.
+    pub lost_frames: u64,
+    /// Samples that arrived.
+    pub samples: u64,
+    /// Samples that did not.
+    pub lost_samples: u64,
+    /// Pieces between frames that were none.
+    pub garbage: u64,
+    /// The recording in progress.
+    pub recording: Option<RecordingStatus>,
+    /// What a person should know: why there is no connection, why a command was refused, why recording ended.
+    pub notice: Option<String>,
+}
+
+/// A recording in progress.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordingStatus {
+    /// The file.
+    pub file: String,
+    /// Bytes written so far.
+    pub bytes: u64,
+}
+
+/// All that arrived since the last drain.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// The latest hello, where there was one (a subscriber's first batch repeats it).
+    pub hello: Option<Hello>,
+    /// Samples with their tick, 10 kHz.
+    pub samples: Vec<(u64, Sample)>,
+    /// Poses, 1 kHz.
+    pub poses: Vec<Pose>,
+    /// Events (a subscriber's first batch repeats the last 256).
+    pub events: Vec<Event>,
+    /// The latest times of the stages, where there were any.
+    pub timing: Option<Timing>,
+    /// How the link is doing now.
+    pub link: LinkStatus,
+    /// Samples that this subscriber was too slow for.
+    pub skipped_samples: u64,
+}
+
+/// What a person may ask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// Power up; torque fades in, a latched fault is cleared.
+    Start,
+    /// Torque off.
+    Stop,
+    /// The needle is at depth 0 now; only while torque is off.
+    Zero,
+    /// The simulated hand goes to this depth in mm; the force decides how far the needle follows.
+    Drag {
+        /// Depth past the zero in mm.
+        depth_mm: f64,
+    },
+    /// The simulated hand stays where it is.
+    Release,
+    /// The simulated hand follows its procedure again, from the beginning.
+    Script,
+    /// Inclination of the simulated device below the horizontal.
+    Tilt {
+        /// In rad.
+        rad: f64,
+    },
+}
+
+/// A running device as the visualizer sees it. Cheap to clone.
+#[derive(Clone)]
+pub struct Session {
+    hub: Arc<Hub>,
+}
+
+/// One looker's place in the stream; dropped, it is forgotten.
+pub struct Subscription {
+    buffer: Arc<Mutex<Buffer>>,
+    hub: Arc<Hub>,
+}
+
+/// The other end: whoever runs the device publishes and takes controls here.
+pub struct Publisher {
+    hub: Arc<Hub>,
+    controls: mpsc::Receiver<Control>,
+}
+
+struct Hub {
+    scene: Scene,
+    state: Mutex<HubState>,
+    controls: mpsc::Sender<Control>,
+}
+
+#[derive(Default)]
+struct HubState {
+    subscribers: Vec<Weak<Mutex<Buffer>>>,
+    hello: Option<Hello>,
+    timing: Option<Timing>,
+    events: VecDeque<Event>,
+    link: LinkStatus,
+}
+
+#[derive(Default)]
+struct Buffer {
+    hello: Option<Hello>,
+    samples: VecDeque<(u64, Sample)>,
+    poses: VecDeque<Pose>,
+    events: VecDeque<Event>,
+    timing: Option<Timing>,
+    skipped_samples: u64,
+}
+
+/// A session and the end that feeds it.
+pub fn open(scene: Scene) -> (Session, Publisher) {
+    let (sender, receiver) = mpsc::channel();
+    let hub = Arc::new(Hub { scene, state: Mutex::default(), controls: sender });
+    (Session { hub: hub.clone() }, Publisher { hub, controls: receiver })
+}
+
+/// A looker that panicked must not take the device with it: its data is still whole.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Appends, dropping the oldest beyond `limit`; how many were dropped.
+fn append<T: Clone>(queue: &mut VecDeque<T>, new: &[T], limit: usize) -> u64 {
+    queue.extend(new.iter().cloned());
+    let excess = queue.len().saturating_sub(limit);
+    queue.drain(..excess);
+    excess as u64
+}
+
+impl Session {
+    /// A new looker; it is told the last hello and the last events at once. Any number may look.
+    pub fn subscribe(&self) -> Subscription {
+        let mut state = lock(&self.hub.state);
+        let buffer = Arc::new(Mutex::new(Buffer {
+            hello: state.hello.clone(),
+            timing: state.timing,
+            events: state.events.clone(),
+            ..Buffer::default()
+        }));
+        state.subscribers.push(Arc::downgrade(&buffer));
+        Subscription { buffer, hub: self.hub.clone() }
+    }
+
+    /// Asks for something; never blocks. What the device refuses is said in [`LinkStatus::notice`].
+    pub fn control(&self, control: Control) {
+        // Where the device's side is gone there is nobody to ask.
+        let _ = self.hub.controls.send(control);
+    }
+
+    /// What a picture needs to know before anything moves.
+    pub fn scene(&self) -> Scene {
+        self.hub.scene.clone()
+    }
+}
+
+impl Subscription {
+    /// All since the last drain; never blocks for long. A slow looker loses the oldest, and the loss is counted.
+    pub fn drain(&mut self) -> Batch {
+        let taken = std::mem::take(&mut *lock(&self.buffer));
+        Batch {
+            hello: taken.hello,
+            samples: taken.samples.into(),
+            poses: taken.poses.into(),
+            events: taken.events.into(),
+            timing: taken.timing,
+            link: lock(&self.hub.state).link.clone(),
+            skipped_samples: taken.skipped_samples,
+        }
+    }
+}
+
+impl Publisher {
+    /// The next thing that a person asked for.
+    pub fn next_control(&self) -> Option<Control> {
+        self.controls.try_recv().ok()
+    }
+
+    /// Samples, the first of them at `first_tick`, the others following without a gap.
+    pub fn samples(&self, first_tick: u64, samples: &[Sample]) {
+        let numbered: Vec<_> = (first_tick..).zip(samples.iter().copied()).collect();
+        self.each(|buffer| {
+            buffer.skipped_samples += append(&mut buffer.samples, &numbered, WAITING_SAMPLES);
+        });
+    }
+
+    /// A pose.
+    pub fn pose(&self, pose: Pose) {
+        self.each(|buffer| {
+            append(&mut buffer.poses, &[pose], WAITING_POSES);
+        });
+    }
+
+    /// An event.
+    pub fn event(&self, event: Event) {
+        append(&mut lock(&self.hub.state).events, &[event], WAITING_EVENTS);
+        self.each(|buffer| {
+            append(&mut buffer.events, &[event], WAITING_EVENTS);
+        });
+    }
+
+    /// A hello: who speaks from now on.
+    pub fn hello(&self, hello: &Hello) {
+        lock(&self.hub.state).hello = Some(hello.clone());
+        self.each(|buffer| buffer.hello = Some(hello.clone()));
+    }
+
+    /// Times of the stages.
+    pub fn timing(&self, timing: Timing) {
+        lock(&self.hub.state).timing = Some(timing);
+        self.each(|buffer| buffer.timing = Some(timing));
+    }
+
+    /// How the link is doing.
+    pub fn link(&self, change: impl FnOnce(&mut LinkStatus)) {
+        change(&mut lock(&self.hub.state).link);
+    }
+
+    fn each(&self, mut act: impl FnMut(&mut Buffer)) {
+        lock(&self.hub.state).subscribers.retain(|subscriber| {
+            subscriber.upgrade().is_some_and(|buffer| {
+                act(&mut lock(&buffer));
+                true
+            })
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::frames::EventKind;
+
+    fn scene() -> Scene {
+        Scene {
+            source: Source::Virtual,
+            profile: "adult".into(),
+            procedure: None,
+            layers: Vec::new(),
+            roller_radius_mm: 10.0,
+            travel_mm: 60.0,
+            largest_force_n: 2.88,
+            tilt_rad: 0.0,
+            hand: true,
+        }
+    }
+
+    #[test]
+    fn a_slow_looker_loses_the_oldest_and_is_told_how_many() {
+        let (session, publisher) = open(scene());
+        let (mut slow, mut quick) = (session.subscribe(), session.subscribe());
+        let block = [Sample::default(); 32];
+        let mut seen = 0;
+        for block_number in 0..1_000 {
+            publisher.samples(block_number * 32, &block);
+            seen += quick.drain().samples.len();
+        }
+        assert_eq!(seen, 32_000);
+        let late = slow.drain();
+        assert_eq!((late.samples.len(), late.skipped_samples), (20_000, 12_000));
+        assert_eq!(late.samples.first().map(|s| s.0), Some(12_000));
+        assert_eq!(slow.drain().samples.len(), 0);
+    }
+
+    #[test]
+    fn a_late_looker_is_told_what_happened_and_a_dropped_one_is_forgotten() {
+        let (session, publisher) = open(scene());
+        let early = session.subscribe();
+        publisher.event(Event { tick: 7, kind: EventKind::Puncture { layer: 0 } });
+        drop(early);
+        publisher.pose(Pose::default());
+        assert!(lock(&session.hub.state).subscribers.is_empty());
+        let batch = session.subscribe().drain();
+        assert_eq!(batch.events.len(), 1);
+        assert!(batch.poses.is_empty());
+    }
+
+    #[test]
+    fn controls_arrive_in_order_and_outlive_their_device() {
+        let (session, publisher) = open(scene());
+        session.control(Control::Start);
+        session.control(Control::Drag { depth_mm: 3.0 });
+        assert_eq!(publisher.next_control(), Some(Control::Start));
+        assert_eq!(publisher.next_control(), Some(Control::Drag { depth_mm: 3.0 }));
+        assert_eq!(publisher.next_control(), None);
+        drop(publisher);
+        session.control(Control::Stop);
+    }
+}

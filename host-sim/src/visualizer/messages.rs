@@ -1,0 +1,275 @@
+//! Everything that server and page say to each other: JSON texts over the WebSocket at `/live`, one message a text.
+//!
+//! After connecting the page gets one `scene`, a `device` as soon as the device has said who it is, and then up to
+//! sixty `frame`s a second; four a second while nothing arrives from the device. The page sends a [`FromPage`] when a
+//! person does something. Times are seconds of the device's own clock, lengths are along the needle.
+
+use serde::{Deserialize, Serialize};
+
+/// Server to page; `type` names the variant.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum ToPage {
+    /// What is simulated; once, at the beginning.
+    Scene(Scene),
+    /// Who the device is; again whenever it starts anew.
+    Device(Device),
+    /// What has happened since the last frame.
+    Frame(Frame),
+}
+
+/// What is simulated.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scene {
+    /// Name of the profile.
+    pub profile: String,
+    /// The layers, outermost first.
+    pub layers: Vec<Layer>,
+    /// Radius of the roller in mm.
+    pub roller_radius_mm: f64,
+    /// Inclination below the horizontal at the start, in rad.
+    pub tilt_rad: f64,
+    /// Whether a person can move the needle in the page; not so on real hardware or in a replay.
+    pub can_drag: bool,
+}
+
+/// One layer of tissue.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Layer {
+    /// `skin`, `fat`, `muscle`, `vessel` or `other`.
+    pub tissue: &'static str,
+    /// Depth of its outer face in mm.
+    pub top_mm: f64,
+    /// Travel past that face at which its wall gives way, in mm; null where it has no wall.
+    pub puncture_mm: Option<f64>,
+}
+
+/// Who the device is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Device {
+    /// Whether it is the virtual one.
+    pub is_virtual: bool,
+    /// Its unique number in hexadecimal; zeros on the virtual device.
+    pub identity: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// CRC-32 of the configuration in force, in hexadecimal.
+    pub config_hash: String,
+    /// Samples a second.
+    pub tick_hz: u32,
+    /// Length of one encoder count along the needle in mm.
+    pub mm_per_count: f64,
+    /// Torque at the converter's full scale in mN·m.
+    pub full_scale_torque_mnm: f64,
+    /// Bits of the converter.
+    pub dac_bits: u8,
+    /// The fault that has latched, in words; null where none has.
+    pub fault: Option<String>,
+}
+
+/// What has happened since the last frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Frame {
+    /// The newest pose; null where none has arrived since the last frame.
+    pub pose: Option<Pose>,
+    /// What the plots draw, oldest first.
+    pub trace: Vec<Bucket>,
+    /// What happened, oldest first.
+    pub events: Vec<Event>,
+    /// How the link does.
+    pub link: Link,
+    /// Who moves the needle.
+    pub hand: Hand,
+    /// Times of the device's stages, once a second.
+    pub timing: Option<Timing>,
+}
+
+/// Where the needle is and what it feels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Pose {
+    /// When, in s.
+    pub t_s: f64,
+    /// Depth of the tip past the zero in mm.
+    pub depth_mm: f64,
+    /// Its speed in mm/s, positive when inserting.
+    pub speed_mm_s: f64,
+    /// The force that the control core computed, in N, positive when it resists insertion.
+    pub force_n: f64,
+    /// What the motor gives at the needle after all limits, from the converter's code; in N, the same sign.
+    pub motor_n: f64,
+    /// The motor's torque in mN·m, positive in the insertion direction.
+    pub torque_mnm: f64,
+    /// Inclination below the horizontal in rad.
+    pub tilt_rad: f64,
+    /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault` or `unknown`.
+    pub state: &'static str,
+    /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity.
+    pub limits: u8,
+}
+
+/// All samples and poses of 5 ms: `[t_s, [depth low, high], [law low, high], [motor low, high]]` in s, mm and N, `t_s` being
+/// where the 5 ms begin.
+/// Null where nothing was known. Extremes are kept, so that no spike is lost on the way to the plot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bucket(pub f64, pub Range, pub Range, pub Range);
+
+/// The least and the greatest of a quantity; null where there was none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Range(pub Option<f64>, pub Option<f64>);
+
+impl Range {
+    /// Takes one more value in.
+    pub fn take(&mut self, value: f64) {
+        self.0 = Some(self.0.map_or(value, |low| low.min(value)));
+        self.1 = Some(self.1.map_or(value, |high| high.max(value)));
+    }
+}
+
+/// Something happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// When, in s.
+    pub t_s: f64,
+    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped` or `other`.
+    pub kind: &'static str,
+    /// The layer it is about, outermost 0.
+    pub layer: Option<u8>,
+    /// Depth of the tip just before, in mm.
+    pub depth_mm: Option<f64>,
+    /// The computed force just before, in N.
+    pub force_n: Option<f64>,
+    /// The cause of a fault, in words.
+    pub cause: Option<String>,
+    /// Limits in force since then, as in [`Pose::limits`].
+    pub limits: Option<u8>,
+}
+
+/// How the link does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Link {
+    /// Whether the device answers.
+    pub connected: bool,
+    /// Frames that arrived.
+    pub frames: u64,
+    /// Frames that are missing.
+    pub lost_frames: u64,
+    /// Samples that are missing.
+    pub lost_samples: u64,
+    /// Pieces that were no frame.
+    pub garbage: u64,
+    /// Samples that this page was too slow for; they are in the recording all the same.
+    pub skipped_samples: u64,
+    /// What is being recorded.
+    pub recording: Option<Recording>,
+}
+
+/// A recording under way.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Recording {
+    /// Name of the file.
+    pub file: String,
+    /// Samples in it so far.
+    pub samples: u64,
+    /// Why it ended early; null while it runs.
+    pub error: Option<String>,
+}
+
+/// Who moves the needle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hand {
+    /// The scripted hand, or whoever holds the real needle.
+    #[default]
+    Demo,
+    /// A person, in a page.
+    Person,
+}
+
+/// Times of the device's stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// Longest time of a whole tick in µs.
+    pub longest_tick_us: f64,
+    /// Ticks that came late or not at all.
+    pub missed_ticks: u32,
+    /// Samples that the device had to drop.
+    pub dropped_samples: u32,
+}
+
+/// Page to server; `do` names the variant, e.g. `{"do":"drag","depth_mm":3.2}`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub enum FromPage {
+    /// Power up.
+    Start,
+    /// Torque off.
+    Stop,
+    /// The needle is at depth 0 now.
+    Zero,
+    /// The hand wants the tip here.
+    Drag {
+        /// Depth in mm, −200 to 500.
+        depth_mm: f64,
+    },
+    /// The pointer was lifted; the hand stays where it is.
+    Release,
+    /// The scripted hand takes over again.
+    Demo,
+    /// The hand turns the needle.
+    Tilt {
+        /// Inclination below the horizontal in rad, 0 to π/2.
+        rad: f64,
+    },
+}
+
+impl FromPage {
+    /// Reads a message; what is wrong with it, in one line, where it cannot be.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let message: Self = serde_json::from_str(text).map_err(|e| format!("message not understood: {e}"))?;
+        match message {
+            Self::Drag { depth_mm } if !(-200.0..=500.0).contains(&depth_mm) => {
+                Err(format!("depth {depth_mm} mm is not within -200 to 500 mm"))
+            }
+            Self::Tilt { rad } if !(0.0..=std::f64::consts::FRAC_PI_2).contains(&rad) => {
+                Err(format!("tilt {rad} rad is not within 0 to pi/2"))
+            }
+            message => Ok(message),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_of_a_page_are_read_and_nonsense_is_refused() {
+        assert_eq!(
+            FromPage::parse(r#"{"do":"drag","depth_mm":3.25}"#),
+            Ok(FromPage::Drag { depth_mm: 3.25 })
+        );
+        assert_eq!(FromPage::parse(r#"{"do":"stop"}"#), Ok(FromPage::Stop));
+        for bad in [
+            "",
+            "{}",
+            r#"{"do":"fly"}"#,
+            r#"{"do":"drag"}"#,
+            r#"{"do":"drag","depth_mm":1e9}"#,
+            r#"{"do":"drag","depth_mm":null}"#,
+            r#"{"do":"tilt","rad":2}"#,
+        ] {
+            let error = FromPage::parse(bad).unwrap_err();
+            assert!(!error.contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_bucket_is_a_flat_enough_array() {
+        let mut range = Range::default();
+        range.take(2.0);
+        range.take(-1.0);
+        let bucket = Bucket(0.5, range, Range::default(), range);
+        let text = serde_json::to_string(&bucket).unwrap();
+        assert_eq!(text, "[0.5,[-1.0,2.0],[null,null],[-1.0,2.0]]");
+    }
+}

@@ -1,0 +1,16 @@
+//! The page: serves it from the program itself, streams to it what the device does, and passes on what a person does.
+//!
+//! [`messages`] is what is said between server and page, [`condense`] turns 10 kHz into what a picture needs,
+//! `server` and `connection` carry it, `assets` holds the files of `host-sim/page`.
+//!
+//! This module may not touch the device, the link or a recording: it knows a [`crate::session::Session`] and nothing
+//! behind it. A page that is slow, asleep or gone costs the session nothing but its own bounded queue.
+
+mod assets;
+pub mod condense;
+mod connection;
+mod event_message;
+pub mod messages;
+mod server;
+
+pub use server::{ServeError, Server, serve};
