@@ -48,7 +48,7 @@ impl Anchor {
                 self.position = self.position.saturating_add(step);
                 let stretch: I16F16 = I32F32::from(depth.0).saturating_sub(self.position).saturating_to_num();
                 let level = exp(times(inserted.0, *per_level_length)).min(*level_cap);
-                let force = stretch.saturating_mul(stiffness.0).saturating_mul(level);
+                let force = stretch.saturating_mul(level).saturating_mul(stiffness.0);
                 Newtons(force.clamp(-limit.0, limit.0))
             }
             Law::Cone { stiffness, inverse_stiffness } => {

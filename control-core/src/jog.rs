@@ -2,31 +2,27 @@
 //! falling one that is felt only while the tip cuts on.
 
 use crate::config;
-use crate::math::times;
 use crate::units::{Millimetres, Newtons, Stiffness};
-use fixed::types::{I2F30, I16F16};
+use fixed::types::{I9F23, I10F22, I16F16};
 
-/// A parabola ready for the tick: the division is done once.
+/// A parabola ready for the tick. `(T − n)²/a` is computed as `((T − n)/√a)²`: two multiplications, and precise for a
+/// soft wall and a hard one alike.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parabola {
     pub(crate) vertex: I16F16,
-    inverse_compliance: I2F30,
-    /// The inverse is scaled down by this, to fit its format where the compliance is below 1 mm²/N.
-    shift: u32,
-    pub(crate) base: I16F16,
+    inverse_root_compliance: I9F23,
+    base: I16F16,
 }
 
 impl Parabola {
     /// `config.compliance` is at least 0.05 mm²/N; [`crate::plan`] has seen to it.
     pub(crate) fn new(config: &config::Parabola) -> Self {
-        let compliance = i64::from(config.compliance.0.to_bits().max(3_277));
-        // 2^46 / (a·2^16) is 1/a in Q30; 1/a ≤ 20 needs five bits more than I2F30 has.
-        let shift = if compliance <= 1 << 16 { 5 } else { 0 };
-        let inverse = ((1_i64 << (46 - shift)) + compliance / 2) / compliance;
+        let compliance = u64::from(config.compliance.0.to_bits().unsigned_abs().max(3_277));
+        // a is a·2^16 here, so 2^62/a is (1/a)·2^46, whose root is Q23.
+        let root = ((1_u64 << 62) / compliance).isqrt();
         Self {
             vertex: config.vertex.0,
-            inverse_compliance: I2F30::from_bits(i32::try_from(inverse).unwrap_or(i32::MAX)),
-            shift,
+            inverse_root_compliance: I9F23::from_bits(i32::try_from(root).unwrap_or(i32::MAX)),
             base: config.base.0,
         }
     }
@@ -34,8 +30,8 @@ impl Parabola {
     /// `(T − n)²/a + b`, saturating.
     pub(crate) fn force(&self, travel: Millimetres) -> Newtons {
         let from_vertex = travel.0.saturating_sub(self.vertex);
-        let square: I16F16 = from_vertex.wide_mul(from_vertex).saturating_to_num();
-        let rise = times(square, self.inverse_compliance).saturating_mul_int(1 << self.shift);
+        let root: I10F22 = from_vertex.wide_mul(self.inverse_root_compliance).saturating_to_num();
+        let rise: I16F16 = root.wide_mul(root).saturating_to_num();
         Newtons(rise.saturating_add(self.base))
     }
 }

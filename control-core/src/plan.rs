@@ -241,7 +241,7 @@ fn check_device(config: &Config) -> Result<(), Refusal> {
         milli(128_000),
         milli(32_767_000),
     )?;
-    within(Field::FullScaleTorque, device.full_scale_torque.0, milli(1_000), milli(500_000))?;
+    within(Field::FullScaleTorque, device.full_scale_torque.0, milli(10_000), milli(500_000))?;
     within(Field::TorqueLimit, limits.torque.0, milli(100), device.full_scale_torque.0)?;
     within(Field::SlewPerTick, limits.slew_per_tick.0, milli(1), milli(100_000))?;
     within(

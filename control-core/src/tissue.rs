@@ -74,7 +74,7 @@ impl Tissue {
         speed: MillimetresPerSecond,
     ) -> Response {
         let walls = self.walls(tissue, count, depth);
-        let friction = self.friction(tissue, depth);
+        let friction = self.friction(tissue, count, depth);
         let state = match friction {
             Some(_) if speed.0 < -WITHDRAWAL_SPEED => State::Withdrawal,
             _ if walls.pressing => State::Elastic,
@@ -117,9 +117,9 @@ impl Tissue {
     }
 
     /// The friction along the needle, where the tip is inside.
-    fn friction(&mut self, tissue: &Layers, depth: Millimetres) -> Option<Newtons> {
+    fn friction(&mut self, tissue: &Layers, count: Counts, depth: Millimetres) -> Option<Newtons> {
         let entry = tissue.layers.first()?;
-        if !self.is_open(tissue) || depth.0 <= entry.top.0 {
+        if !self.is_open(tissue) || count.0 < entry.contact {
             self.anchor.release(depth);
             return None;
         }

@@ -1,0 +1,205 @@
+//! Fixed point against its floating-point twin: over any valid configuration and any walk of the needle the two stay
+//! within one step of the converter, and nothing overflows or panics whatever the counts.
+
+mod model;
+
+use control_core::config::{
+    Config, DacWidth, Device, FrictionLaw, Layer, MAX_LAYERS, Parabola, SafetyConfig, SpeedMethod, Tissue,
+    Wall,
+};
+use control_core::event::{Fault, State};
+use control_core::units::{
+    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
+    Newtons, Stiffness,
+};
+use control_core::{Controller, Order, Plan, TickInput};
+use fixed::types::{I8F24, I16F16};
+use proptest::prelude::*;
+
+fn q(value: f64) -> I16F16 {
+    I16F16::from_num(value)
+}
+
+fn device() -> impl Strategy<Value = Device> {
+    (4.0..25.0_f64, 256..=65_535_u16, 10.0..500.0_f64, any::<bool>()).prop_map(
+        |(radius, counts, torque, narrow)| Device {
+            roller_radius: Millimetres(q(radius)),
+            counts_per_turn: counts,
+            full_scale_torque: MillinewtonMetres(q(torque)),
+            dac: if narrow { DacWidth::Bits8 } else { DacWidth::Bits12 },
+        },
+    )
+}
+
+fn limits(device: Device) -> impl Strategy<Value = SafetyConfig> {
+    let full = device.full_scale_torque.0.to_num::<f64>();
+    (0.1..=1.0_f64, 0.01..50.0_f64, 10..400_u16, 2..200_u16, 20.0..200.0_f64, 0.5..7.0_f64).prop_map(
+        move |(share, slew, fade_in_ms, max_counts_per_tick, travel, stiffness)| SafetyConfig {
+            torque: MillinewtonMetres(q(full * share)),
+            slew_per_tick: MillinewtonMetres(q(slew)),
+            fade_in_ms,
+            max_counts_per_tick,
+            travel: Millimetres(q(travel)),
+            stiffness: Stiffness(q(stiffness)),
+            heartbeat_ms: 5_000,
+        },
+    )
+}
+
+fn friction(stiffest: f64, strongest: f64) -> impl Strategy<Value = FrictionLaw> {
+    let paper = (1.0..200.0_f64, 1.0..8.0_f64, 5..1_000_u16, 0.01..0.9_f64, 0.01..0.9_f64);
+    let paper = paper.prop_map(move |(length, cap, anchor_ms, share, limit)| FrictionLaw::Paper {
+        level_length: Millimetres(q(length)),
+        level_cap: q(cap),
+        anchor_ms,
+        stiffness: Stiffness(q((stiffest * share / cap).max(0.001))),
+        limit: Newtons(q((strongest * limit).max(0.001))),
+    });
+    let cone = (0.1..0.6_f64)
+        .prop_map(move |share| FrictionLaw::Cone { stiffness: Stiffness(q((stiffest * share).max(0.05))) });
+    prop_oneof![paper, cone]
+}
+
+/// A wall that is likely to be valid: its slope and force are shares of what is allowed.
+fn wall(stiffest: f64, strongest: f64) -> impl Strategy<Value = Option<Wall>> {
+    let parts = (0.1..0.5_f64, 0.05..0.8_f64, 0.2..5.0_f64, 0.0..1.0_f64, 0.05..0.4_f64);
+    let wall = parts.prop_map(move |(slope, force, beyond, relief, unload)| {
+        let (slope, force) = (slope * stiffest, force * strongest);
+        // f = T²/a and 2T/a at the puncture.
+        let puncture = (2.0 * force / slope).clamp(0.05, 20.0);
+        let compliance = (2.0 * puncture / slope).clamp(0.05, 1_000.0);
+        let peak = puncture * puncture / compliance;
+        let relief_compliance = (beyond * beyond / (relief * peak).max(0.002)).clamp(0.05, 1_000.0);
+        let parabola = |vertex: f64, compliance: f64| Parabola {
+            vertex: Millimetres(q(vertex)),
+            compliance: JogCompliance(q(compliance)),
+            base: Newtons::default(),
+        };
+        Wall {
+            elastic: parabola(0.0, compliance),
+            puncture_travel: Millimetres(q(puncture)),
+            relief: parabola(puncture + beyond, relief_compliance),
+            unload: Stiffness(q((unload * stiffest).max(0.05))),
+        }
+    });
+    prop::option::weighted(0.7, wall)
+}
+
+fn layers(stiffest: f64, strongest: f64, travel: f64) -> impl Strategy<Value = Vec<Layer>> {
+    let layer = (wall(stiffest, strongest), 0.0..0.3_f64, 0.1..10.0_f64);
+    prop::collection::vec(layer, 1..=MAX_LAYERS).prop_map(move |parts| {
+        let mut top = 0.0;
+        let place = |(wall, friction, gap): (Option<Wall>, f64, f64)| {
+            top += gap;
+            let layer = Layer {
+                tissue: Tissue::Other,
+                top: Millimetres(q(top)),
+                wall,
+                friction: FrictionPerMillimetre(q(friction * strongest / travel)),
+            };
+            top += wall.map_or(0.0, |w| w.puncture_travel.0.to_num::<f64>());
+            layer
+        };
+        parts.into_iter().map(place).collect()
+    })
+}
+
+/// Any configuration that is not refused.
+fn valid_config() -> impl Strategy<Value = (Config, Plan)> {
+    let config =
+        device().prop_flat_map(|device| (Just(device), limits(device))).prop_flat_map(|(device, limits)| {
+            let stiffest = limits.stiffness.0.to_num::<f64>();
+            let strongest = limits.torque.0.to_num::<f64>() / device.roller_radius.0.to_num::<f64>();
+            let travel = limits.travel.0.to_num::<f64>();
+            let speed = prop_oneof![Just(SpeedMethod::Window), Just(SpeedMethod::EdgeTiming)];
+            let laws =
+                (friction(stiffest, strongest), layers(stiffest, strongest, travel), speed, 0..=8_389_i32);
+            laws.prop_map(move |(friction, layers, speed, damping)| Config {
+                device,
+                limits,
+                speed,
+                damping: Damping(I8F24::from_bits(damping)),
+                friction,
+                layers: layers.into_iter().collect(),
+            })
+        });
+    config.prop_filter_map("refused", |config| Plan::new(&config).ok().map(|plan| (config, plan)))
+}
+
+/// Legs of a walk: counts a tick (as a share of the largest) and ticks.
+fn legs() -> impl Strategy<Value = Vec<(f64, u16)>> {
+    let slow = (-0.05..0.12_f64, 1..400_u16);
+    let fast = (-1.0..1.0_f64, 1..60_u16);
+    let rest = (Just(0.0), 1..1_500_u16);
+    prop::collection::vec(prop_oneof![4 => slow, 2 => fast, 1 => rest], 1..24)
+}
+
+fn walk(legs: &[(f64, u16)], largest: f64, furthest: i32) -> Vec<i32> {
+    let (mut at, mut counts) = (0.0_f64, Vec::new());
+    for (share, ticks) in legs {
+        for _ in 0..*ticks {
+            at = (at + share * largest).clamp(f64::from(-furthest), f64::from(furthest));
+            counts.push(at.round() as i32);
+        }
+    }
+    counts
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, max_global_rejects: 2_000_000, max_shrink_iters: 2_000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn fixed_point_stays_within_one_step_of_its_twin((config, plan) in valid_config(), legs in legs()) {
+        let mm_per_count = plan.mm_per_count().to_num::<f64>();
+        let furthest = (config.limits.travel.0.to_num::<f64>() / mm_per_count) as i32 - 1;
+        let largest = f64::from(config.limits.max_counts_per_tick) - 1.0;
+        let mut twin = model::Twin::new(&config, mm_per_count);
+        let mut controller = Controller::new(plan);
+        controller.order(Order::Start);
+        let zero = f64::from(config.device.dac.mid_scale());
+        for (tick, count) in walk(&legs, largest, furthest).into_iter().enumerate() {
+            controller.order(Order::Heartbeat);
+            let output = controller.tick(TickInput { count: Counts(count), ..TickInput::default() });
+            prop_assert_eq!(output.tripped, None);
+            let (got, wanted) = (f64::from(output.dac.0) - zero, twin.tick(count));
+            prop_assert!((got - wanted).abs() <= 1.0, "tick {tick}, count {count}: {got} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn no_sequence_of_counts_and_orders_panics(
+        (_, plan) in valid_config(),
+        steps in prop::collection::vec((any::<i32>(), 0_u32..32, 0_u8..12, any::<i16>()), 1..600),
+    ) {
+        let mut controller = Controller::new(plan.clone());
+        let limit = plan.config().device.dac.span();
+        for (count, shift, order, tilt) in steps {
+            match order {
+                0 => controller.order(Order::Stop),
+                1 => controller.order(Order::Zero),
+                2 => controller.order(Order::Configure(plan.clone())),
+                3 => controller.order(Order::Trip(Fault::Tilt)),
+                4..=7 => controller.order(Order::Start),
+                _ => controller.order(Order::Heartbeat),
+            }
+            let output = controller.tick(TickInput { count: Counts(count >> shift), tilt: Milliradians(tilt) });
+            let zero = plan.zero_torque_code().0;
+            prop_assert!(output.dac.0.abs_diff(zero) <= limit);
+            let powered = State::from_code(output.sample.state).is_some_and(State::is_powered);
+            prop_assert_eq!(powered, output.enable);
+            prop_assert!(output.enable || output.dac.0 == zero, "torque without the amplifier");
+        }
+    }
+
+    #[test]
+    fn a_count_is_the_circumference_over_the_counts(radius in 4.0..25.0_f64, counts in 256..=65_535_u16) {
+        let mut config = Config::default();
+        config.device.roller_radius = Millimetres(q(radius));
+        config.device.counts_per_turn = counts;
+        config.limits.stiffness = Stiffness(q(7.0));
+        if let Ok(plan) = Plan::new(&config) {
+            let exact = 2.0 * std::f64::consts::PI * q(radius).to_num::<f64>() / f64::from(counts);
+            prop_assert!((plan.mm_per_count().to_num::<f64>() - exact).abs() < 2e-9);
+        }
+    }
+}

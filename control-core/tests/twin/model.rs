@@ -1,0 +1,164 @@
+//! The floating-point twin of the whole tick, written from the equations (seed 001 and the force laws of the design), not
+//! from the fixed-point code. It takes the configuration's own quantised values as exact.
+
+use control_core::config::{Config, FrictionLaw, Layer, Parabola, SpeedMethod};
+
+/// What the twin remembers from tick to tick.
+pub(crate) struct Twin {
+    config: Config,
+    mm_per_count: f64,
+    layers: Vec<LayerState>,
+    anchor: f64,
+    given: f64,
+    ticks: u32,
+    counts: Vec<i32>,
+    edges: Vec<(usize, i32)>,
+    last_edge: (usize, i32),
+}
+
+#[derive(Clone, Copy, Default)]
+struct LayerState {
+    open: bool,
+    frontier: f64,
+}
+
+fn force(p: &Parabola, travel: f64) -> f64 {
+    let from_vertex = travel - p.vertex.0.to_num::<f64>();
+    from_vertex * from_vertex / p.compliance.0.to_num::<f64>() + p.base.0.to_num::<f64>()
+}
+
+impl Twin {
+    pub(crate) fn new(config: &Config, mm_per_count: f64) -> Self {
+        let layers = vec![LayerState::default(); config.layers.len()];
+        let config = config.clone();
+        Self {
+            config,
+            mm_per_count,
+            layers,
+            anchor: 0.0,
+            given: 0.0,
+            ticks: 0,
+            counts: Vec::new(),
+            edges: vec![(0, 0)],
+            last_edge: (0, 0),
+        }
+    }
+
+    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call.
+    pub(crate) fn tick(&mut self, count: i32) -> f64 {
+        let depth = f64::from(count) * self.mm_per_count;
+        let speed = self.speed(count);
+        let force = self.walls(count, depth) + self.friction(count, depth);
+        let force = force + speed * self.config.damping.0.to_num::<f64>();
+        let device = self.config.device;
+        let limits = self.config.limits;
+        let largest = limits.torque.0.to_num::<f64>();
+        let wanted = (-force * device.roller_radius.0.to_num::<f64>()).clamp(-largest, largest);
+        self.ticks += 1;
+        let faded = wanted * (f64::from(self.ticks) / (f64::from(limits.fade_in_ms) * 10.0)).min(1.0);
+        let slew = limits.slew_per_tick.0.to_num::<f64>();
+        self.given = faded.clamp(self.given - slew, self.given + slew);
+        let span = f64::from(device.dac.span());
+        (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-span, span)
+    }
+
+    fn counts_at(&self, depth: f64) -> i32 {
+        (depth / self.mm_per_count).ceil() as i32
+    }
+
+    fn walls(&mut self, count: i32, depth: f64) -> f64 {
+        let mut sum = 0.0;
+        for index in 0..self.layers.len() {
+            let layer: Layer = self.config.layers[index];
+            let top = layer.top.0.to_num::<f64>();
+            let mut state = self.layers[index];
+            if count < self.counts_at(top - 13_107.0 / 65_536.0) {
+                state = LayerState::default();
+            }
+            if let Some(wall) = layer.wall {
+                let travel = depth - top;
+                let puncture = wall.puncture_travel.0.to_num::<f64>();
+                if !state.open && count >= self.counts_at(top + puncture) {
+                    state = LayerState { open: true, frontier: travel };
+                }
+                if state.open {
+                    state.frontier = state.frontier.max(travel);
+                    let cut = force(&wall.relief, state.frontier.min(wall.relief.vertex.0.to_num()));
+                    let drawn_back = state.frontier - travel;
+                    sum += (cut - drawn_back * wall.unload.0.to_num::<f64>()).max(0.0);
+                } else if count >= self.counts_at(top) {
+                    sum += force(&wall.elastic, travel);
+                }
+            }
+            self.layers[index] = state;
+        }
+        sum
+    }
+
+    fn friction(&mut self, count: i32, depth: f64) -> f64 {
+        let layers = &self.config.layers;
+        let first_wall = layers.iter().position(|l| l.wall.is_some());
+        let open = first_wall.is_none_or(|i| self.layers[i].open);
+        let entry = layers[0].top.0.to_num::<f64>();
+        if !open || count < self.counts_at(entry) {
+            self.anchor = depth;
+            return 0.0;
+        }
+        match self.config.friction {
+            FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => {
+                let follow = 1.0 - (-0.1 / f64::from(anchor_ms)).exp();
+                self.anchor += (depth - self.anchor) * follow;
+                let level = ((depth - entry) / level_length.0.to_num::<f64>()).exp().min(level_cap.to_num());
+                let limit = limit.0.to_num::<f64>();
+                ((depth - self.anchor) * level * stiffness.0.to_num::<f64>()).clamp(-limit, limit)
+            }
+            FrictionLaw::Cone { stiffness } => {
+                let mut limit = 0.0;
+                for (index, layer) in layers.iter().enumerate() {
+                    let end = layers.get(index + 1).map_or(f64::INFINITY, |l| l.top.0.to_num());
+                    let inside = (depth.min(end) - layer.top.0.to_num::<f64>()).max(0.0);
+                    limit += inside * layer.friction.0.to_num::<f64>();
+                }
+                let stiffness = stiffness.0.to_num::<f64>();
+                self.anchor = self.anchor.clamp(depth - limit / stiffness, depth + limit / stiffness);
+                (depth - self.anchor) * stiffness
+            }
+        }
+    }
+
+    fn speed(&mut self, count: i32) -> f64 {
+        self.counts.push(count);
+        let speed = match self.config.speed {
+            SpeedMethod::Window => self.speed_over_window(count),
+            SpeedMethod::EdgeTiming => self.speed_between_edges(count),
+        };
+        // The documented range of the type: 33 m/s, which no needle reaches.
+        speed.clamp(-32_768.0, 32_768.0)
+    }
+
+    fn speed_over_window(&self, count: i32) -> f64 {
+        let before = self.counts.len().checked_sub(129).map_or(0, |i| self.counts[i]);
+        f64::from(count - before) * self.mm_per_count * 10_000.0 / 128.0
+    }
+
+    fn speed_between_edges(&mut self, count: i32) -> f64 {
+        let now = self.counts.len();
+        if count != self.last_edge.1 {
+            self.last_edge = (now, count);
+            if now - self.edges[self.edges.len() - 1].0 >= 16 {
+                self.edges.push(self.last_edge);
+            }
+        }
+        let silent = now - self.last_edge.0;
+        if silent > 1000 {
+            return 0.0;
+        }
+        let age = |e: &&(usize, i32)| self.last_edge.0 - e.0;
+        let remembered = &self.edges[self.edges.len().saturating_sub(8)..];
+        let inside = remembered.iter().filter(|e| (1..=128).contains(&age(e))).max_by_key(age);
+        let before = remembered.iter().filter(|e| age(e) > 128 && age(e) <= 1000).min_by_key(age);
+        let first = *inside.or(before).unwrap_or(&self.last_edge);
+        let span = (self.last_edge.0 - first.0).max(silent).max(1);
+        f64::from(self.last_edge.1 - first.1) * self.mm_per_count * 10_000.0 / span as f64
+    }
+}
