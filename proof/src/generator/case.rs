@@ -1,0 +1,459 @@
+//! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the key.
+
+use super::effects::{self, Parameter};
+use super::excite::{self, Excitation, Kind};
+use super::machine::{Machine, Needs};
+use super::outside;
+use super::plant::Plant;
+use super::simulate::{Believed, Diverged, Row, Run, STEP, Series, simulate};
+use super::strength::{Declared, Measured, measure};
+use crate::rng::Rng;
+
+/// What kind of case it is, and so what the right answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Category {
+    /// One effect: name it, or a class of three at most that holds it.
+    Single,
+    /// Two effects: both, and none else.
+    Pair,
+    /// The nominal model itself with noise: no name.
+    Null,
+    /// The nominal model itself under a strong disturbance: no name.
+    Disturbance,
+    /// Right structure, wrong values: no name.
+    ParametersOnly,
+    /// Physics that has no name: no name.
+    Outside,
+    /// Recordings that cannot tell: a class with the truth in it, or "insufficient excitation".
+    CannotTell,
+}
+
+impl Category {
+    /// Short word for tables and files.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Category::Single => "single",
+            Category::Pair => "pair",
+            Category::Null => "null",
+            Category::Disturbance => "disturbance",
+            Category::ParametersOnly => "parameters_only",
+            Category::Outside => "outside",
+            Category::CannotTell => "cannot_tell",
+        }
+    }
+}
+
+/// What to build.
+#[derive(Clone, Debug)]
+pub(crate) struct Spec {
+    /// Opaque number: the only thing that the tool can see of it.
+    pub(crate) id: usize,
+    pub(crate) category: Category,
+    /// What is hidden: contract names, or foreign ones in [`Category::Outside`].
+    pub(crate) hidden: Vec<&'static str>,
+    /// Effect over noise that is asked for; zero where nothing is hidden.
+    pub(crate) strength: f64,
+    /// Which draw of the same kind this is.
+    pub(crate) repeat: usize,
+    /// Plays these instead of what shows the effect.
+    pub(crate) poor: Option<&'static [Kind]>,
+}
+
+/// Values as the rig file has them; `None`: the key is missing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nominal {
+    pub(crate) inertia: f64,
+    pub(crate) viscous: Option<f64>,
+    pub(crate) coulomb: Option<f64>,
+    pub(crate) offset: Option<f64>,
+    pub(crate) weight: Option<f64>,
+    pub(crate) gain: f64,
+}
+
+/// A case with its key.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) spec: Spec,
+    pub(crate) machine: Machine,
+    pub(crate) plant: Plant,
+    pub(crate) believed: Believed,
+    pub(crate) declared: Declared,
+    pub(crate) nominal: Nominal,
+    pub(crate) kinds: [Kind; 3],
+    /// Two to fit on, one held out.
+    pub(crate) recordings: Vec<Vec<Row>>,
+    /// A loop ran, and its reference is recorded.
+    pub(crate) with_reference: [bool; 3],
+    pub(crate) with_force: bool,
+    /// Strength of each hidden effect alone, and of all together, as achieved.
+    pub(crate) alone: Vec<f64>,
+    pub(crate) together: Measured,
+    pub(crate) truths: Vec<(&'static str, Vec<Parameter>)>,
+}
+
+impl Case {
+    /// The three recordings measured at another bandwidth, on the held-out one: what an oracle would remove.
+    pub(crate) fn held_out(&self, band: f64) -> Measured {
+        let rows: Vec<&[Row]> = self.recordings.iter().map(Vec::as_slice).collect();
+        measure(&rows, 2, &self.believed, &self.declared, self.machine.rate, band)
+    }
+}
+
+struct Plan {
+    excitation: Excitation,
+    times: Vec<f64>,
+    tilt: Series,
+    force: Series,
+    unit_noise: Series,
+    rough: Series,
+    offset: f64,
+    start: f64,
+    zero: f64,
+    random: Rng,
+}
+
+struct Draft<'a> {
+    spec: &'a Spec,
+    rng: &'a Rng,
+    machine: Machine,
+    declared: Declared,
+    base: f64,
+    plans: Vec<Plan>,
+    noise_scale: f64,
+}
+
+impl Draft<'_> {
+    fn plant(&self, scales: &[(usize, f64)]) -> Plant {
+        let mut plant = self.machine.plant.clone();
+        for &(i, s) in scales {
+            let name = self.spec.hidden[i];
+            let mut form = self.rng.fork(&format!("form/{i}"));
+            if self.spec.category == Category::Outside {
+                outside::apply(name, &self.machine, &mut plant, self.base, s, &mut form);
+            } else {
+                effects::apply(name, &self.machine, &mut plant, self.base, s, &mut form);
+            }
+        }
+        plant
+    }
+
+    fn believed(&self, plant: &Plant) -> Believed {
+        let lacks = |name: &str| self.spec.hidden.contains(&name);
+        let m = &self.machine;
+        Believed {
+            inertia: plant.inertia,
+            viscous: if lacks("viscous_friction") { 0.0 } else { plant.viscous },
+            coulomb: if lacks("coulomb_friction") { 0.0 } else { plant.dry.coulomb },
+            gain: plant.gain,
+            offset: plant.offset,
+            weight: if m.weight_key { plant.weight } else { 0.0 },
+        }
+    }
+
+    fn play(&self, plant: &Plant, plan: &Plan, step: f64) -> Result<Vec<Row>, Diverged> {
+        let m = &self.machine;
+        let coulomb = m.plant.dry.coulomb;
+        let scale = self.noise_scale * m.noise_share * coulomb;
+        let mut disturbance = plan.unit_noise.clone();
+        disturbance.values.iter_mut().for_each(|x| *x *= scale);
+        if !plan.rough.values.is_empty() {
+            for (i, value) in disturbance.values.iter_mut().enumerate() {
+                *value += plan.rough.at(i as f64 * plan.unit_noise.interval);
+            }
+        }
+        let run = Run {
+            times: plan.times.clone(),
+            drive: plan.excitation.drive.clone(),
+            control: plan.excitation.control.clone(),
+            limit: m.limit,
+            command_step: m.command_step,
+            tilt: plan.tilt.clone(),
+            force: plan.force.clone(),
+            disturbance,
+            offset: plan.offset,
+            start: plan.start,
+            zero_counts: plan.zero,
+            speed_bound: 12.0 * m.top_speed,
+            random: plan.random.clone(),
+        };
+        simulate(plant, &self.believed(plant), &run, step)
+    }
+
+    fn measured(&self, plant: &Plant, step: f64) -> Result<Measured, Diverged> {
+        let fits: Vec<Vec<Row>> =
+            self.plans.iter().take(2).map(|p| self.play(plant, p, step)).collect::<Result<_, _>>()?;
+        let rows: Vec<&[Row]> = fits.iter().map(Vec::as_slice).collect();
+        let m = &self.machine;
+        Ok(measure(&rows, 2, &self.believed(plant), &self.declared, m.rate, m.residual_bandwidth()))
+    }
+
+    /// Finds the scale of effect `i` alone at which effect over noise is `target`. Where the effect is at its bound, the
+    /// disturbance gives way, then the encoder gets finer.
+    fn calibrate(&mut self, i: usize, target: f64) -> Result<f64, Diverged> {
+        let name = self.spec.hidden[i];
+        let (low, high, mut s) = if self.spec.category == Category::Outside {
+            outside::bounds(name)
+        } else {
+            effects::bounds(name, &self.machine)
+        };
+        s = (s * (target / 5.0)).clamp(low, high);
+        let coarse = 40e-6;
+        let mut last: Option<(f64, f64)> = None;
+        for _ in 0..9 {
+            let plant = self.plant(&[(i, s)]);
+            let Ok(now) = self.measured(&plant, coarse) else {
+                // Too strong to be run: the bound comes down.
+                s = (s * 0.5).max(low);
+                if s <= low {
+                    return Err(Diverged);
+                }
+                continue;
+            };
+            let ratio = now.effect / now.noise.max(1e-300);
+            let miss = (target / ratio.max(1e-9)).ln();
+            if miss.abs() < 0.08 {
+                break;
+            }
+            let slope = match last {
+                Some((s0, r0)) if (s / s0).ln().abs() > 1e-3 => {
+                    ((ratio / r0).ln() / (s / s0).ln()).clamp(0.4, 3.0)
+                }
+                _ => 1.0,
+            };
+            last = Some((s, ratio));
+            let wanted = s * (miss / slope).clamp(-2.5, 2.5).exp();
+            s = wanted.clamp(low, high);
+            if wanted > high || wanted < low {
+                let short = (wanted / s).powf(slope);
+                self.noise_scale = (self.noise_scale / short).clamp(0.03, 6.0);
+                if self.noise_scale <= 0.04 {
+                    self.machine.plant.counts_per_unit = (self.machine.plant.counts_per_unit * 2.0).round();
+                }
+                last = None;
+            }
+        }
+        Ok(s)
+    }
+}
+
+/// Builds the case; tries other machines until one runs and comes within a quarter of the strength asked for.
+pub(crate) fn build(spec: &Spec, seed: u64, quick: bool) -> Case {
+    let label =
+        format!("{}/{}/{}/{}", spec.category.word(), spec.hidden.join("+"), spec.strength, spec.repeat);
+    let mut closest: Option<(f64, Case)> = None;
+    for attempt in 0..24 {
+        let rng = Rng::new(seed).fork(&label).fork(&attempt.to_string());
+        let Some(case) = attempt_case(spec, &rng, quick) else { continue };
+        let miss = if spec.strength > 0.0 && spec.category != Category::CannotTell {
+            case.alone.iter().map(|a| (a / spec.strength).max(1e-9).ln().abs()).fold(0.0, f64::max)
+        } else {
+            0.0
+        };
+        if miss < 0.22 {
+            return case;
+        }
+        if closest.as_ref().is_none_or(|(m, _)| miss < *m) {
+            closest = Some((miss, case));
+        }
+        if attempt >= 7 && closest.is_some() {
+            break;
+        }
+    }
+    closest.map(|(_, case)| case).unwrap_or_else(|| panic!("no machine could be run for {label}"))
+}
+
+fn merged_needs(spec: &Spec) -> Needs {
+    let mut all = Needs::default();
+    for name in &spec.hidden {
+        let n = if spec.category == Category::Outside { outside::needs(name) } else { effects::needs(name) };
+        all.rotary = all.rotary.or(n.rotary);
+        all.tilt = all.tilt.or(n.tilt);
+        all.place |= n.place;
+        all.turns |= n.turns;
+        all.no_offset |= n.no_offset;
+        all.fast |= n.fast;
+    }
+    if spec.category == Category::CannotTell {
+        // Asymmetry with an offset allowed, imbalance on part of a turn.
+        all.no_offset = false;
+    }
+    all
+}
+
+fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
+    let needs = merged_needs(spec);
+    let mut machine = Machine::draw(&mut rng.fork("machine"), needs, quick);
+    let mut pick = rng.fork("kinds");
+    if spec.category == Category::CannotTell {
+        machine.offset_key = true;
+        if spec.hidden == ["mass_imbalance"] && spec.poor.is_some_and(|p| p.contains(&Kind::OneTriangle)) {
+            machine.travel = 0.35 * machine.plant.turn;
+            machine.start_spread = Some(0.01 * machine.travel);
+        }
+    }
+    let kinds = draw_kinds(spec, &mut pick);
+    let with_force = spec.hidden.contains(&"load_dependent_friction") || pick.chance(0.04);
+    let declared = Declared {
+        inertia: pick.range(0.05, 0.2),
+        viscous: pick.range(0.3, 0.5),
+        coulomb: pick.range(0.25, 0.5),
+        gain: pick.range(0.01, 0.1),
+        weight: pick.range(0.1, 0.3),
+        offset: 0.1 * machine.plant.dry.coulomb,
+        offset_allowed: machine.offset_key,
+    };
+    let coulomb = machine.plant.dry.coulomb;
+    let place = rng.fork("place").range(0.0, 2.0) * machine.plant.turn;
+    let load = coulomb * pick.range(0.8, 1.6);
+    let mut with_reference = [false; 3];
+    let plans = (0..3)
+        .map(|k| {
+            let mut own = rng.fork(&format!("recording/{k}"));
+            let excitation = excite::build(kinds[k], &machine, &mut own);
+            with_reference[k] = excitation.control.is_some() && own.chance(0.85);
+            let start = match machine.start_spread {
+                Some(spread) => place + 0.5 * spread * own.range(-1.0, 1.0),
+                None => machine.plant.turn * own.range(0.0, 3.0),
+            };
+            let mut unit_noise = excite::disturbance(&machine, &mut own);
+            let mean = unit_noise.values.iter().sum::<f64>() / unit_noise.values.len() as f64;
+            unit_noise.values.iter_mut().for_each(|x| *x -= mean);
+            let mut rough = Series::default();
+            if spec.category == Category::Disturbance {
+                rough = excite::rough_disturbance(&machine, &mut own);
+                let size = coulomb * own.range(0.12, 0.4);
+                rough.values.iter_mut().for_each(|x| *x *= size);
+            }
+            Plan {
+                excitation,
+                times: machine.stamps(&mut own),
+                tilt: if machine.tilt { excite::tilt_sweep(&machine, &mut own) } else { Series::default() },
+                force: if with_force { excite::pushes(&machine, load, &mut own) } else { Series::default() },
+                unit_noise,
+                rough,
+                offset: if machine.offset_key { 0.04 * coulomb * own.bounded_normal(2.0) } else { 0.0 },
+                start,
+                zero: (own.range(-1e5, 1e5)).round() + own.unit(),
+                random: own.fork("plant"),
+            }
+        })
+        .collect();
+    let mut draft = Draft { spec, rng, machine, declared, base: place, plans, noise_scale: 1.0 };
+
+    let mut scales: Vec<(usize, f64)> = Vec::new();
+    for i in 0..spec.hidden.len() {
+        let s = if spec.category == Category::CannotTell {
+            let (low, high, guess) = effects::bounds(spec.hidden[i], &draft.machine);
+            (2.0 * guess).clamp(low, high)
+        } else {
+            draft.calibrate(i, spec.strength).ok()?
+        };
+        scales.push((i, s));
+    }
+    // The second calibration may have moved the noise: each strength is measured again, alone, as it is.
+    let mut alone = Vec::new();
+    for scale in &scales {
+        let now = draft.measured(&draft.plant(&[*scale]), 40e-6).ok()?;
+        alone.push(now.effect / now.noise);
+    }
+    let plant = draft.plant(&scales);
+    let recordings: Vec<Vec<Row>> =
+        draft.plans.iter().map(|p| draft.play(&plant, p, STEP)).collect::<Result<_, _>>().ok()?;
+    let believed = draft.believed(&plant);
+    let rows: Vec<&[Row]> = recordings.iter().map(Vec::as_slice).collect();
+    let m = &draft.machine;
+    let together = measure(&rows[..2], 2, &believed, &declared, m.rate, m.residual_bandwidth());
+    let held = measure(&rows[2..], 1, &believed, &declared, m.rate, m.residual_bandwidth());
+    if together.moving < 0.08 || held.moving < 0.08 || recordings.iter().any(|r| lost_control(r, m)) {
+        return None;
+    }
+    if scales.len() == 1 {
+        alone[0] = together.effect / together.noise;
+    }
+    let truths = if spec.category == Category::Outside {
+        Vec::new()
+    } else {
+        spec.hidden.iter().map(|&name| (name, effects::truth(name, &plant, &rows[..2]))).collect()
+    };
+    let nominal = draw_nominal(spec, &draft.machine, &plant, &declared, &mut rng.fork("nominal"));
+    Some(Case {
+        spec: spec.clone(),
+        machine: draft.machine,
+        plant,
+        believed,
+        declared,
+        nominal,
+        kinds,
+        recordings,
+        with_reference,
+        with_force,
+        alone,
+        together,
+        truths,
+    })
+}
+
+/// A drive that asks for its limit all the time, or a loop that has lost its reference: nobody would keep the recording.
+fn lost_control(rows: &[Row], m: &Machine) -> bool {
+    let clipped = rows.iter().filter(|r| r.command.abs() > 0.999 * m.limit).count();
+    let (mut far, mut looped) = (0, false);
+    for row in rows {
+        looped |= row.reference_counts != 0.0;
+        let error = (row.reference_counts - row.counts) / m.plant.counts_per_unit;
+        far += usize::from(error.abs() > 0.2 * m.travel);
+    }
+    clipped * 10 > rows.len() || looped && far * 10 > rows.len()
+}
+
+fn draw_kinds(spec: &Spec, pick: &mut Rng) -> [Kind; 3] {
+    if let Some(poor) = spec.poor {
+        return [*pick.pick(poor), *pick.pick(poor), *pick.pick(poor)];
+    }
+    let lists: Vec<&[Kind]> = if spec.hidden.is_empty() {
+        vec![effects::kinds(""), &[Kind::Triangle, Kind::Hard, Kind::Injected, Kind::Ladder, Kind::Levels]]
+    } else if spec.category == Category::Outside {
+        spec.hidden.iter().map(|n| outside::kinds(n)).collect()
+    } else {
+        spec.hidden.iter().map(|n| effects::kinds(n)).collect()
+    };
+    let first = *pick.pick(lists[0]);
+    let mut second = *pick.pick(lists[lists.len() - 1]);
+    for _ in 0..4 {
+        if second != first {
+            break;
+        }
+        second = *pick.pick(lists[lists.len() - 1]);
+    }
+    let which = pick.below(lists.len());
+    [first, second, *pick.pick(lists[which])]
+}
+
+fn draw_nominal(spec: &Spec, m: &Machine, plant: &Plant, declared: &Declared, rng: &mut Rng) -> Nominal {
+    let lacks = |name: &str| spec.hidden.contains(&name);
+    let exact = matches!(spec.category, Category::Null | Category::Disturbance);
+    let mut off = |sigma: f64| {
+        if exact {
+            1.0
+        } else if spec.category == Category::ParametersOnly {
+            // Clearly wrong, and still what the rig declares possible.
+            1.0 + sigma * rng.sign() * rng.range(0.8, 2.0)
+        } else {
+            1.0 + sigma * rng.bounded_normal(2.0)
+        }
+    };
+    let inertia = plant.inertia * off(declared.inertia);
+    let viscous = plant.viscous * off(declared.viscous);
+    let coulomb = plant.dry.coulomb * off(declared.coulomb);
+    let gain = plant.gain * off(declared.gain);
+    let weight = plant.weight * off(declared.weight);
+    let offset =
+        if exact { plant.offset } else { plant.offset + 0.5 * declared.offset * rng.bounded_normal(2.0) };
+    Nominal {
+        inertia,
+        gain,
+        viscous: (!lacks("viscous_friction")).then_some(viscous.max(0.02 * plant.viscous)),
+        coulomb: (!lacks("coulomb_friction")).then_some(coulomb.max(0.02 * plant.dry.coulomb)),
+        offset: m.offset_key.then_some(offset),
+        weight: m.weight_key.then_some(weight),
+    }
+}

@@ -1,0 +1,96 @@
+//! Physics outside the contract's names: the right answer is to say that something is there and that no name fits.
+
+use super::excite::Kind;
+use super::machine::{Machine, Needs};
+use super::plant::{Foreign, Plant};
+use crate::rng::Rng;
+
+/// The kinds of foreign physics.
+pub(crate) const FOREIGN: [&str; 8] = [
+    "creep_spring",
+    "whirling_force",
+    "hum",
+    "irregular_wells",
+    "payload_change",
+    "linkage_inertia",
+    "gear_loss",
+    "speed_window_friction",
+];
+
+/// What it asks of the machine.
+pub(crate) fn needs(name: &str) -> Needs {
+    let mut needs = Needs::default();
+    if matches!(name, "irregular_wells" | "linkage_inertia") {
+        needs.place = true;
+    }
+    needs
+}
+
+/// Excitations that show it.
+pub(crate) fn kinds(name: &str) -> &'static [Kind] {
+    use Kind::*;
+    match name {
+        "irregular_wells" => &[Triangle, Trapezoids],
+        "payload_change" | "linkage_inertia" => &[Trapezoids, Injected, Hard],
+        "gear_loss" => &[Hard, Injected, Trapezoids],
+        "speed_window_friction" => &[Staircase, Trapezoids],
+        _ => &[Trapezoids, Staircase, Triangle],
+    }
+}
+
+/// (smallest, largest, first guess) of the scale.
+pub(crate) fn bounds(name: &str) -> (f64, f64, f64) {
+    match name {
+        "payload_change" | "linkage_inertia" => (0.01, 1.5, 0.3),
+        "gear_loss" => (0.005, 0.5, 0.1),
+        _ => (0.01, 1.5, 0.2),
+    }
+}
+
+/// Puts it into `plant` at scale `s`; `rng` draws the form and must be the same for every scale.
+pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f64, rng: &mut Rng) {
+    let (coulomb, v, travel) = (m.plant.dry.coulomb, m.top_speed, m.travel);
+    let foreign = match name {
+        "creep_spring" => {
+            let relaxation = rng.range(0.4, 1.5);
+            Foreign::CreepSpring { stiffness: s * coulomb / (0.2 * v * relaxation), relaxation }
+        }
+        "whirling_force" => Foreign::WhirlingForce {
+            amplitude: s * coulomb,
+            base_hz: rng.range(0.3, 1.0),
+            per_speed_hz: rng.range(2.0, 6.0) / v.powf(0.6),
+            power: 0.6,
+        },
+        "hum" => {
+            let top = (0.4 * m.residual_bandwidth()).min(18.0);
+            Foreign::Hum { amplitude: s * coulomb, hertz: rng.range(0.5 * top, top) }
+        }
+        "irregular_wells" => {
+            let width = travel * rng.range(0.012, 0.03);
+            let wells = (0..7)
+                .map(|_| {
+                    let depth = s * coulomb * width * rng.range(0.5, 1.5) * rng.sign();
+                    (depth, base + travel * rng.range(0.02, 0.9), width * rng.range(0.6, 1.6))
+                })
+                .collect();
+            Foreign::Wells { wells }
+        }
+        "payload_change" => Foreign::PayloadChange { share: s, at: rng.range(0.35, 0.65) },
+        "linkage_inertia" => Foreign::Linkage {
+            share: s,
+            centre: base + travel * rng.range(0.3, 0.6),
+            width: travel * rng.range(0.1, 0.25),
+        },
+        "gear_loss" => {
+            plant.dry.per_drive = s;
+            return;
+        }
+        "speed_window_friction" => {
+            let centre = v * rng.range(0.25, 0.5);
+            plant.dry.speed_window = Some((s * coulomb, centre, centre * rng.range(0.2, 0.35)));
+            return;
+        }
+        other => unreachable!("`{other}` is not among the foreign physics"),
+    };
+    plant.foreign.push(foreign);
+}

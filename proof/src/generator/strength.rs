@@ -1,0 +1,165 @@
+//! How strong an effect is, defined.
+//!
+//! Let B be 100 Hz, or a twentieth of the sampling rate where that is less. In the two fit recordings, on rows that move
+//! (no instant at rest, and faster than 1 % of the recording's rms speed):
+//!
+//! - **noise** is the rms of what an observer of bandwidth B would see with the true model in hand: the disturbance and
+//!   bias wander below B, plus inertia times the second derivative of the encoder's rounding below B; each recording's
+//!   mean is left out.
+//! - **effect** is the rms of the force that the nominal structure lacks, with its true values in it: inertia times true
+//!   acceleration less the believed forces, below B (what a sensor effect does to the reading counts through inertia and
+//!   viscosity), after taking out what a refit of the nominal terms within their declared uncertainty, and an offset of
+//!   each recording, could imitate. The gain stays: scaling everything together is not a refit.
+//!
+//! Strength is effect / noise.
+
+use super::simulate::{Believed, Row};
+use crate::signal::{Normal, derivative, low_pass, rms};
+
+/// Relative standard deviations that the rig declares.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Declared {
+    pub(crate) inertia: f64,
+    pub(crate) viscous: f64,
+    pub(crate) coulomb: f64,
+    pub(crate) gain: f64,
+    pub(crate) weight: f64,
+    /// Absolute.
+    pub(crate) offset: f64,
+    /// Each recording may have an offset of its own; false where the rig rules an offset out.
+    pub(crate) offset_allowed: bool,
+}
+
+/// What is measured of a set of recordings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Measured {
+    pub(crate) effect: f64,
+    pub(crate) noise: f64,
+    /// Rms of the whole force below B, to see the two in proportion.
+    pub(crate) force: f64,
+    /// Share of the rows that move.
+    pub(crate) moving: f64,
+}
+
+struct Columns {
+    effect: Vec<f64>,
+    noise: Vec<f64>,
+    force: Vec<f64>,
+    acceleration: Vec<f64>,
+    speed: Vec<f64>,
+    tilt: Vec<f64>,
+    moving: Vec<bool>,
+    seconds: f64,
+}
+
+fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
+    let below = |x: Vec<f64>| low_pass(&x, rate, band);
+    let of = |f: &dyn Fn(&Row) -> f64| rows.iter().map(f).collect::<Vec<f64>>();
+    let (sensor, rounding) =
+        (below(of(&|r| r.sensor_effect)), below(of(&|r| r.reading_error - r.sensor_effect)));
+    let sensor_speed = derivative(&sensor, rate);
+    let sensor_acceleration = derivative(&sensor_speed, rate);
+    let rounding_acceleration = derivative(&derivative(&rounding, rate), rate);
+    let mut effect = below(of(&|r| r.missing));
+    for i in 0..effect.len() {
+        effect[i] += believed.inertia * sensor_acceleration[i] + believed.viscous * sensor_speed[i];
+    }
+    let mut noise = below(of(&|r| r.disturbance));
+    for i in 0..noise.len() {
+        noise[i] += believed.inertia * rounding_acceleration[i];
+    }
+    let speed = of(&|r| r.v);
+    let slowest = 0.01 * rms(&speed);
+    // The ends carry the filter's transient.
+    let edge = ((2.0 * rate / band) as usize).min(rows.len() / 10);
+    let moving = rows
+        .iter()
+        .enumerate()
+        .map(|(i, r)| r.moving && r.v.abs() > slowest && i >= edge && i + edge < rows.len())
+        .collect();
+    Columns {
+        effect,
+        noise,
+        force: below(of(&|r| believed.gain * r.command)),
+        acceleration: below(derivative(&below(of(&|r| r.v)), rate)),
+        tilt: of(&|r| r.tilt.sin()),
+        seconds: rows.len() as f64 / rate,
+        speed,
+        moving,
+    }
+}
+
+/// Measures `recordings` at bandwidth `band`; what a refit can imitate is fitted on the first `fitted` of them (offsets on
+/// each) and the numbers are of the rest, or of all where `fitted` is all.
+pub(crate) fn measure(
+    recordings: &[&[Row]],
+    fitted: usize,
+    believed: &Believed,
+    declared: &Declared,
+    rate: f64,
+    band: f64,
+) -> Measured {
+    let sets: Vec<Columns> = recordings.iter().map(|r| columns(r, believed, rate, band)).collect();
+    let stride = ((rate / (4.0 * band)) as usize).max(1);
+    let judged = if fitted < sets.len() { fitted..sets.len() } else { 0..sets.len() };
+    // Noise first: the refit's prior needs it.
+    let mut noise = Vec::new();
+    let mut force = Vec::new();
+    let (mut moving, mut all) = (0.0, 0.0);
+    for set in &sets[judged.clone()] {
+        let kept: Vec<f64> = picks(set, stride).map(|i| set.noise[i]).collect();
+        let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
+        noise.extend(kept.iter().map(|x| x - mean));
+        force.extend(picks(set, stride).map(|i| set.force[i]));
+        moving += set.moving.iter().filter(|&&m| m).count() as f64;
+        all += set.moving.len() as f64;
+    }
+    let noise = rms(&noise);
+    let width = 4 + sets.len();
+    let row = |set: &Columns, k: usize, i: usize| {
+        let mut x = vec![0.0; width];
+        x[0] = believed.inertia * set.acceleration[i];
+        x[1] = believed.viscous * set.speed[i];
+        x[2] = if believed.coulomb > 0.0 { believed.coulomb * set.speed[i].signum() } else { 0.0 };
+        x[3] = believed.weight * set.tilt[i];
+        x[4 + k] = if declared.offset_allowed { 1.0 } else { 0.0 };
+        x
+    };
+    let mut normal = Normal::new(width);
+    let mut independent = 0.0;
+    for (k, set) in sets.iter().enumerate().take(fitted) {
+        for i in picks(set, stride) {
+            normal.add(&row(set, k, i), set.effect[i]);
+        }
+        independent += 2.0 * band * set.seconds;
+    }
+    // Rows that follow each other closely are not independent: the prior weighs accordingly.
+    let weight = (normal.rows as f64 / f64::max(independent, 1.0)).max(1.0);
+    let prior = |sigma: f64| weight * noise * noise / (sigma * sigma).max(1e-12);
+    let mut penalty = vec![
+        prior(declared.inertia),
+        prior(declared.viscous),
+        prior(declared.coulomb),
+        prior(declared.weight),
+    ];
+    penalty.resize(width, 0.0);
+    let active: Vec<usize> = (0..width).collect();
+    let shared = normal.solve(&active, &penalty);
+    let mut effect = Vec::new();
+    for (k, set) in sets.iter().enumerate().skip(judged.start) {
+        let left: Vec<f64> = picks(set, stride)
+            .map(|i| {
+                let x = row(set, k, i);
+                set.effect[i] - x[..4].iter().zip(&shared[..4]).map(|(a, b)| a * b).sum::<f64>()
+            })
+            .collect();
+        let mean =
+            if declared.offset_allowed { left.iter().sum::<f64>() / left.len().max(1) as f64 } else { 0.0 };
+        effect.extend(left.iter().map(|x| x - mean));
+    }
+    Measured { effect: rms(&effect), noise, force: rms(&force), moving: moving / f64::max(all, 1.0) }
+}
+
+fn picks(set: &Columns, stride: usize) -> impl Iterator<Item = usize> + '_ {
+    (0..set.moving.len()).step_by(stride).filter(|&i| set.moving[i])
+}

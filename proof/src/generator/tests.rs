@@ -1,0 +1,257 @@
+//! The plant against physics that can be worked out by hand.
+
+use std::f64::consts::TAU;
+
+use super::case::{Category, Spec, build};
+use super::drive::{Drive, Tones};
+use super::files;
+use super::machine::{Machine, Needs};
+use super::plant::{Harmonic, Plant, Presliding, Train};
+use super::simulate::{Believed, Row, Run, STEP, Series, simulate};
+use crate::rng::Rng;
+
+fn bare(inertia: f64) -> Plant {
+    let mut plant = Machine::draw(&mut Rng::new(1), Needs::default(), true).plant;
+    plant.inertia = inertia;
+    plant.viscous = 0.0;
+    plant.dry.coulomb = 0.0;
+    plant.gain = 1.0;
+    plant.offset = 0.0;
+    plant.weight = 0.0;
+    plant.turn = TAU;
+    plant.counts_per_unit = 1e9;
+    plant
+}
+
+fn open(rate: f64, seconds: f64, drive: Drive) -> Run {
+    Run {
+        times: (0..(rate * seconds) as usize).map(|i| i as f64 / rate).collect(),
+        drive,
+        control: None,
+        limit: 1e9,
+        command_step: 1e-12,
+        tilt: Series::default(),
+        force: Series::default(),
+        disturbance: Series::default(),
+        offset: 0.0,
+        start: 0.0,
+        zero_counts: 0.0,
+        speed_bound: 1e9,
+        random: Rng::new(5),
+    }
+}
+
+fn believed(plant: &Plant) -> Believed {
+    Believed {
+        inertia: plant.inertia,
+        viscous: plant.viscous,
+        coulomb: plant.dry.coulomb,
+        gain: plant.gain,
+        offset: plant.offset,
+        weight: plant.weight,
+    }
+}
+
+fn play(plant: &Plant, run: &Run) -> Vec<Row> {
+    simulate(plant, &believed(plant), run, STEP).expect("the run is bounded")
+}
+
+fn levels(list: &[(f64, f64)]) -> Drive {
+    Drive { levels: list.to_vec(), ..Drive::default() }
+}
+
+#[test]
+fn energy_is_kept_without_dissipation() {
+    let mut plant = bare(2.0);
+    plant.spring = Some((8.0, 0.0, 0.0));
+    let mut run = open(1000.0, 20.0, Drive::default());
+    run.start = 0.5;
+    let energy = |r: &Row| 0.5 * 2.0 * r.v * r.v + 0.5 * 8.0 * r.q * r.q;
+    let rows = play(&plant, &run);
+    let first = energy(&rows[0]);
+    let worst = rows.iter().map(|r| (energy(r) / first - 1.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-7, "energy off by {worst:e} of itself");
+    // Natural frequency 1/π Hz: after 20 s the phase is 40 rad.
+    let last = rows.last().unwrap();
+    assert!((last.q - 0.5 * (2.0 * last.time).cos()).abs() < 1e-6);
+}
+
+#[test]
+fn constant_force_gives_the_parabola() {
+    let rows = play(&bare(0.5), &open(500.0, 2.0, levels(&[(3.0, 10.0)])));
+    let last = rows.last().unwrap();
+    assert!((last.q - 0.5 * 6.0 * last.time.powi(2)).abs() < 1e-9 * last.q);
+    assert!(rows.iter().all(|r| r.missing.abs() < 1e-9), "the believed model is the plant");
+}
+
+#[test]
+fn stick_holds_below_the_friction_and_slides_at_the_difference_above() {
+    let mut plant = bare(1.0);
+    plant.dry.coulomb = 2.0;
+    let rows = play(&plant, &open(1000.0, 4.0, levels(&[(1.999, 2.0), (3.0, 1.0), (0.0, 5.0)])));
+    assert!(rows.iter().filter(|r| r.time < 2.0).all(|r| r.q == 0.0 && r.v == 0.0));
+    let at = |t: f64| rows[(t * 1000.0).round() as usize];
+    assert!((at(2.5).v - 0.5).abs() < 1e-6, "accelerates at (3 − 2)/1");
+    assert!((at(3.25).v - 0.5).abs() < 1e-4, "decelerates at 2/1");
+    assert!(at(3.9).v == 0.0 && !at(3.9).moving, "and stays at rest");
+}
+
+#[test]
+fn two_masses_ring_at_the_known_frequency() {
+    let mut plant = bare(3.0);
+    // Motor 1, load 2, k 500: sqrt(k·(1/1 + 1/2)) = 27.39 rad/s.
+    plant.train =
+        Train::Spring { load_share: 2.0 / 3.0, friction_share: 0.0, stiffness: 500.0, damping: 0.0 };
+    let rows = play(&plant, &open(2000.0, 8.0, levels(&[(10.0, 0.005), (0.0, 20.0)])));
+    let drift = rows.last().unwrap().q / rows.last().unwrap().time;
+    let wave: Vec<f64> = rows.iter().map(|r| r.v - drift).collect();
+    let crossings: Vec<f64> = (1..wave.len())
+        .filter(|&i| wave[i - 1] < 0.0 && wave[i] >= 0.0)
+        .map(|i| rows[i - 1].time - wave[i - 1] / (wave[i] - wave[i - 1]) * 5e-4)
+        .collect();
+    let period = (crossings[crossings.len() - 1] - crossings[1]) / (crossings.len() - 2) as f64;
+    let expected = (500.0_f64 * 1.5).sqrt();
+    assert!((TAU / period / expected - 1.0).abs() < 1e-3, "{} against {expected}", TAU / period);
+    // The motor stands still at the antiresonance sqrt(k/J_load): force there, and the motor hardly moves.
+    let anti = (500.0_f64 / 2.0).sqrt() / TAU;
+    plant.viscous = 1.0;
+    let motion = |hz: f64| {
+        let tones = Tones { tones: vec![(1.0, hz, 0.0)] };
+        let rows = play(&plant, &open(1000.0, 60.0, Drive { tones, ..Drive::default() }));
+        let tail: Vec<f64> = rows[30_000..].iter().map(|r| r.v).collect();
+        let mean = tail.iter().sum::<f64>() / tail.len() as f64;
+        crate::signal::rms(&tail.iter().map(|v| v - mean).collect::<Vec<_>>())
+    };
+    let (at, beside) = (motion(anti), motion(0.6 * anti));
+    assert!(at * 20.0 < beside, "{at} against {beside}");
+}
+
+#[test]
+fn backlash_lets_the_motor_run_free_by_the_gap() {
+    let mut plant = bare(1.0);
+    plant.dry.coulomb = 0.06;
+    plant.viscous = 2.0;
+    plant.train =
+        Train::Gap { load_share: 0.5, friction_share: 0.5, gap: 0.1, stiffness: 2e5, damping: 200.0 };
+    // The motor creeps over half the gap at 0.02; what is left of the force then, 0.02, the load's friction holds.
+    let rows = play(&plant, &open(1000.0, 30.0, levels(&[(0.05, 60.0)])));
+    let rest = rows.last().unwrap();
+    assert!((rest.q - 0.05).abs() < 3e-3, "stands at {}", rest.q);
+}
+
+#[test]
+fn cogging_amplitude_is_found_by_a_fourier_sum_over_the_angle() {
+    let mut plant = bare(1e-3);
+    plant.viscous = 1e-2;
+    plant.cogging = vec![
+        Harmonic { order: 7.0, amplitude: 2e-3, phase: 0.4 },
+        Harmonic { order: 14.0, amplitude: 5e-4, phase: 2.0 },
+    ];
+    let rows = play(&plant, &open(20_000.0, 8.0, levels(&[(0.1, 100.0)])));
+    // Whole turns only, weighted by the angle passed.
+    let from = 40_000;
+    let turns = ((rows[rows.len() - 1].q - rows[from].q) / TAU).floor();
+    let end = rows[from].q + turns * TAU;
+    for (order, expected) in [(7.0, 2e-3), (14.0, 5e-4), (9.0, 0.0)] {
+        let (mut a, mut b) = (0.0, 0.0);
+        for pair in rows[from..].windows(2).take_while(|p| p[1].q < end) {
+            let (width, middle) = (pair[1].q - pair[0].q, 0.5 * (pair[1].q + pair[0].q));
+            a += pair[0].missing * (order * middle).sin() * width;
+            b += pair[0].missing * (order * middle).cos() * width;
+        }
+        let amplitude = a.hypot(b) * 2.0 / (turns * TAU);
+        assert!((amplitude - expected).abs() < 2e-5, "order {order}: {amplitude:e}");
+    }
+}
+
+#[test]
+fn lugre_returns_elastically_for_small_moves_and_slides_at_the_coulomb_level() {
+    let mut plant = bare(1.0);
+    plant.dry.coulomb = 2.0;
+    plant.dry.presliding = Some(Presliding::LuGre { stiffness: 1000.0, damping: 20.0 });
+    let drive = Drive { ramps: true, ..levels(&[(1.0, 4.0), (0.0, 4.0)]) };
+    let rows = play(&plant, &open(1000.0, 8.0, drive));
+    let at = |t: f64| rows[(t * 1000.0).round() as usize];
+    // Slowly loaded from rest: F = F_c·(1 − exp(−σ x/F_c)).
+    let expected = -2.0 / 1000.0 * (1.0_f64 - 0.5).ln();
+    assert!((at(3.999).q / expected - 1.0).abs() < 0.02, "{} against {expected}", at(3.999).q);
+    let back = at(7.9).q / at(3.999).q;
+    assert!((0.05..0.5).contains(&back), "some of it stays: {back}");
+    let rows = play(&plant, &open(1000.0, 3.0, levels(&[(5.0, 10.0)])));
+    let (a, b) = (rows[1000], rows[2000]);
+    assert!(((b.v - a.v) / (b.time - a.time) - 3.0).abs() < 1e-3);
+}
+
+#[test]
+fn the_encoder_floors_to_counts() {
+    let mut plant = bare(1.0);
+    plant.counts_per_unit = 100.0;
+    let mut run = open(100.0, 3.0, levels(&[(0.3, 100.0)]));
+    run.zero_counts = 12.25;
+    for r in play(&plant, &run) {
+        assert_eq!(r.counts, (r.q * 100.0 + 12.25).floor());
+    }
+}
+
+#[test]
+fn the_command_is_held_from_its_row_to_the_next_on_any_clock() {
+    let plant = bare(2.0);
+    let mut run = open(50.0, 4.0, Drive::default());
+    let mut rng = Rng::new(2);
+    run.times.iter_mut().for_each(|t| *t += 0.008 * rng.unit());
+    run.drive.tones = Tones { tones: vec![(3.0, 1.3, 0.2)] };
+    for pair in play(&plant, &run).windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        assert!((b.v - a.v - a.command / 2.0 * (b.time - a.time)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_delay_moves_the_force_by_exactly_itself() {
+    let mut plant = bare(1.0);
+    plant.delay = 0.0123;
+    let rows = play(&plant, &open(1000.0, 0.2, levels(&[(1.0, 9.0)])));
+    // Force from 0.0123 s on: v = t − 0.0123.
+    let last = rows.last().unwrap();
+    assert!((last.v - (last.time - 0.0123)).abs() < 1.1e-5, "{}", last.v);
+}
+
+#[test]
+fn a_lag_charges_exponentially() {
+    let mut plant = bare(1.0);
+    plant.lag = 0.02;
+    let rows = play(&plant, &open(1000.0, 0.2, levels(&[(1.0, 9.0)])));
+    let r = rows[100];
+    let expected = r.time - 0.02 * (1.0 - (-r.time / 0.02).exp());
+    assert!((r.v - expected).abs() < 1e-5, "{} {expected}", r.v);
+}
+
+fn spec(category: Category, hidden: Vec<&'static str>, strength: f64) -> Spec {
+    Spec { id: 1, category, hidden, strength, repeat: 0, poor: None }
+}
+
+#[test]
+fn a_seed_gives_the_same_files_and_another_seed_others() {
+    let write = |seed: u64, tag: &str| {
+        let dir = std::env::temp_dir().join(format!("proof-seed-{}-{tag}", std::process::id()));
+        let case = build(&spec(Category::Single, vec!["cogging"], 3.0), seed, true);
+        let paths = files::write_case(&case, &dir).unwrap();
+        let text = |p: &std::path::Path| std::fs::read_to_string(p).unwrap();
+        let all = [text(&paths.rig), text(&paths.fit[0]), text(&paths.fit[1]), text(&paths.holdout[0])];
+        std::fs::remove_dir_all(&dir).unwrap();
+        all
+    };
+    let first = write(4, "a");
+    assert_eq!(first, write(4, "b"));
+    assert_ne!(first, write(5, "c"));
+}
+
+#[test]
+fn a_case_has_the_strength_asked_for_and_a_null_has_none() {
+    for (name, strength) in [("stribeck_friction", 3.0), ("command_delay", 10.0), ("tilt_gravity", 1.0)] {
+        let case = build(&spec(Category::Single, vec![name], strength), 8, true);
+        assert!((case.alone[0] / strength).ln().abs() < 0.25, "{name}: {} for {strength}", case.alone[0]);
+    }
+    let null = build(&spec(Category::Null, vec![], 0.0), 8, true);
+    assert!(null.together.effect < 1e-2 * null.together.noise, "{:?}", null.together);
+}

@@ -1,0 +1,62 @@
+//! The blinded benchmark of the diagnosis.
+//!
+//! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
+//! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
+
+mod cases;
+mod generator;
+mod options;
+mod pool;
+mod rng;
+mod signal;
+
+use std::path::Path;
+
+pub use options::{HELP, Options};
+
+use cases::Amounts;
+use generator::case::{Spec, build};
+use generator::files;
+
+/// Does what the options ask for.
+///
+/// # Errors
+/// One sentence: what could not be read, written or run, and where.
+pub fn run(options: &Options) -> Result<(), String> {
+    let specs = wanted(options);
+    if let Some(dir) = &options.write {
+        return write_all(options, &specs, dir);
+    }
+    Ok(())
+}
+
+fn wanted(options: &Options) -> Vec<Spec> {
+    let amounts = if options.quick { Amounts::quick() } else { Amounts::full(options.cases) };
+    let mut specs = cases::list(amounts, options.seed);
+    if let Some(text) = &options.only {
+        specs.retain(|s| {
+            s.category.word().contains(text) || s.hidden.iter().any(|h| h.contains(text.as_str()))
+        });
+    }
+    specs
+}
+
+fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String> {
+    let keys = dir.join("keys");
+    let failed = |what: &Path, e: std::io::Error| {
+        format!("cannot write {}: {e}; choose another --write folder", what.display())
+    };
+    std::fs::create_dir_all(&keys).map_err(|e| failed(&keys, e))?;
+    let written = pool::map(options.jobs, "writing cases", specs, |spec| {
+        let case = build(spec, options.seed, options.quick);
+        let name = format!("case-{:04}", spec.id);
+        let folder = dir.join("cases").join(&name);
+        files::write_case(&case, &folder).map_err(|e| failed(&folder, e))?;
+        let key = keys.join(format!("{name}.json"));
+        let text = serde_json::to_string_pretty(&files::key(&case)).map_err(|e| e.to_string())?;
+        std::fs::write(&key, text + "\n").map_err(|e| failed(&key, e))
+    });
+    let written: Result<Vec<()>, String> = written.into_iter().collect();
+    println!("{} cases in {}, their keys in {}", written?.len(), dir.join("cases").display(), keys.display());
+    Ok(())
+}
