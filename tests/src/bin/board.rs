@@ -1,0 +1,2 @@
+//! Runs the board by hand.
+fn main() {}

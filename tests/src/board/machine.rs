@@ -1,0 +1,117 @@
+//! The STM32F4DISCOVERY for the emulator: the part, its crystal and rail, the chips and the cable.
+//!
+//! The emulator's part is the STM32F427, which has everything of the STM32F407 that the firmware
+//! uses at the same addresses, and more memory; the image is linked for the smaller part.
+
+use std::num::{NonZeroU32, NonZeroU64};
+use std::sync::Arc;
+
+use rigless::device::Level;
+use rigless::emulator::Processor;
+use rigless::machine::{Board, Target, armv7m};
+use rigless::mcu::{Mcu, Operate, Wired};
+use rigless::snapshot::Store;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::peripherals::gpio::Pin;
+use rigless::soc::stm32f427::peripherals::spi::Select;
+use rigless::soc::{Error, Gate, Window};
+
+use super::Wiring;
+use super::dac::Dac;
+use super::processor::{DAC, OTG, Probe, Probed};
+use super::tilt::Accelerometer;
+use super::usb_port::{INTERRUPTS, UsbPort};
+
+/// The crystal and the rail of the board.
+const CRYSTAL_HZ: u64 = 8_000_000;
+const RAIL_MILLIVOLTS: u32 = 3_300;
+/// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
+/// count a time.
+pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
+const CORE_HZ: NonZeroU64 = NonZeroU64::new(INSTRUCTIONS_PER_SECOND).expect("not zero");
+const MCU: &str = "stm32f407";
+
+/// The board.
+#[derive(Debug)]
+pub(super) struct Machine {
+    pub(super) mcu: Wired<Wired<Stm32f427, UsbPort>, Dac>,
+    probe: Probe,
+}
+
+impl Machine {
+    pub(super) fn new(wiring: &Wiring, probe: Probe) -> Result<Self, Error> {
+        let mut part = Stm32f427::new()?;
+        part.rcc.attach_crystals(CRYSTAL_HZ, 0);
+        part.set_supply(RAIL_MILLIVOLTS);
+        for converter in &mut part.adc {
+            converter.set_reference(RAIL_MILLIVOLTS);
+        }
+        if let Some(model) = wiring.tilt {
+            let select = Select { port: "GPIOE", pin: pin(3), active: Level::Low };
+            part.spi[0].attach_selected(Accelerometer::new(model), select);
+        }
+        let size = |bytes| NonZeroU64::new(bytes).expect("not zero");
+        let usb = Window::new("USB", OTG.2, size(OTG.1))
+            .gated(Gate::by("RCC", "AHB2ENR", "OTGFSEN"))
+            .raising(&INTERRUPTS);
+        let dac = Window::new("DAC1", DAC.2, size(DAC.1)).gated(Gate::by("RCC", "APB1ENR", "DACEN"));
+        let with_usb = Wired::new(part, usb, UsbPort::default())?;
+        Ok(Self { mcu: Wired::new(with_usb, dac, Dac::default())?, probe })
+    }
+
+    pub(super) fn part(&mut self) -> &mut Stm32f427 {
+        &mut self.mcu.part.part
+    }
+
+    pub(super) fn usb(&mut self) -> &mut UsbPort {
+        self.mcu.part.chip_mut()
+    }
+
+    pub(super) fn dac(&self) -> &Dac {
+        self.mcu.chip()
+    }
+}
+
+/// The pin at `index` of a port.
+pub(super) fn pin(index: u8) -> Pin {
+    Pin::new(index).expect("a port has sixteen pins")
+}
+
+impl Store for Machine {}
+
+impl Board for Machine {
+    fn name(&self) -> &'static str {
+        "stm32f4discovery"
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec![MCU]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.mcu)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let lines = u32::from(self.mcu.cpu().interrupt_lines);
+        let mut core = armv7m::Core {
+            variant: armv7m::Variant::M4,
+            clock_hz: CORE_HZ,
+            interrupt_lines: NonZeroU32::new(lines).expect("a part with interrupts"),
+            priority_bits: 4,
+            refclk_divider: NonZeroU32::new(8).expect("not zero"),
+            instructions_per_second: CORE_HZ,
+            boot: "flash",
+        }
+        .spec_with_parts(
+            &rigless::cpu::armv7m::windows(self.mcu.bus()),
+            armv7m::Fpu::FpV4Sp,
+            armv7m::MpuRegions::Eight,
+        );
+        let (make, probe) = (core.processor.clone(), self.probe.clone());
+        core.processor = Arc::new(move |endian| {
+            make(endian).map(|core| Box::new(Probed::new(core, probe.clone())) as Box<dyn Processor>)
+        });
+        vec![Target::new(MCU, &mut self.mcu, core)]
+    }
+}

@@ -1,0 +1,228 @@
+//! The emulated board: the flash image, unmodified, on an STM32F407 with a plant on its pins, an
+//! accelerometer on SPI and a USB host on its cable.
+//!
+//! Everything that knows the emulator stays in this module; a test sees pins, a shaft, a cable and
+//! virtual time. The clock is one instruction a cycle at 168 MHz: it proves order, rates and
+//! instruction counts, not cycles. The same image, plant and orders give the same run.
+
+mod dac;
+mod machine;
+pub mod otg;
+pub mod plant;
+pub mod processor;
+mod rtt;
+mod run;
+pub mod tilt;
+mod usb_port;
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use rigless::emulator::{self, Start};
+use rigless::image::Image;
+use rigless::session::Session;
+use rigless::symbols::Symbols;
+use rigless::time::VirtualNanos;
+
+pub use dac::Dac;
+pub use machine::INSTRUCTIONS_PER_SECOND;
+pub use plant::{Drive, Nanos, PlantSide};
+pub use processor::{HandlerRun, Jump, Probe};
+pub use run::{DacWrite, EncoderRead, Log, Stopped};
+pub use usb_port::UsbPort;
+
+use machine::Machine;
+use run::{Done, Order, PAINT, World};
+
+/// A millisecond of virtual time.
+pub const MILLISECOND: Nanos = 1_000_000;
+
+/// One of the part's timers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Timer {
+    /// TIM2, TIM3, TIM4 or TIM5: 0 to 3.
+    General(usize),
+    /// TIM1 or TIM8: 0 or 1.
+    Advanced(usize),
+}
+
+impl Timer {
+    /// The address of its counter.
+    #[must_use]
+    pub fn count_address(self) -> u64 {
+        const COUNT: u64 = 0x24;
+        match self {
+            Self::General(n) => 0x4000_0000 + 0x400 * n as u64 + COUNT,
+            Self::Advanced(n) => 0x4001_0000 + 0x400 * n as u64 + COUNT,
+        }
+    }
+}
+
+/// What is soldered to the part.
+#[derive(Debug, Clone, Copy)]
+pub struct Wiring {
+    /// The timer the encoder's tracks go to.
+    pub encoder: Timer,
+    /// The timer whose update is the tick, with the rate it counts at in hertz; without one no
+    /// latency is measured.
+    pub tick: Option<(Timer, u64)>,
+    /// The amplifier's enable line: port (0 is A), pin, and the level that enables.
+    pub enable: (usize, u8, bool),
+    /// The accelerometer, if any.
+    pub tilt: Option<tilt::Model>,
+    /// How often the plant moves, in nanoseconds.
+    pub plant_period: Nanos,
+}
+
+/// Why a board could not be switched on.
+#[derive(Debug)]
+pub struct Refused(String);
+
+impl std::fmt::Display for Refused {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Refused {}
+
+/// Where the flash image is: `FIRMWARE_ELF`, or where `cargo xtask firmware` leaves it.
+#[must_use]
+pub fn firmware_path() -> PathBuf {
+    const DEFAULT: &str = "target/thumbv7em-none-eabihf/firmware/firmware";
+    std::env::var_os("FIRMWARE_ELF")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(DEFAULT), PathBuf::from)
+}
+
+/// A board that is switched on.
+#[derive(Debug)]
+pub struct Board {
+    orders: Sender<Order>,
+    done: Receiver<Done>,
+    thread: Option<JoinHandle<Result<(), String>>>,
+    probe: Probe,
+    symbols: Symbols,
+    stack: Option<(u64, u64)>,
+    now: Nanos,
+}
+
+impl Board {
+    /// Switches on a board with the image at `path`, wired as `wiring`, with `plant` on its shaft.
+    /// The core has run nothing yet.
+    pub fn on(path: &Path, wiring: Wiring, plant: impl PlantSide + 'static) -> Result<Self, Refused> {
+        let refuse = |why: String| Refused(format!("{}: {why}", path.display()));
+        let bytes = std::fs::read(path)
+            .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
+        let symbols =
+            Symbols::read(&bytes, |address| address & !1).map_err(|error| refuse(error.to_string()))?;
+        let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
+        let probe = Probe::default();
+        let machine = Machine::new(&wiring, probe.clone()).map_err(|error| refuse(error.to_string()))?;
+        let session =
+            Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
+        let find = |name: &str| symbols.get(name).ok();
+        let stack = find("_stack_end").or_else(|| find("__euninit")).zip(find("_stack_start"));
+        let places = run::Symbols { rtt: find("_SEGGER_RTT"), stack };
+        let (orders, taken) = channel();
+        let (answer, done) = channel();
+        let world = World::new(wiring, places, Box::new(plant), taken, answer);
+        let thread = std::thread::spawn(move || {
+            let images = [image];
+            let finished = emulator::run(session, &Start::new(&images), world);
+            finished.map(drop).map_err(|error| error.to_string())
+        });
+        Ok(Self { orders, done, thread: Some(thread), probe, symbols, stack, now: 0 })
+    }
+
+    fn order(&mut self, order: Order) {
+        if self.orders.send(order).is_ok() && self.done.recv().is_ok() {
+            return;
+        }
+        let ended = self.thread.take().map(JoinHandle::join);
+        panic!("the emulated board stopped at {} ns: {ended:?}", self.now);
+    }
+
+    /// Virtual time since the board was switched on.
+    #[must_use]
+    pub fn now(&self) -> Nanos {
+        self.now
+    }
+
+    /// Runs to the instant `at`.
+    pub fn run_until(&mut self, at: Nanos) {
+        if at > self.now {
+            self.order(Order::Until(at));
+            self.now = at;
+        }
+    }
+
+    /// Runs for `milliseconds` of virtual time.
+    pub fn run_ms(&mut self, milliseconds: u64) {
+        self.run_until(self.now + milliseconds * MILLISECOND);
+    }
+
+    /// Runs until `wanted` holds, looking every `every_us` microseconds, for `limit_ms`
+    /// milliseconds at most. Answers whether it came to hold.
+    pub fn run_while_not(
+        &mut self,
+        limit_ms: u64,
+        every_us: u64,
+        wanted: impl FnMut(&mut Stopped<'_>) -> bool + Send + Clone + 'static,
+    ) -> bool {
+        let end = self.now + limit_ms * MILLISECOND;
+        loop {
+            let mut look = wanted.clone();
+            if self.at_stop(move |stopped| look(stopped)) {
+                return true;
+            }
+            if self.now >= end {
+                return false;
+            }
+            self.run_until((self.now + every_us * 1_000).min(end));
+        }
+    }
+
+    /// Visits the stopped board.
+    pub fn at_stop<T: Send + 'static>(
+        &mut self,
+        visit: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
+    ) -> T {
+        let (answer, answered) = channel();
+        self.order(Order::Visit(Box::new(move |stopped| {
+            let _ = answer.send(visit(stopped));
+        })));
+        answered.recv().expect("the visit was made")
+    }
+
+    /// The probe on the core: counts by interrupt, and jumps.
+    #[must_use]
+    pub fn probe(&self) -> Probe {
+        self.probe.clone()
+    }
+
+    /// The address of the function or object called `name` in the image.
+    #[must_use]
+    pub fn symbol(&self, name: &str) -> Option<u64> {
+        self.symbols.get(name).ok()
+    }
+
+    /// The most stack the firmware has used, and what it has, in bytes; `None` where the image
+    /// doesn't say where its stack is.
+    pub fn stack_use(&mut self) -> Option<(u64, u64)> {
+        let (low, high) = self.stack?;
+        let untouched = self.at_stop(move |stopped| {
+            (low..high).step_by(4).take_while(|&address| stopped.word(address) == Some(PAINT)).count()
+        });
+        Some((high - low - 4 * untouched as u64, high - low))
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        let _ = self.orders.send(Order::End);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

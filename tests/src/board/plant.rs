@@ -1,0 +1,141 @@
+//! What hangs on the device's shaft: a plant takes the drive and gives the encoder's angle.
+
+use std::fmt;
+
+/// Virtual time since the board was switched on, in nanoseconds.
+pub type Nanos = u64;
+
+/// What the device puts out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drive {
+    /// The DAC code, 0 to 4095; mid-scale is zero torque. `None` while the pin is not driven.
+    pub code: Option<u16>,
+    /// Whether the amplifier is enabled.
+    pub enabled: bool,
+}
+
+/// The mechanical side of the pins.
+pub trait PlantSide: Send {
+    /// Moves on to `at` under `drive` and answers the encoder's angle in counts (quadruple
+    /// evaluation: four to a line), counted from where the board was switched on.
+    fn step(&mut self, at: Nanos, drive: Drive) -> i64;
+}
+
+impl<F: FnMut(Nanos, Drive) -> i64 + Send> PlantSide for F {
+    fn step(&mut self, at: Nanos, drive: Drive) -> i64 {
+        self(at, drive)
+    }
+}
+
+impl fmt::Debug for dyn PlantSide {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a plant")
+    }
+}
+
+/// A shaft held still.
+#[must_use]
+pub fn held() -> impl PlantSide {
+    |_: Nanos, _: Drive| 0
+}
+
+/// A hand strong enough to follow a path whatever the motor does: points of time and angle, joined
+/// by straight lines, the last angle held.
+#[must_use]
+pub fn path(points: Vec<(Nanos, i64)>) -> impl PlantSide {
+    move |at: Nanos, _: Drive| {
+        let after = points.partition_point(|&(time, _)| time <= at);
+        match (after.checked_sub(1).map(|before| points[before]), points.get(after)) {
+            (Some((from, start)), Some(&(to, end))) => {
+                let span = i128::from(to - from);
+                let done = i128::from(at - from);
+                start + (i128::from(end - start) * done / span) as i64
+            }
+            (Some((_, angle)), None) => angle,
+            (None, _) => points.first().map_or(0, |&(_, angle)| angle),
+        }
+    }
+}
+
+/// The two tracks of an incremental encoder.
+#[derive(Debug)]
+pub(super) struct Encoder {
+    /// The angle whose levels are on the wires, in counts.
+    angle: i64,
+    target: i64,
+    next_edge: Nanos,
+    spacing: Nanos,
+}
+
+/// The least time between two edges: a shaft at 4,000,000 counts a second, far beyond a hand and
+/// slow enough for the input filters.
+pub(super) const LEAST_EDGE_SPACING: Nanos = 250;
+
+impl Encoder {
+    pub(super) fn new() -> Self {
+        Self { angle: 0, target: 0, next_edge: 0, spacing: LEAST_EDGE_SPACING }
+    }
+
+    /// The shaft is to be at `target` when the next step comes, `step` from `now`.
+    pub(super) fn aim(&mut self, now: Nanos, target: i64, step: Nanos) {
+        self.target = target;
+        let edges = target.abs_diff(self.angle);
+        if edges > 0 {
+            self.spacing = (step / edges).max(LEAST_EDGE_SPACING);
+            self.next_edge = now;
+        }
+    }
+
+    /// When the next edge is due.
+    pub(super) fn due(&self) -> Option<Nanos> {
+        (self.angle != self.target).then_some(self.next_edge)
+    }
+
+    /// Makes the edge that is due and answers the levels of both tracks. Track A leads when the
+    /// angle grows.
+    pub(super) fn edge(&mut self) -> (bool, bool) {
+        self.angle += (self.target - self.angle).signum();
+        self.next_edge += self.spacing;
+        self.levels()
+    }
+
+    /// The levels of both tracks.
+    pub(super) fn levels(&self) -> (bool, bool) {
+        match self.angle.rem_euclid(4) {
+            0 => (false, false),
+            1 => (true, false),
+            2 => (true, true),
+            _ => (false, true),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tracks_walk_the_gray_code_one_edge_at_a_time() {
+        let mut encoder = Encoder::new();
+        encoder.aim(1_000, 5, 10_000);
+        let mut seen = vec![encoder.levels()];
+        let mut times = Vec::new();
+        while let Some(due) = encoder.due() {
+            times.push(due);
+            seen.push(encoder.edge());
+        }
+        assert_eq!(times, [1_000, 3_000, 5_000, 7_000, 9_000]);
+        for pair in seen.windows(2) {
+            let changed = usize::from(pair[0].0 != pair[1].0) + usize::from(pair[0].1 != pair[1].1);
+            assert_eq!(changed, 1, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn a_path_goes_straight_between_its_points_and_then_holds() {
+        let mut path = path(vec![(1_000, 10), (2_000, -10)]);
+        let drive = Drive { code: None, enabled: false };
+        let angles: Vec<i64> = [0, 1_000, 1_500, 2_000, 9_000].map(|at| path.step(at, drive)).to_vec();
+        assert_eq!(angles, [10, 10, 0, -10, -10]);
+    }
+}

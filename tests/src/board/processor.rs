@@ -1,0 +1,333 @@
+//! The emulator's core with three things added: addresses of peripherals it has no model for lead
+//! to windows where the board has one, every instruction can be put down to the interrupt that ran
+//! it, and a fault can be injected by moving the program counter.
+//!
+//! Nothing here changes what the firmware sees: the windows answer at the addresses of the manual.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rigless::emulator::{Access, Checked, CoreBus, DataModel, Error, Exit, InterruptLine, Processor, Queued};
+use rigless::soc::{Endian, Width};
+use rigless::time::VirtualNanos;
+
+/// Where the manual puts the USB core, how much of it there is, and where its window is.
+pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
+/// The same for the DAC.
+pub(super) const DAC: (u64, u64, u64) = (0x4000_7400, 0x400, 0x4010_0000);
+
+fn window(address: u64) -> u64 {
+    for (base, size, window) in [OTG, DAC] {
+        if (base..base + size).contains(&address) {
+            return address - base + window;
+        }
+    }
+    address
+}
+
+/// The number the architecture gives external interrupt 0.
+pub const FIRST_EXTERNAL: u32 = 16;
+const REGISTER_SP: usize = 13;
+const REGISTER_PC: usize = 15;
+const REGISTER_XPSR: usize = 16;
+
+/// One run of an interrupt handler, from the first instruction to the last, preemption excluded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HandlerRun {
+    /// The instruction count of the run at its first instruction.
+    pub from: u64,
+    /// How many instructions it took.
+    pub instructions: u32,
+}
+
+/// Where the program counter goes, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Jump {
+    /// The exception that has to be running; 0 is thread mode.
+    pub exception: u32,
+    /// How many of its instructions it may do first.
+    pub after: u32,
+    /// Where it goes on. Bit 0 is ignored.
+    pub to: u32,
+}
+
+/// What a probe counts and does.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// Count instructions by exception: exact, and about a hundred times slower.
+    pub profile: bool,
+    /// Every completed run of every exception handler, by exception number.
+    pub runs: BTreeMap<u32, Vec<HandlerRun>>,
+    /// Instructions in thread mode.
+    pub thread: u64,
+    /// The lowest main stack pointer seen while profiling.
+    pub lowest_sp: Option<u32>,
+    /// A jump still to come.
+    pub jump: Option<Jump>,
+    /// Instructions done in the exception a jump waits for.
+    jump_progress: u32,
+}
+
+/// Shared between the test and the core.
+#[derive(Debug, Clone, Default)]
+pub struct Probe(Arc<Mutex<Tally>>);
+
+impl Probe {
+    /// What was counted, to read or to change.
+    pub fn tally(&self) -> MutexGuard<'_, Tally> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A handler under way.
+#[derive(Debug)]
+struct Active {
+    exception: u32,
+    /// The stack pointer when it was first seen.
+    sp: u32,
+    run: HandlerRun,
+}
+
+/// The emulator's core, wrapped.
+#[derive(Debug)]
+pub(super) struct Probed {
+    core: Box<dyn Processor>,
+    probe: Probe,
+    /// The handlers under way, innermost last.
+    active: Vec<Active>,
+}
+
+impl Probed {
+    pub(super) fn new(core: Box<dyn Processor>, probe: Probe) -> Self {
+        Self { core, probe, active: Vec::new() }
+    }
+
+    fn register(&self, number: usize) -> u32 {
+        let bytes = self.core.gdb_register(number).unwrap_or_default();
+        bytes.try_into().map_or(0, u32::from_le_bytes)
+    }
+
+    fn exception(&self) -> u32 {
+        self.register(REGISTER_XPSR) & 0x1FF
+    }
+
+    /// Runs one instruction at a time and looks at the core after each.
+    fn run_stepping(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
+        let mut retired = 0;
+        while retired < u64::from(budget) {
+            let (exit, did) = self.core.run(1, bus);
+            retired += did;
+            if did > 0 {
+                self.account(did as u32);
+            }
+            let more = self.probe.tally().profile || self.probe.tally().jump.is_some();
+            if exit != Exit::Budget || !more {
+                return (exit, retired);
+            }
+        }
+        (Exit::Budget, retired)
+    }
+
+    /// Puts `did` instructions down to the exception they ran in. The core looks for interrupts
+    /// before an instruction, so one that is new belongs to the new handler; a return changes the
+    /// exception after its last instruction, so that one belongs to the old.
+    fn account(&mut self, did: u32) {
+        let exception = self.exception();
+        let sp = self.register(REGISTER_SP);
+        let count = self.core.retired();
+        let probe = self.probe.clone();
+        let mut tally = probe.tally();
+        if tally.profile {
+            tally.lowest_sp = Some(tally.lowest_sp.map_or(sp, |lowest| lowest.min(sp)));
+        }
+        let current = self.active.last().map_or(0, |handler| handler.exception);
+        if exception == current {
+            self.count(did, &mut tally);
+        } else if let Some(outer) = self.active.iter().rposition(|handler| handler.exception == exception) {
+            self.count(did, &mut tally);
+            self.end_from(outer + 1, &mut tally);
+        } else if exception == 0 {
+            self.count(did, &mut tally);
+            self.end_from(0, &mut tally);
+        } else {
+            // A tail chain takes over the frame of the handler that ended, and none of its own
+            // instructions has run; a preemption pushes a frame below it and has run one.
+            let chained = self.active.last().is_some_and(|handler| sp >= handler.sp);
+            if chained {
+                self.count(did, &mut tally);
+                self.end_from(self.active.len() - 1, &mut tally);
+            }
+            let instructions = if chained { 0 } else { did };
+            let from = count - u64::from(instructions);
+            self.active.push(Active { exception, sp, run: HandlerRun { from, instructions } });
+        }
+        let due = tally.jump.is_some_and(|jump| jump.exception == exception);
+        if due {
+            tally.jump_progress += did;
+            if let Some(jump) = tally.jump
+                && tally.jump_progress > jump.after
+            {
+                tally.jump = None;
+                tally.jump_progress = 0;
+                self.core.set_gdb_register(REGISTER_PC, &(jump.to & !1).to_le_bytes());
+            }
+        }
+    }
+
+    /// Counts `did` instructions for the innermost handler, or for thread mode.
+    fn count(&mut self, did: u32, tally: &mut Tally) {
+        match self.active.last_mut() {
+            Some(handler) => handler.run.instructions += did,
+            None => tally.thread += u64::from(did),
+        }
+    }
+
+    /// Ends every handler from the `first`th inwards.
+    fn end_from(&mut self, first: usize, tally: &mut Tally) {
+        for handler in self.active.drain(first..) {
+            if tally.profile {
+                tally.runs.entry(handler.exception).or_default().push(handler.run);
+            }
+        }
+    }
+}
+
+impl Processor for Probed {
+    fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
+        let mut bus = Rerouted(bus);
+        let stepping = {
+            let tally = self.probe.tally();
+            tally.profile || tally.jump.is_some()
+        };
+        if stepping { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
+    }
+
+    fn reset(&mut self) {
+        self.active.clear();
+        self.core.reset();
+    }
+
+    fn retired(&self) -> u64 {
+        self.core.retired()
+    }
+
+    fn ask(&mut self, queued: Queued) {
+        self.core.ask(queued);
+    }
+
+    fn maps(&self, start: u64, length: u64) -> bool {
+        self.core.maps(start, length)
+    }
+
+    fn page_size(&self) -> u64 {
+        self.core.page_size()
+    }
+
+    #[allow(unsafe_code, reason = "hands on what the runner promised, unchanged")]
+    unsafe fn map(&mut self, start: u64, length: u64, host: *mut u8, writable: bool) {
+        // SAFETY: the caller's promise is passed on as it is.
+        unsafe { self.core.map(start, length, host, writable) }
+    }
+
+    fn boot(&mut self, table: u64, read: &dyn Fn(u64, Width) -> Option<u64>) {
+        self.core.boot(table, read);
+    }
+
+    fn take_reset_request(&mut self) -> bool {
+        self.core.take_reset_request()
+    }
+
+    fn next_event(&self) -> Option<VirtualNanos> {
+        self.core.next_event()
+    }
+
+    fn on_event(&mut self, now: VirtualNanos) {
+        self.core.on_event(now);
+    }
+
+    fn waiting(&self) -> bool {
+        self.core.waiting()
+    }
+
+    fn pc(&self) -> u64 {
+        self.core.pc()
+    }
+
+    fn add_breakpoint(&mut self, address: u64) -> bool {
+        self.core.add_breakpoint(address)
+    }
+
+    fn remove_breakpoint(&mut self, address: u64) {
+        self.core.remove_breakpoint(address);
+    }
+
+    fn pass_breakpoint(&mut self, address: u64) {
+        self.core.pass_breakpoint(address);
+    }
+
+    fn gdb_register(&self, number: usize) -> Option<Vec<u8>> {
+        self.core.gdb_register(number)
+    }
+
+    fn set_gdb_register(&mut self, number: usize, bytes: &[u8]) -> bool {
+        self.core.set_gdb_register(number, bytes)
+    }
+
+    fn data_model(&self) -> DataModel {
+        self.core.data_model()
+    }
+
+    fn byte_order(&self, address: u64) -> Endian {
+        self.core.byte_order(address)
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.core.save()
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.core.load(bytes)
+    }
+}
+
+/// The runner's bus, with the windows in place.
+struct Rerouted<'a>(&'a mut dyn CoreBus);
+
+impl CoreBus for Rerouted<'_> {
+    fn access(&mut self, mut access: Access, from_code: bool) -> Option<u64> {
+        access.address = window(access.address);
+        self.0.access(access, from_code)
+    }
+
+    fn time(&self, instructions: u64) -> VirtualNanos {
+        self.0.time(instructions)
+    }
+
+    fn queued(&mut self) -> Vec<Queued> {
+        self.0.queued()
+    }
+
+    fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
+        self.0.carry_on(instructions, event)
+    }
+
+    fn acknowledge(&mut self, line: InterruptLine, instructions: u64) -> Option<u64> {
+        self.0.acknowledge(line, instructions)
+    }
+
+    fn read_checked(&mut self, access: Access, report: bool) -> Option<Checked> {
+        self.0.read_checked(access, report)
+    }
+
+    fn write_checked(&mut self, access: Access) -> Option<bool> {
+        self.0.write_checked(access)
+    }
+
+    fn stops_before(&mut self, access: &Access) -> bool {
+        self.0.stops_before(access)
+    }
+
+    fn send_trace(&mut self, bytes: &[u8]) {
+        self.0.send_trace(bytes);
+    }
+}

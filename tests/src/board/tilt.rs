@@ -1,0 +1,197 @@
+//! The accelerometers of the board's two revisions, on SPI 1: LIS302DL and LIS3DSH, and what goes
+//! wrong with them.
+
+use rigless::chip::{Timeline, spi::Peer};
+use rigless::snapshot::Store;
+
+const WHO_AM_I: u8 = 0x0F;
+/// The first output register of either chip is the X axis; the LIS302DL has one byte an axis, in
+/// every second register, the LIS3DSH two.
+const OUT_X: u8 = 0x28;
+const STATUS: u8 = 0x27;
+
+/// Which accelerometer is on the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Model {
+    /// LIS302DL: 8 bits, 18 mg a digit.
+    Lis302dl,
+    /// LIS3DSH: 16 bits, 0.06 mg a digit.
+    Lis3dsh,
+}
+
+/// What is wrong with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Health {
+    /// Nothing.
+    Good,
+    /// Nothing answers: the line stays low.
+    Absent,
+    /// It answers, and its outputs never change again.
+    Stuck,
+    /// Every register reads whatever a random line would give.
+    Nonsense,
+}
+
+/// One accelerometer.
+#[derive(Debug)]
+pub struct Accelerometer {
+    model: Model,
+    /// What is wrong with it, if anything.
+    pub health: Health,
+    registers: [u8; 128],
+    /// The address the next byte goes to or comes from, once the first byte has come.
+    address: Option<u8>,
+    reading: bool,
+    steps: bool,
+    noise: u64,
+    transfers: u64,
+}
+
+impl Accelerometer {
+    /// A chip that measures one gravity along Z.
+    #[must_use]
+    pub fn new(model: Model) -> Self {
+        let mut registers = [0; 128];
+        registers[usize::from(WHO_AM_I)] = match model {
+            Model::Lis302dl => 0x3B,
+            Model::Lis3dsh => 0x3F,
+        };
+        registers[0x20] = 0x07;
+        // LIS3DSH: CTRL_REG6.ADD_INC is set out of reset.
+        registers[0x25] = 0x10;
+        registers[usize::from(STATUS)] = 0x0F;
+        let mut chip = Self {
+            model,
+            health: Health::Good,
+            registers,
+            address: None,
+            reading: false,
+            steps: false,
+            noise: 0x9E37_79B9_7F4A_7C15,
+            transfers: 0,
+        };
+        chip.set_milligravities([0, 0, 1_000]);
+        chip
+    }
+
+    /// What it measures along X, Y and Z, in thousandths of a gravity.
+    pub fn set_milligravities(&mut self, axes: [i32; 3]) {
+        if self.health == Health::Stuck {
+            return;
+        }
+        for (axis, milligravities) in (0u8..).zip(axes) {
+            let at = usize::from(OUT_X + 2 * axis);
+            match self.model {
+                Model::Lis302dl => {
+                    let digits = (milligravities / 18).clamp(-128, 127) as i8;
+                    self.registers[at + 1] = digits as u8;
+                }
+                Model::Lis3dsh => {
+                    let digits = (milligravities * 100 / 6).clamp(-32_768, 32_767) as i16;
+                    self.registers[at..at + 2].copy_from_slice(&digits.to_le_bytes());
+                }
+            }
+        }
+    }
+
+    /// The bytes that crossed the wires since the board was switched on.
+    #[must_use]
+    pub fn transfers(&self) -> u64 {
+        self.transfers
+    }
+
+    fn random(&mut self) -> u8 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        self.noise as u8
+    }
+
+    fn byte(&mut self, mosi: u8) -> u8 {
+        self.transfers += 1;
+        let Some(address) = self.address else {
+            self.reading = mosi & 0x80 != 0;
+            (self.address, self.steps) = match self.model {
+                // Bit 6 asks for the address to step.
+                Model::Lis302dl => (Some(mosi & 0x3F), mosi & 0x40 != 0),
+                Model::Lis3dsh => (Some(mosi & 0x7F), self.registers[0x25] & 0x10 != 0),
+            };
+            return 0;
+        };
+        let register = &mut self.registers[usize::from(address & 0x7F)];
+        let answer = if self.reading {
+            *register
+        } else {
+            // The identity and the outputs are read only.
+            if address >= 0x20 && !(STATUS..=0x2D).contains(&address) {
+                *register = mosi;
+            }
+            0
+        };
+        if self.steps {
+            self.address = Some(address.wrapping_add(1) & 0x7F);
+        }
+        match self.health {
+            Health::Good | Health::Stuck => answer,
+            Health::Absent => 0,
+            Health::Nonsense => self.random(),
+        }
+    }
+}
+
+impl Store for Accelerometer {}
+
+impl Peer for Accelerometer {
+    fn transfer(&mut self, mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {
+        if bits > 8 {
+            let high = self.byte((mosi >> 8) as u8);
+            let low = self.byte(mosi as u8);
+            return u32::from(high) << 8 | u32::from(low);
+        }
+        self.byte(mosi as u8).into()
+    }
+
+    fn select(&mut self, _context: &mut Timeline<'_, '_>) {
+        self.address = None;
+    }
+
+    fn deselect(&mut self, _context: &mut Timeline<'_, '_>) {
+        self.address = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(chip: &mut Accelerometer, first: u8, bytes: usize) -> Vec<u8> {
+        chip.address = None;
+        chip.byte(first);
+        (0..bytes).map(|_| chip.byte(0)).collect()
+    }
+
+    #[test]
+    fn each_chip_says_who_it_is() {
+        assert_eq!(read(&mut Accelerometer::new(Model::Lis302dl), 0x8F, 1), [0x3B]);
+        assert_eq!(read(&mut Accelerometer::new(Model::Lis3dsh), 0x8F, 1), [0x3F]);
+    }
+
+    #[test]
+    fn one_gravity_reads_as_one_gravity() {
+        let mut old = Accelerometer::new(Model::Lis302dl);
+        assert_eq!(read(&mut old, 0xE9, 5), [0, 0, 0, 0, 55], "55 digits of 18 mg");
+        let mut new = Accelerometer::new(Model::Lis3dsh);
+        let bytes = read(&mut new, 0xA8, 6);
+        assert_eq!(i16::from_le_bytes([bytes[4], bytes[5]]), 16_666);
+    }
+
+    #[test]
+    fn a_stuck_chip_keeps_its_outputs_and_an_absent_one_reads_zero() {
+        let mut chip = Accelerometer::new(Model::Lis3dsh);
+        chip.health = Health::Stuck;
+        chip.set_milligravities([1_000, 0, 0]);
+        assert_eq!(read(&mut chip, 0xA8, 2), [0, 0]);
+        chip.health = Health::Absent;
+        assert_eq!(read(&mut chip, 0x8F, 1), [0]);
+    }
+}
