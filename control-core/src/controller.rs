@@ -2,6 +2,7 @@
 //! nothing else.
 
 use crate::event::{Fault, Limits, State, Transitions};
+use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
 use crate::math::times;
 use crate::plan::Plan;
@@ -74,6 +75,8 @@ pub enum Order {
     Configure(Plan),
     /// Something outside the tick went wrong: torque off, latched.
     Trip(Fault),
+    /// Play an excitation from where the motor is; only while torque is off. It has passed [`Excitation::check`].
+    Excite(Excitation),
 }
 
 /// The control law with its memory.
@@ -90,11 +93,18 @@ pub struct Controller {
     tripped: Option<Fault>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 enum Mode {
     Idle,
     Running,
+    Exciting(Player),
     Faulted,
+}
+
+impl Mode {
+    fn is_powered(&self) -> bool {
+        matches!(self, Mode::Running | Mode::Exciting(_))
+    }
 }
 
 impl Controller {
@@ -121,27 +131,33 @@ impl Controller {
     /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
     pub fn order(&mut self, order: Order) {
         match order {
-            Order::Start if self.mode != Mode::Running => {
-                self.limiter.restart();
-                self.silent_ticks = 0;
-                self.mode = Mode::Running;
+            Order::Start if !self.mode.is_powered() => self.power_up(Mode::Running),
+            Order::Excite(excitation) if !self.mode.is_powered() => {
+                let depth = self.plan.scale.depth(self.previous.map_or(Counts(0), |p| moved(self.origin, p)));
+                self.power_up(Mode::Exciting(Player::new(&excitation, depth)));
             }
-            Order::Stop if self.mode == Mode::Running => self.mode = Mode::Idle,
-            Order::Zero if self.mode != Mode::Running => {
+            Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
+            Order::Zero if !self.mode.is_powered() => {
                 self.origin = self.previous.unwrap_or_default();
                 self.tissue = Tissue::default();
                 self.speed = SpeedEstimator::new(self.plan.config.speed, Counts(0));
             }
             Order::Heartbeat => self.silent_ticks = 0,
-            Order::Configure(plan) if self.mode != Mode::Running => {
+            Order::Configure(plan) if !self.mode.is_powered() => {
                 let count = self.previous.map_or(Counts(0), |p| moved(self.origin, p));
                 self.speed = SpeedEstimator::new(plan.config.speed, count);
                 self.tissue = Tissue::default();
                 self.plan = plan;
             }
             Order::Trip(fault) => self.trip(fault),
-            Order::Start | Order::Stop | Order::Zero | Order::Configure(_) => {}
+            Order::Start | Order::Stop | Order::Zero | Order::Configure(_) | Order::Excite(_) => {}
         }
+    }
+
+    fn power_up(&mut self, mode: Mode) {
+        self.limiter.restart();
+        self.silent_ticks = 0;
+        self.mode = mode;
     }
 
     /// One tick, 100 µs after the one before.
@@ -151,19 +167,21 @@ impl Controller {
         let speed = self.speed.tick(&self.plan.scale, count);
         let tissue = self.tissue.tick(&self.plan.layers, count, depth, speed);
         self.watch_host();
-        let (torque, limits) = match self.mode {
-            Mode::Running => self.limiter.tick(&self.plan.torque_limits, self.torque(tissue.force, speed)),
-            Mode::Idle | Mode::Faulted => (MillinewtonMetres::default(), Limits::default()),
+        let wanted = self.wanted_torque(tissue.force, depth, speed);
+        let (torque, limits) = match wanted {
+            Some(wanted) => self.limiter.tick(&self.plan.torque_limits, wanted),
+            None => (MillinewtonMetres::default(), Limits::default()),
         };
         let dac = self.plan.dac.code(torque);
         let state = match self.mode {
             Mode::Running => tissue.state,
+            Mode::Exciting(_) => State::Excitation,
             Mode::Idle => State::Idle,
             Mode::Faulted => State::Fault,
         };
         TickOutput {
             dac,
-            enable: self.mode == Mode::Running,
+            enable: self.mode.is_powered(),
             sample: Sample { count: count.0, dac: dac.0, state: state as u8, tilt_mrad: input.tilt.0 },
             transitions: tissue.transitions,
             limits,
@@ -179,18 +197,21 @@ impl Controller {
         let step = self.previous.map_or(0, |previous| moved(previous, absolute).0);
         self.previous = Some(absolute);
         let count = moved(self.origin, absolute);
-        if self.mode == Mode::Running {
-            if step.unsigned_abs() > u32::from(self.plan.config.limits.max_counts_per_tick) {
-                self.trip(Fault::EncoderJump);
-            } else if count.0.unsigned_abs() > self.plan.travel_counts.unsigned_abs() {
-                self.trip(Fault::Travel);
-            }
+        let is_beyond = match &self.mode {
+            Mode::Running => count.0.unsigned_abs() > self.plan.travel_counts.unsigned_abs(),
+            Mode::Exciting(player) => player.is_beyond(self.plan.scale.depth(count)),
+            Mode::Idle | Mode::Faulted => return count,
+        };
+        if step.unsigned_abs() > u32::from(self.plan.config.limits.max_counts_per_tick) {
+            self.trip(Fault::EncoderJump);
+        } else if is_beyond {
+            self.trip(Fault::Travel);
         }
         count
     }
 
     fn watch_host(&mut self) {
-        if self.mode != Mode::Running {
+        if !self.mode.is_powered() {
             return;
         }
         self.silent_ticks = self.silent_ticks.saturating_add(1);
@@ -200,17 +221,34 @@ impl Controller {
     }
 
     fn trip(&mut self, fault: Fault) {
-        if self.mode != Mode::Faulted {
+        if !matches!(self.mode, Mode::Faulted) {
             self.tripped = Some(fault);
         }
         self.mode = Mode::Faulted;
     }
 
-    /// Motor torque against the tissue's force and the damping. N times mm is mN·m.
-    fn torque(&self, force: Newtons, speed: MillimetresPerSecond) -> MillinewtonMetres {
-        let damping = fixed::types::I2F30::saturating_from_num(self.plan.config.damping.0);
-        let resisting = force.0.saturating_add(times(speed.0, damping));
-        let torque: I16F16 = resisting.saturating_mul(self.plan.config.device.roller_radius.0);
-        MillinewtonMetres(I16F16::ZERO.saturating_sub(torque))
+    /// Motor torque that the law or the excitation asks for; none where torque is off. N times mm is mN·m.
+    fn wanted_torque(
+        &mut self,
+        force: Newtons,
+        depth: Millimetres,
+        speed: MillimetresPerSecond,
+    ) -> Option<MillinewtonMetres> {
+        let radius = self.plan.config.device.roller_radius;
+        match &mut self.mode {
+            Mode::Running => {
+                let damping = fixed::types::I2F30::saturating_from_num(self.plan.config.damping.0);
+                let resisting = force.0.saturating_add(times(speed.0, damping));
+                Some(MillinewtonMetres(I16F16::ZERO.saturating_sub(resisting.saturating_mul(radius.0))))
+            }
+            Mode::Exciting(player) => {
+                let torque = player.tick(radius, depth, speed);
+                if torque.is_none() {
+                    self.mode = Mode::Idle;
+                }
+                torque
+            }
+            Mode::Idle | Mode::Faulted => None,
+        }
     }
 }

@@ -19,6 +19,7 @@
 pub mod config;
 pub mod controller;
 pub mod event;
+pub mod excitation;
 pub mod friction;
 pub mod jog;
 pub mod kinematics;

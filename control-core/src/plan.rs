@@ -123,6 +123,13 @@ pub enum Field {
     BaseForce,
     Friction,
     LayerTop,
+    DurationSeconds,
+    ServoStiffness,
+    Speed,
+    Ratio,
+    Steps,
+    DwellMs,
+    Frequency,
 }
 
 impl fmt::Display for Refusal {
@@ -221,7 +228,7 @@ impl Plan {
     }
 }
 
-fn within(field: Field, value: I16F16, low: I16F16, high: I16F16) -> Result<(), Refusal> {
+pub(crate) fn within(field: Field, value: I16F16, low: I16F16, high: I16F16) -> Result<(), Refusal> {
     if value < low || value > high { Err(Refusal::OutOfRange { field, value, low, high }) } else { Ok(()) }
 }
 

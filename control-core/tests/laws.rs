@@ -149,3 +149,30 @@ fn orders_that_do_not_fit_the_mode_change_nothing() {
     let after = hold(&mut c, at, 0.000_1);
     assert_eq!((before.sample, before.force), (after.sample, after.force));
 }
+
+#[test]
+fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
+    use control_core::excitation::{Excitation, Servo, Signal};
+    use control_core::units::{Damping, MillinewtonMetres};
+    let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(5)), ramp_ms: 200 };
+    let excitation = Excitation {
+        signal: ramps,
+        duration_ms: 1_000,
+        servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
+        travel: Millimetres(I16F16::from_num(20)),
+    };
+    let mut c = Controller::new(Plan::new(&Config::default()).expect("sound"));
+    c.tick(TickInput::default());
+    c.order(Order::Excite(excitation.clone()));
+    let outputs = (0..11_000).map(|_| tick_at(&mut c, 0)).collect::<Vec<_>>();
+    let zero = c.plan().zero_torque_code().0;
+    let (most, least) = outputs.iter().fold((0, u16::MAX), |(a, b), o| (o.dac.0.max(a), o.dac.0.min(b)));
+    // 5 mN·m of 28.8 mN·m over 2,047 steps.
+    assert!(most.abs_diff(zero + 355) <= 2 && least.abs_diff(zero - 355) <= 2, "{least} to {most}");
+    assert_eq!(outputs.iter().filter(|o| o.enable).count(), 10_000);
+    assert!(outputs[10_000..].iter().all(|o| o.dac.0 == zero && o.sample.state == State::Idle as u8));
+
+    c.order(Order::Excite(excitation));
+    let trips = (0..2_000).filter_map(|t| tick_at(&mut c, t * 2).tripped).collect::<Vec<_>>();
+    assert_eq!(trips, [Fault::Travel], "4,000 counts are 63 mm");
+}

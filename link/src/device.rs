@@ -246,8 +246,15 @@ impl Endpoint {
                 self.fault = None;
                 Ok(())
             }
-            Command::Configure(_) | Command::Zero if powered => Err(Rejection::Powered),
+            Command::Configure(_) | Command::Zero | Command::Excite(_) if powered => Err(Rejection::Powered),
             Command::Zero => self.order(Order::Zero),
+            Command::Excite(excitation) => {
+                excitation.check(&self.plan).map_err(Rejection::Config)?;
+                self.order(Order::Excite(excitation))?;
+                self.start_ordered = true;
+                self.fault = None;
+                Ok(())
+            }
             Command::Configure(config) => {
                 let plan = Plan::new(&config).map_err(Rejection::Config)?;
                 self.order(Order::Configure(plan.clone()))?;

@@ -3,6 +3,7 @@
 use control_core::config::{Config, DacWidth};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
+use control_core::excitation::Excitation;
 use control_core::plan::Refusal;
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
 use fixed::types::I2F30;
@@ -188,7 +189,7 @@ pub struct Ack {
 /// Why a command was not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Rejection {
-    /// The configuration may not run.
+    /// The configuration or the excitation may not run.
     Config(Refusal),
     /// Not while torque is on: stop first.
     Powered,
@@ -239,4 +240,6 @@ pub enum Command {
     Zero,
     /// Still here.
     Heartbeat,
+    /// Play an excitation, with nobody's hand on the needle; only while torque is off.
+    Excite(Excitation),
 }

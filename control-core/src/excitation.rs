@@ -1,0 +1,418 @@
+//! Signals that separate one physical effect from another (`characterise`). The device plays them with nobody's hand on
+//! the needle: a reference that a soft position servo follows, a torque on top, or both. The safety limits stay in force.
+//!
+//! The reference is a pure function of the signal and the tick, so the PC can write down what the servo was asked to
+//! follow: it plays the same [`Reference`].
+
+use crate::TICK_HZ;
+use crate::math::times;
+use crate::plan::{Field, Plan, Refusal, within};
+use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
+use fixed::types::{I2F30, I16F16, I32F32};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Sines of a multisine at the most.
+pub const MAX_LINES: usize = 12;
+
+/// What to play.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Excitation {
+    /// The signal.
+    pub signal: Signal,
+    /// How long, 10–600,000 ms; torque goes off at the end.
+    pub duration_ms: u32,
+    /// Gains of the servo that follows the reference.
+    pub servo: Servo,
+    /// Largest distance from where it began, 1–1,000 mm along the roller; beyond it is a fault.
+    pub travel: Millimetres,
+}
+
+/// A soft position servo: `F = K·(r − x) + D·(ṙ − ẋ)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Servo {
+    /// K, up to the plan's stiffness limit; 0 plays torque alone.
+    pub stiffness: Stiffness,
+    /// D, 0–0.02 N·s/mm.
+    pub damping: Damping,
+}
+
+/// The signals, each for the effects that it tells apart.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Signal {
+    /// Constant speeds, each there and back, each `ratio` times the one before; begins again after the last. Tells
+    /// Stribeck friction from quadratic drag and viscosity.
+    SpeedStaircase {
+        /// The first speed.
+        slowest: MillimetresPerSecond,
+        /// From one speed to the next, 1–4.
+        ratio: I16F16,
+        /// Number of speeds, 1–32.
+        steps: u8,
+        /// Time at a speed, one way, 50–10,000 ms.
+        dwell_ms: u16,
+    },
+    /// There and back at one speed, over many turns. Shows what depends on the angle and on the travel.
+    Triangle {
+        /// From one end to the other.
+        stroke: Millimetres,
+        /// Speed.
+        speed: MillimetresPerSecond,
+    },
+    /// Reversals of growing amplitude: there and back over each, each `ratio` times the one before; begins again after
+    /// the last. Tells presliding from backlash.
+    ReversalLadder {
+        /// The first amplitude.
+        smallest: Millimetres,
+        /// From one amplitude to the next, 1–4.
+        ratio: I16F16,
+        /// Number of amplitudes, 1–16.
+        steps: u8,
+        /// Speed.
+        speed: MillimetresPerSecond,
+    },
+    /// Sines of equal torque around the reference at rest, with Schroeder's phases. Tells delay from electrical lag.
+    Multisine {
+        /// Amplitude of each sine.
+        torque: MillinewtonMetres,
+        /// Frequencies in Hz.
+        frequencies: Vec<u16, MAX_LINES>,
+    },
+    /// Torque that rises from zero until the motor breaks away, there and back. Shows dry friction at rest.
+    BreakawayRamps {
+        /// Largest torque.
+        torque: MillinewtonMetres,
+        /// Time from zero to the largest, 50–10,000 ms.
+        ramp_ms: u16,
+    },
+    /// The reference at rest while a person tilts the device. Shows a weight.
+    Hold,
+}
+
+impl Excitation {
+    /// Whether the device may play it under `plan`.
+    pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
+        let limits = &plan.config().limits;
+        let thousandth = |t: i64| I16F16::from_num(t) / 1000;
+        let seconds = I16F16::saturating_from_num(I32F32::from_num(self.duration_ms) / 1000);
+        within(Field::DurationSeconds, seconds, thousandth(10), I16F16::from_num(600))?;
+        within(Field::Travel, self.travel.0, I16F16::ONE, I16F16::from_num(1000))?;
+        within(Field::ServoStiffness, self.servo.stiffness.0, I16F16::ZERO, limits.stiffness.0)?;
+        within(Field::Damping, I16F16::from_num(self.servo.damping.0), I16F16::ZERO, thousandth(20))?;
+        let speed =
+            |s: MillimetresPerSecond| within(Field::Speed, s.0, thousandth(10), I16F16::from_num(2000));
+        let torque = |t: MillinewtonMetres| within(Field::TorqueLimit, t.0, I16F16::ZERO, limits.torque.0);
+        let length = |l: Millimetres| within(Field::Travel, l.0, thousandth(10), self.travel.0);
+        let ratio = |r: I16F16| within(Field::Ratio, r, I16F16::ONE, I16F16::from_num(4));
+        let steps =
+            |n: u8, most: u8| within(Field::Steps, I16F16::from_num(n), I16F16::ONE, I16F16::from_num(most));
+        let dwell = |ms: u16| {
+            within(
+                Field::DwellMs,
+                I16F16::from_num(ms.min(30_000)),
+                I16F16::from_num(50),
+                I16F16::from_num(10_000),
+            )
+        };
+        match &self.signal {
+            Signal::SpeedStaircase { slowest, ratio: r, steps: n, dwell_ms } => {
+                speed(*slowest)?;
+                ratio(*r)?;
+                steps(*n, 32)?;
+                dwell(*dwell_ms)?;
+                let fastest = power(slowest.0, *r, n - 1);
+                speed(MillimetresPerSecond(fastest))?;
+                length(Millimetres((fastest / 1000).saturating_mul_int(i32::from(*dwell_ms))))
+            }
+            Signal::Triangle { stroke, speed: s } => {
+                length(*stroke)?;
+                speed(*s)
+            }
+            Signal::ReversalLadder { smallest, ratio: r, steps: n, speed: s } => {
+                speed(*s)?;
+                ratio(*r)?;
+                steps(*n, 16)?;
+                length(*smallest)?;
+                length(Millimetres(power(smallest.0, *r, n - 1)))
+            }
+            Signal::Multisine { torque: t, frequencies } => {
+                torque(MillinewtonMetres(t.0.saturating_mul_int(frequencies.len() as i32)))?;
+                frequencies.iter().try_for_each(|f| {
+                    within(
+                        Field::Frequency,
+                        I16F16::from_num((*f).min(30_000)),
+                        I16F16::ONE,
+                        I16F16::from_num(2000),
+                    )
+                })
+            }
+            Signal::BreakawayRamps { torque: t, ramp_ms } => {
+                torque(*t)?;
+                dwell(*ramp_ms)
+            }
+            Signal::Hold => Ok(()),
+        }
+    }
+}
+
+/// `base · ratio^exponent`, saturating.
+fn power(base: I16F16, ratio: I16F16, exponent: u8) -> I16F16 {
+    (0..exponent).fold(base, |product, _| product.saturating_mul(ratio))
+}
+
+/// What the servo follows at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Target {
+    /// Position along the needle, from where the excitation began.
+    pub position: Millimetres,
+    /// Its speed.
+    pub speed: MillimetresPerSecond,
+    /// Torque on top of the servo's.
+    pub torque: MillinewtonMetres,
+}
+
+/// Plays the reference of an excitation, tick by tick.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    signal: Signal,
+    position: I32F32,
+    elapsed_ticks: u32,
+    step: u8,
+    leg: Leg,
+    phases: [u32; MAX_LINES],
+}
+
+/// One straight run of the reference.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    outwards: bool,
+    level: I16F16,
+    remaining_ticks: u32,
+}
+
+impl Reference {
+    /// From the beginning. The signal has passed [`Excitation::check`].
+    pub fn new(signal: &Signal) -> Self {
+        let mut reference = Self {
+            signal: signal.clone(),
+            position: I32F32::ZERO,
+            elapsed_ticks: 0,
+            step: 0,
+            leg: Leg { outwards: true, level: I16F16::ZERO, remaining_ticks: 0 },
+            phases: [0; MAX_LINES],
+        };
+        if let Signal::Multisine { frequencies, .. } = signal {
+            // Schroeder: phase of line i is π·i²/n, which keeps the peak low.
+            let n = (frequencies.len() as u64).max(1);
+            for (i, phase) in (0_u64..).zip(&mut reference.phases) {
+                *phase = (((i * i) << 31) / n) as u32;
+            }
+        }
+        reference.begin_leg(true);
+        reference
+    }
+
+    /// The target of the next tick.
+    pub fn tick(&mut self) -> Target {
+        if self.leg.remaining_ticks == 0 {
+            self.next_leg();
+        }
+        self.leg.remaining_ticks = self.leg.remaining_ticks.saturating_sub(1);
+        self.elapsed_ticks = self.elapsed_ticks.wrapping_add(1);
+        let mut target = Target::default();
+        match &self.signal {
+            Signal::Hold => {}
+            Signal::Multisine { torque, frequencies } => {
+                target.torque.0 = multisine(frequencies, &mut self.phases, torque.0);
+            }
+            Signal::BreakawayRamps { torque, ramp_ms } => {
+                let whole = u32::from(*ramp_ms) * (TICK_HZ / 1000);
+                let elapsed = i64::from(whole.saturating_sub(self.leg.remaining_ticks));
+                let rising = i64::from(torque.0.to_bits()) * elapsed / i64::from(whole.max(1));
+                let rising = I16F16::from_bits(i32::try_from(rising).unwrap_or(0));
+                target.torque.0 = if self.leg.outwards { rising } else { -rising };
+            }
+            Signal::SpeedStaircase { .. } | Signal::Triangle { .. } | Signal::ReversalLadder { .. } => {
+                let speed = if self.leg.outwards { self.leg.level } else { -self.leg.level };
+                self.position = self.position.saturating_add(I32F32::from(speed) / i64::from(TICK_HZ));
+                target.speed.0 = speed;
+            }
+        }
+        target.position.0 = self.position.saturating_to_num();
+        target
+    }
+
+    fn next_leg(&mut self) {
+        if self.leg.outwards {
+            return self.begin_leg(false);
+        }
+        // Back where it began, to the last bit: nothing adds up over a long run.
+        self.position = I32F32::ZERO;
+        let steps = match &self.signal {
+            Signal::SpeedStaircase { steps, .. } | Signal::ReversalLadder { steps, .. } => *steps,
+            _ => 1,
+        };
+        self.step = if self.step + 1 >= steps { 0 } else { self.step + 1 };
+        self.begin_leg(true);
+    }
+
+    fn begin_leg(&mut self, outwards: bool) {
+        let ticks_per_ms = TICK_HZ / 1000;
+        let (level, remaining_ticks) = match &self.signal {
+            Signal::SpeedStaircase { slowest, ratio, dwell_ms, .. } => {
+                (power(slowest.0, *ratio, self.step), u32::from(*dwell_ms) * ticks_per_ms)
+            }
+            Signal::Triangle { stroke, speed } => (speed.0, ticks_over(stroke.0, speed.0)),
+            Signal::ReversalLadder { smallest, ratio, speed, .. } => {
+                (speed.0, ticks_over(power(smallest.0, *ratio, self.step), speed.0))
+            }
+            Signal::BreakawayRamps { ramp_ms, .. } => (I16F16::ZERO, u32::from(*ramp_ms) * ticks_per_ms),
+            Signal::Multisine { .. } | Signal::Hold => (I16F16::ZERO, u32::MAX),
+        };
+        self.leg = Leg { outwards, level, remaining_ticks: remaining_ticks.max(1) };
+    }
+}
+
+/// Ticks to cover a length at a speed.
+fn ticks_over(length: I16F16, speed: I16F16) -> u32 {
+    let ticks = i64::from(length.to_bits()) * i64::from(TICK_HZ) / i64::from(speed.to_bits().max(1));
+    u32::try_from(ticks).unwrap_or(1)
+}
+
+fn multisine(frequencies: &[u16], phases: &mut [u32; MAX_LINES], torque: I16F16) -> I16F16 {
+    // 2^32 / 10,000 Hz, in Q8: the frequency error stays below 1e-7 of a hertz.
+    const PHASE_PER_HZ_Q8: u64 = (1 << 40) / TICK_HZ as u64;
+    let mut sum = I16F16::ZERO;
+    for (frequency, phase) in frequencies.iter().zip(phases) {
+        sum = sum.saturating_add(times(torque, sine(*phase)));
+        *phase = phase.wrapping_add(((u64::from(*frequency) * PHASE_PER_HZ_Q8) >> 8) as u32);
+    }
+    sum
+}
+
+/// Sine of a phase of which 2^32 is a turn; error below 2e-4. A fifth-order odd polynomial over a quarter turn.
+fn sine(phase: u32) -> I2F30 {
+    // x in [−1, 1] quarter turns; beyond a quarter the sine runs back.
+    let quarter = 1_i64 << 30;
+    let signed = i64::from(phase.cast_signed());
+    let folded = if signed > quarter {
+        2 * quarter - signed
+    } else if signed < -quarter {
+        -2 * quarter - signed
+    } else {
+        signed
+    };
+    let x = I2F30::from_bits(folded as i32);
+    // sin(πx/2) ≈ c₁x + c₃x³ + c₅x⁵ with c₁ + c₃ + c₅ = 1: exact at 0 and at the quarter.
+    const C1: I2F30 = I2F30::from_bits(1_686_033_033);
+    const C3: I2F30 = I2F30::from_bits(-689_020_702);
+    const C5: I2F30 = I2F30::from_bits(76_729_493);
+    let x2 = x.saturating_mul(x);
+    x.saturating_mul(C1.saturating_add(x2.saturating_mul(C3.saturating_add(x2.saturating_mul(C5)))))
+}
+
+/// Plays an excitation against the motor: the reference, the servo and the end.
+#[derive(Clone, Debug)]
+pub(crate) struct Player {
+    reference: Reference,
+    servo: Servo,
+    begin: Millimetres,
+    travel: Millimetres,
+    remaining_ticks: u32,
+}
+
+impl Player {
+    pub(crate) fn new(excitation: &Excitation, begin: Millimetres) -> Self {
+        Self {
+            reference: Reference::new(&excitation.signal),
+            servo: excitation.servo,
+            begin,
+            travel: excitation.travel,
+            remaining_ticks: excitation.duration_ms.saturating_mul(TICK_HZ / 1000),
+        }
+    }
+
+    /// Torque in the insertion direction, or nothing at the end.
+    pub(crate) fn tick(
+        &mut self,
+        roller_radius: Millimetres,
+        depth: Millimetres,
+        speed: MillimetresPerSecond,
+    ) -> Option<MillinewtonMetres> {
+        self.remaining_ticks = self.remaining_ticks.checked_sub(1)?;
+        let target = self.reference.tick();
+        let behind = self.begin.0.saturating_add(target.position.0).saturating_sub(depth.0);
+        let slower = target.speed.0.saturating_sub(speed.0);
+        let damping = I2F30::saturating_from_num(self.servo.damping.0);
+        let force = behind.saturating_mul(self.servo.stiffness.0).saturating_add(times(slower, damping));
+        Some(MillinewtonMetres(force.saturating_mul(roller_radius.0).saturating_add(target.torque.0)))
+    }
+
+    /// Whether the motor is further from the beginning than allowed.
+    pub(crate) fn is_beyond(&self, depth: Millimetres) -> bool {
+        depth.0.saturating_sub(self.begin.0).saturating_abs() > self.travel.0
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    #[test]
+    fn the_sine_follows_its_twin() {
+        for step in 0..4096_u32 {
+            let phase = step << 20;
+            let exact = (f64::from(step) / 4096.0 * core::f64::consts::TAU).sin();
+            let got = sine(phase).to_num::<f64>();
+            assert!((got - exact).abs() < 2e-4, "{step}: {got} for {exact}");
+        }
+    }
+
+    fn staircase() -> Signal {
+        Signal::SpeedStaircase {
+            slowest: MillimetresPerSecond(I16F16::from_num(2)),
+            ratio: I16F16::from_num(2),
+            steps: 7,
+            dwell_ms: 500,
+        }
+    }
+
+    #[test]
+    fn a_staircase_covers_two_decades_and_comes_back_each_time() {
+        let mut reference = Reference::new(&staircase());
+        let targets = (0..7 * 10_000).map(|_| reference.tick());
+        let (mut fastest, mut furthest, mut turned) = (0.0_f64, 0.0_f64, 0);
+        let mut outwards = true;
+        let mut last = Target::default();
+        for target in targets {
+            fastest = fastest.max(target.speed.0.to_num());
+            furthest = furthest.max(target.position.0.to_num());
+            turned += u32::from((target.speed.0 > 0) != outwards);
+            outwards = target.speed.0 > 0;
+            last = target;
+        }
+        assert_eq!(fastest, 128.0);
+        assert!((furthest - 64.0).abs() < 0.1, "{furthest} mm at half a second of 128 mm/s");
+        assert_eq!(turned, 13);
+        assert!(last.position.0.to_num::<f64>().abs() < 0.1, "{last:?}");
+    }
+
+    #[test]
+    fn what_would_leave_the_travel_or_the_torque_is_refused() {
+        let plan = Plan::new(&Config::default()).unwrap();
+        let servo = Servo { stiffness: Stiffness(I16F16::from_num(0.1)), damping: Damping::default() };
+        let travel = Millimetres(I16F16::from_num(100));
+        let sound = Excitation { signal: staircase(), duration_ms: 10_000, servo, travel };
+        assert_eq!(sound.check(&plan), Ok(()));
+        let short = Excitation { travel: Millimetres(I16F16::from_num(50)), ..sound.clone() };
+        assert!(matches!(short.check(&plan), Err(Refusal::OutOfRange { field: Field::Travel, .. })));
+        let strong = Signal::Multisine {
+            torque: MillinewtonMetres(I16F16::from_num(10)),
+            frequencies: [10, 20, 40].into_iter().collect(),
+        };
+        let strong = Excitation { signal: strong, ..sound };
+        assert!(matches!(strong.check(&plan), Err(Refusal::OutOfRange { field: Field::TorqueLimit, .. })));
+    }
+}
