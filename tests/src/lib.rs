@@ -1,8 +1,9 @@
 //! The flash image on an emulated board, end to end.
 //!
-//! [`board`] runs the image; [`usb_host`] is the PC's end of its cable. The tests in `tests/` say
-//! what the device promises. Nothing here is part of the product, and nothing of it reaches into
-//! the firmware: one image, no feature flag for tests.
+//! [`board`] runs the image; [`usb_host`] is the PC's end of its cable; [`pc`] is the program on
+//! that PC. The tests in `tests/` say what the device promises. Nothing here is part of the
+//! product, and nothing of it reaches into the firmware: one image, no feature flag for tests.
 
 pub mod board;
+pub mod pc;
 pub mod usb_host;

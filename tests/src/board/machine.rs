@@ -18,6 +18,7 @@ use rigless::soc::{Error, Gate, Window};
 
 use super::Wiring;
 use super::dac::Dac;
+use super::flash::Flash;
 use super::processor::{DAC, OTG, Probe, Probed};
 use super::tilt::Accelerometer;
 use super::usb_port::{INTERRUPTS, UsbPort};
@@ -36,10 +37,11 @@ const MCU: &str = "stm32f407";
 pub(super) struct Machine {
     pub(super) mcu: Wired<Wired<Stm32f427, UsbPort>, Dac>,
     probe: Probe,
+    flash: Flash,
 }
 
 impl Machine {
-    pub(super) fn new(wiring: &Wiring, probe: Probe) -> Result<Self, Error> {
+    pub(super) fn new(wiring: &Wiring, probe: Probe, flash: Flash) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
         part.rcc.attach_crystals(CRYSTAL_HZ, 0);
         part.set_supply(RAIL_MILLIVOLTS);
@@ -56,7 +58,7 @@ impl Machine {
             .raising(&INTERRUPTS);
         let dac = Window::new("DAC1", DAC.2, size(DAC.1)).gated(Gate::by("RCC", "APB1ENR", "DACEN"));
         let with_usb = Wired::new(part, usb, UsbPort::default())?;
-        Ok(Self { mcu: Wired::new(with_usb, dac, Dac::default())?, probe })
+        Ok(Self { mcu: Wired::new(with_usb, dac, Dac::default())?, probe, flash })
     }
 
     pub(super) fn part(&mut self) -> &mut Stm32f427 {
@@ -108,9 +110,10 @@ impl Board for Machine {
             armv7m::Fpu::FpV4Sp,
             armv7m::MpuRegions::Eight,
         );
-        let (make, probe) = (core.processor.clone(), self.probe.clone());
+        let (make, probe, flash) = (core.processor.clone(), self.probe.clone(), self.flash.clone());
         core.processor = Arc::new(move |endian| {
-            make(endian).map(|core| Box::new(Probed::new(core, probe.clone())) as Box<dyn Processor>)
+            make(endian)
+                .map(|core| Box::new(Probed::new(core, probe.clone(), flash.clone())) as Box<dyn Processor>)
         });
         vec![Target::new(MCU, &mut self.mcu, core)]
     }

@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod dac;
+pub mod flash;
 mod machine;
 pub mod otg;
 pub mod plant;
@@ -59,7 +60,7 @@ impl Timer {
     }
 }
 
-/// What is soldered to the part.
+/// What is soldered to the part. The default is what the firmware is written for.
 #[derive(Debug, Clone, Copy)]
 pub struct Wiring {
     /// The timer the encoder's tracks go to.
@@ -73,6 +74,18 @@ pub struct Wiring {
     pub tilt: Option<tilt::Model>,
     /// How often the plant moves, in nanoseconds.
     pub plant_period: Nanos,
+}
+
+impl Default for Wiring {
+    fn default() -> Self {
+        Self {
+            encoder: Timer::General(0),
+            tick: Some((Timer::General(2), 84_000_000)),
+            enable: (3, 7, true),
+            tilt: Some(tilt::Model::Lis3dsh),
+            plant_period: 20_000,
+        }
+    }
 }
 
 /// Why a board could not be switched on.
@@ -95,6 +108,11 @@ pub fn firmware_path() -> PathBuf {
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(DEFAULT), PathBuf::from)
 }
 
+/// Whether two addresses are in one memory of the part, the second as an end.
+fn same_memory(low: u64, top: u64) -> bool {
+    low < top && low >> 28 == (top - 1) >> 28
+}
+
 /// A board that is switched on.
 #[derive(Debug)]
 pub struct Board {
@@ -102,6 +120,7 @@ pub struct Board {
     done: Receiver<Done>,
     thread: Option<JoinHandle<Result<(), String>>>,
     probe: Probe,
+    flash: flash::Flash,
     symbols: Symbols,
     stack: Option<(u64, u64)>,
     now: Nanos,
@@ -117,12 +136,18 @@ impl Board {
         let symbols =
             Symbols::read(&bytes, |address| address & !1).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
-        let probe = Probe::default();
-        let machine = Machine::new(&wiring, probe.clone()).map_err(|error| refuse(error.to_string()))?;
+        let (probe, flash) = (Probe::default(), flash::Flash::default());
+        let machine =
+            Machine::new(&wiring, probe.clone(), flash.clone()).map_err(|error| refuse(error.to_string()))?;
         let session =
             Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
         let find = |name: &str| symbols.get(name).ok();
-        let stack = find("_stack_end").or_else(|| find("__euninit")).zip(find("_stack_start"));
+        let stack = find("_stack_start").map(|top| {
+            // The stack ends where the image says, or at the foot of the memory its top is in.
+            let low =
+                ["_stack_end", "__euninit"].into_iter().filter_map(find).find(|low| same_memory(*low, top));
+            (low.unwrap_or((top - 1) & !0xFFFF), top)
+        });
         let places = run::Symbols { rtt: find("_SEGGER_RTT"), stack };
         let (orders, taken) = channel();
         let (answer, done) = channel();
@@ -132,7 +157,7 @@ impl Board {
             let finished = emulator::run(session, &Start::new(&images), world);
             finished.map(drop).map_err(|error| error.to_string())
         });
-        Ok(Self { orders, done, thread: Some(thread), probe, symbols, stack, now: 0 })
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, stack, now: 0 })
     }
 
     fn order(&mut self, order: Order) {
@@ -199,6 +224,12 @@ impl Board {
     #[must_use]
     pub fn probe(&self) -> Probe {
         self.probe.clone()
+    }
+
+    /// The sectors of flash that the firmware writes to.
+    #[must_use]
+    pub fn flash(&self) -> flash::Flash {
+        self.flash.clone()
     }
 
     /// The address of the function or object called `name` in the image.

@@ -7,9 +7,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use rigless::emulator::{Access, Checked, CoreBus, DataModel, Error, Exit, InterruptLine, Processor, Queued};
+use rigless::emulator::{
+    Access, AccessKind, Checked, CoreBus, DataModel, Error, Exit, InterruptLine, Processor, Queued,
+};
 use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
+
+use super::flash::{Flash, WRITABLE};
 
 /// Where the manual puts the USB core, how much of it there is, and where its window is.
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
@@ -93,13 +97,21 @@ struct Active {
 pub(super) struct Probed {
     core: Box<dyn Processor>,
     probe: Probe,
+    flash: Flash,
     /// The handlers under way, innermost last.
     active: Vec<Active>,
 }
 
 impl Probed {
-    pub(super) fn new(core: Box<dyn Processor>, probe: Probe) -> Self {
-        Self { core, probe, active: Vec::new() }
+    pub(super) fn new(core: Box<dyn Processor>, probe: Probe, flash: Flash) -> Self {
+        Self { core, probe, flash, active: Vec::new() }
+    }
+
+    /// Has every access to the sectors the firmware writes to go over the bus.
+    fn route_flash(&mut self) {
+        for page in WRITABLE.step_by(self.core.page_size() as usize) {
+            self.core.ask(Queued::Route(page));
+        }
     }
 
     fn register(&self, number: usize) -> u32 {
@@ -194,7 +206,8 @@ impl Probed {
 
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
-        let mut bus = Rerouted(bus);
+        let flash = self.flash.clone();
+        let mut bus = Rerouted { bus, flash: &flash };
         let stepping = {
             let tally = self.probe.tally();
             tally.profile || tally.jump.is_some()
@@ -204,6 +217,7 @@ impl Processor for Probed {
 
     fn reset(&mut self) {
         self.active.clear();
+        self.flash.array().restarted();
         self.core.reset();
     }
 
@@ -231,10 +245,11 @@ impl Processor for Probed {
 
     fn boot(&mut self, table: u64, read: &dyn Fn(u64, Width) -> Option<u64>) {
         self.core.boot(table, read);
+        self.route_flash();
     }
 
     fn take_reset_request(&mut self) -> bool {
-        self.core.take_reset_request()
+        self.core.take_reset_request() || std::mem::take(&mut self.flash.array().cut)
     }
 
     fn next_event(&self) -> Option<VirtualNanos> {
@@ -291,43 +306,60 @@ impl Processor for Probed {
 }
 
 /// The runner's bus, with the windows in place.
-struct Rerouted<'a>(&'a mut dyn CoreBus);
+struct Rerouted<'a> {
+    bus: &'a mut dyn CoreBus,
+    flash: &'a Flash,
+}
 
 impl CoreBus for Rerouted<'_> {
     fn access(&mut self, mut access: Access, from_code: bool) -> Option<u64> {
+        let written = access.kind == AccessKind::Write;
+        if WRITABLE.contains(&access.address) {
+            let (address, value) = (access.address, access.value as u32);
+            let mut array = self.flash.array();
+            if written {
+                array.store(address, access.width.bytes(), value);
+                return Some(access.value);
+            }
+            let word = u64::from(array.word(address)) | u64::from(array.word(address + 4)) << 32;
+            return Some(word >> (8 * (address & 3)) & access.width.mask());
+        }
+        if written {
+            self.flash.array().register_written(access.address, access.value as u32);
+        }
         access.address = window(access.address);
-        self.0.access(access, from_code)
+        self.bus.access(access, from_code)
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {
-        self.0.time(instructions)
+        self.bus.time(instructions)
     }
 
     fn queued(&mut self) -> Vec<Queued> {
-        self.0.queued()
+        self.bus.queued()
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        self.0.carry_on(instructions, event)
+        self.bus.carry_on(instructions, event)
     }
 
     fn acknowledge(&mut self, line: InterruptLine, instructions: u64) -> Option<u64> {
-        self.0.acknowledge(line, instructions)
+        self.bus.acknowledge(line, instructions)
     }
 
     fn read_checked(&mut self, access: Access, report: bool) -> Option<Checked> {
-        self.0.read_checked(access, report)
+        self.bus.read_checked(access, report)
     }
 
     fn write_checked(&mut self, access: Access) -> Option<bool> {
-        self.0.write_checked(access)
+        self.bus.write_checked(access)
     }
 
     fn stops_before(&mut self, access: &Access) -> bool {
-        self.0.stops_before(access)
+        self.bus.stops_before(access)
     }
 
     fn send_trace(&mut self, bytes: &[u8]) {
-        self.0.send_trace(bytes);
+        self.bus.send_trace(bytes);
     }
 }
