@@ -10,7 +10,22 @@
 
 pub mod effects;
 mod error;
+mod estimate;
+mod fit;
+mod judge;
+mod kalman;
+mod library;
+mod model;
+mod noise;
+mod null;
+mod periodic;
+mod pipeline;
 pub mod recording;
+pub mod report;
 pub mod rig;
+mod screen;
+mod select;
+mod solve;
+mod track;
 
 pub use error::InputError;

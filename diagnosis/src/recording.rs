@@ -95,7 +95,9 @@ impl Recording {
                         let field: String = field.chars().take(24).collect();
                         return Err(at(
                             line,
-                            format!("{name} is \"{field}\", not a usable number; correct or cut the recording"),
+                            format!(
+                                "{name} is \"{field}\", not a usable number; correct or cut the recording"
+                            ),
                         ));
                     };
                     columns[*known].push(value);
@@ -105,7 +107,10 @@ impl Recording {
             if count != names.len() {
                 return Err(at(
                     line,
-                    format!("{count} fields where the header names {}; restore the row or cut the recording before it", names.len()),
+                    format!(
+                        "{count} fields where the header names {}; restore the row or cut the recording before it",
+                        names.len()
+                    ),
                 ));
             }
             let times = &columns[0];
@@ -114,13 +119,17 @@ impl Recording {
             {
                 return Err(at(
                     line,
-                    format!("the time {now} s does not come after {before} s; times must increase from row to row"),
+                    format!(
+                        "the time {now} s does not come after {before} s; times must increase from row to row"
+                    ),
                 ));
             }
         }
         let [time_s, command, position_counts, tilt, reference, force] = columns;
         if time_s.len() < 2 {
-            return Err(InputError::new(format!("{file}: fewer than two rows; record some seconds of motion")));
+            return Err(InputError::new(format!(
+                "{file}: fewer than two rows; record some seconds of motion"
+            )));
         }
         let optional = |column: Vec<f64>, known: usize| place[known].map(|_| column);
         Ok(Self {

@@ -138,7 +138,10 @@ impl Rig {
     /// Reads and checks a rig file.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let text = std::fs::read_to_string(path).map_err(|cause| {
-            InputError::new(format!("{}: the rig file cannot be read ({cause}); check its path", path.display()))
+            InputError::new(format!(
+                "{}: the rig file cannot be read ({cause}); check its path",
+                path.display()
+            ))
         })?;
         Self::parse(&text, &path.display().to_string())
     }
@@ -146,7 +149,8 @@ impl Rig {
     /// Checks the text of a rig file; `file` is what errors call it.
     pub fn parse(text: &str, file: &str) -> Result<Self, InputError> {
         let rig: Self = toml::from_str(text).map_err(|cause| {
-            let line = cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+            let line =
+                cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
             InputError::new(format!("{file}, line {line}: {}; see the rig format", cause.message()))
         })?;
         rig.check(file)?;

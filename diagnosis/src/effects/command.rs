@@ -29,8 +29,12 @@ impl CommandLaw {
                 Self::Deadband { half_width: get("half_width"), shift: get("shift") > 0.5 }
             }
             EffectName::CommandSaturation => Self::Clip { limit: get("limit"), ratio: 1.0 },
-            EffectName::RollerSlip => Self::Clip { limit: get("limit"), ratio: effect.shape_or("ratio", 1.0) },
-            EffectName::CommandDelay => Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 },
+            EffectName::RollerSlip => {
+                Self::Clip { limit: get("limit"), ratio: effect.shape_or("ratio", 1.0) }
+            }
+            EffectName::CommandDelay => {
+                Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 }
+            }
             EffectName::ElectricalLag => Self::Lag { time_constant: get("time_constant"), state: None },
             _ => return None,
         })

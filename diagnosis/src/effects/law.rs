@@ -54,7 +54,11 @@ impl Law {
         let names: Vec<String> = match effect.name {
             N::ViscousFriction => vec!["viscous".into()],
             N::CoulombFriction => vec!["coulomb".into()],
-            N::AsymmetricFriction => vec!["coulomb_difference".into(), "viscous_difference".into()],
+            N::AsymmetricFriction => {
+                b = get("viscous_only", 0.0);
+                let both = ["viscous_difference".to_owned(), "coulomb_difference".to_owned()];
+                both.into_iter().take(if b > 0.5 { 1 } else { 2 }).collect()
+            }
             N::StribeckFriction => {
                 (a, b) = (get("speed", 1.0), get("exponent", 2.0));
                 vec!["peak".into()]
@@ -151,8 +155,10 @@ impl Law {
             N::ViscousFriction => out[0] = -s.velocity,
             N::CoulombFriction => out[0] = -way,
             N::AsymmetricFriction => {
-                out[0] = -way.abs();
-                out[1] = -s.velocity.abs();
+                out[0] = -s.velocity.abs();
+                if let Some(dry) = out.get_mut(1) {
+                    *dry = -way.abs();
+                }
             }
             N::StribeckFriction => out[0] = -way * (-(s.velocity.abs() / self.a).powf(self.b)).exp(),
             N::PreslidingFriction => {

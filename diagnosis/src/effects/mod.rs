@@ -71,7 +71,9 @@ impl Effect {
         let positive: &[&str] = match self.name {
             EffectName::StribeckFriction => &["speed"],
             EffectName::PreslidingFriction => &["deflection"],
-            EffectName::FrictionDrift | EffectName::GainDrift | EffectName::ElectricalLag => &["time_constant"],
+            EffectName::FrictionDrift | EffectName::GainDrift | EffectName::ElectricalLag => {
+                &["time_constant"]
+            }
             EffectName::CommandSaturation => &["limit"],
             EffectName::RollerSlip => &["limit"],
             EffectName::Backlash => &["gap"],

@@ -101,11 +101,12 @@ impl Plant {
             let next = self.velocity + (free - self.velocity.signum() * dry) / inertia * dt;
             // Dry friction stops the axis; it never turns it round within a step.
             let coasting = self.velocity + free / inertia * dt;
-            self.velocity = if next * self.velocity < 0.0 && (coasting * self.velocity > 0.0 || free.abs() <= dry) {
-                0.0
-            } else {
-                next
-            };
+            self.velocity =
+                if next * self.velocity < 0.0 && (coasting * self.velocity > 0.0 || free.abs() <= dry) {
+                    0.0
+                } else {
+                    next
+                };
         }
         self.position += self.velocity * dt;
         self.time += dt;

@@ -1,0 +1,74 @@
+//! The force residual that people see: one estimator, the same for the nominal, the refitted and the patched model.
+//!
+//! A fixed-interval smoother whose disturbance state is a random walk is a low-pass of sixth order without phase, exact
+//! under uneven time stamps; its bandwidth is what the report states.
+
+use crate::kalman::{Noise, smooth};
+use crate::track::{Total, Track};
+use std::f64::consts::TAU;
+
+/// Largest bandwidth, Hz.
+const WIDEST_HZ: f64 = 100.0;
+const NARROWEST_HZ: f64 = 5.0;
+
+/// The estimator for some recordings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Estimator {
+    pub(crate) bandwidth_hz: f64,
+}
+
+impl Estimator {
+    /// Chooses the bandwidth at which sensor noise stays below a tenth of the acceleration `scale`.
+    pub(crate) fn new(tracks: &[Track], noise: &Noise, scale: f64) -> Self {
+        let slowest = tracks.iter().map(Track::block_rate).fold(f64::INFINITY, f64::min);
+        let mut hz = WIDEST_HZ.min(0.25 * slowest);
+        while hz > NARROWEST_HZ && sensor_noise(tracks, noise, hz) > 0.05 * scale {
+            hz *= 0.9;
+        }
+        Self { bandwidth_hz: hz.max(NARROWEST_HZ) }
+    }
+
+    /// Acceleration that the inputs do not explain, per block.
+    pub(crate) fn residual(&self, track: &Track, total: &Total) -> Vec<f64> {
+        let mut even = track.clone();
+        // The same filter everywhere: neither quantisation nor rest changes it.
+        let h = 1.0 / track.block_rate();
+        even.quantum.fill(1.0);
+        even.rest.fill(false);
+        let tau = 1e3;
+        let walk = (TAU * self.bandwidth_hz).powi(6) * h;
+        let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0 };
+        smooth(&even, &noise, total).d
+    }
+}
+
+/// What the sensor alone puts into an acceleration estimate of some bandwidth, root mean square.
+pub(crate) fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for track in tracks {
+        let h = 1.0 / track.block_rate();
+        let mut quantum: Vec<f64> = track.quantum.clone();
+        quantum.sort_by(f64::total_cmp);
+        sum += noise.sensor * quantum[quantum.len() / 2] * h;
+        count += 1.0;
+    }
+    // ∫ ω⁴/(1 + (ω/ωc)⁶)² df over both sides = ωc⁵/(2π) · 2 · π/36 · 1/sin(5π/6)
+    let integral = (TAU * hz).powi(5) / TAU * 2.0 * (std::f64::consts::PI / 36.0)
+        / (5.0 * std::f64::consts::PI / 6.0).sin();
+    (sum / count * integral).sqrt()
+}
+
+/// Root mean square of residuals over the rows that move.
+pub(crate) fn rms(residuals: &[Vec<f64>], tracks: &[Track]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (residual, track) in residuals.iter().zip(tracks) {
+        for (x, rest) in residual.iter().zip(&track.rest) {
+            if !rest {
+                sum += x * x;
+                count += 1.0;
+            }
+        }
+    }
+    if count > 0.0 { (sum / count as f64).sqrt() } else { 0.0 }
+}

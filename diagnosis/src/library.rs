@@ -1,0 +1,195 @@
+//! Which shapes of each effect are worth trying on given recordings: the grids from which refinement starts.
+
+use crate::effects::{Effect, EffectName as N};
+use crate::model::Nominal;
+use crate::track::Track;
+
+/// What the recordings span.
+#[derive(Debug, Clone)]
+pub(crate) struct Span {
+    /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown.
+    pub(crate) speed: f64,
+    pub(crate) speed_floor: f64,
+    /// Travel relative to the start of each recording.
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// Largest |command|.
+    pub(crate) command: f64,
+    /// Longest recording, s.
+    pub(crate) duration: f64,
+    /// Mean time between rows, s, and between blocks.
+    pub(crate) row: f64,
+    pub(crate) block: f64,
+    /// One count.
+    pub(crate) count: f64,
+    /// Whether the columns are there and vary.
+    pub(crate) tilt: bool,
+    pub(crate) force: bool,
+}
+
+fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
+    let mut all = columns.flatten();
+    let Some(first) = all.next() else { return false };
+    let (low, high) = all.fold((first, first), |(a, b), x| (a.min(x), b.max(x)));
+    high - low > 1e-9 * (high.abs() + low.abs()).max(1e-300)
+}
+
+impl Span {
+    pub(crate) fn of(tracks: &[Track], nominal: &Nominal) -> Self {
+        let mut speeds: Vec<f64> = tracks.iter().flat_map(|t| t.v.iter().map(|v| v.abs())).collect();
+        speeds.sort_by(f64::total_cmp);
+        let fold = |pick: &dyn Fn(&Track) -> f64| tracks.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        let rows: f64 = tracks.iter().map(|t| t.row_hold.len() as f64).sum();
+        let blocks: f64 = tracks.iter().map(|t| t.blocks() as f64).sum();
+        let seconds: f64 = tracks.iter().map(|t| t.row_time.last().copied().unwrap_or(0.0)).sum();
+        Self {
+            speed: speeds[speeds.len() * 99 / 100],
+            speed_floor: fold(&|t| t.speed_floor),
+            low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),
+            high: fold(&|t| t.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+            command: fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs()))),
+            duration: fold(&|t| t.row_time.last().copied().unwrap_or(0.0)),
+            row: seconds / rows,
+            block: seconds / blocks,
+            count: 1.0 / nominal.rig.encoder.counts_per_unit,
+            tilt: varies(tracks.iter().flat_map(|t| column(&t.tilt))),
+            force: varies(tracks.iter().flat_map(|t| column(&t.force))),
+        }
+    }
+
+    pub(crate) fn travel(&self) -> f64 {
+        self.high - self.low
+    }
+}
+
+fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {
+    values.iter().flatten().map(|x| Some(*x))
+}
+
+/// `count` values from `from` to `to`, evenly spaced in their logarithm.
+pub(crate) fn logarithmic(from: f64, to: f64, count: usize) -> Vec<f64> {
+    if from.is_nan() || to.is_nan() || from <= 0.0 || to <= from || count < 2 {
+        return if to > 0.0 { vec![to] } else { Vec::new() };
+    }
+    let ratio = (to / from).ln() / (count - 1) as f64;
+    (0..count).map(|i| from * (ratio * i as f64).exp()).collect()
+}
+
+/// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds it already.
+/// Periodic effects and missed counts are sought in a way of their own.
+pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
+    if nominal.holds(name) {
+        return Vec::new();
+    }
+    let one = |key: &str, values: Vec<f64>| -> Vec<Effect> {
+        values.into_iter().map(|value| Effect::shaped(name, &[(key, value)])).collect()
+    };
+    let turn = nominal.rig.turn();
+    let turns = turn.map_or(0.0, |turn| span.travel() / turn);
+    match name {
+        N::ViscousFriction | N::CoulombFriction | N::QuadraticDrag => vec![Effect::shaped(name, &[])],
+        N::AsymmetricFriction => {
+            let known = nominal.rig.model.offset.is_some();
+            vec![Effect::shaped(name, if known { &[("viscous_only", 1.0)] } else { &[] })]
+        }
+        N::StribeckFriction => {
+            let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
+            let mut out = Vec::new();
+            for exponent in [1.0, 2.0] {
+                for speed in logarithmic(from, 0.4 * span.speed, 8) {
+                    out.push(Effect::shaped(name, &[("speed", speed), ("exponent", exponent)]));
+                }
+            }
+            out
+        }
+        N::PreslidingFriction => one("deflection", logarithmic(2.0 * span.count, 0.03 * span.travel(), 9)),
+        N::PositionDependentFriction | N::PositionDependentDamping => {
+            vec![Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", 3.0)])]
+        }
+        N::LoadDependentFriction if span.force => vec![Effect::shaped(name, &[])],
+        N::FrictionDrift | N::GainDrift => {
+            one("time_constant", logarithmic(0.08 * span.duration, 2.0 * span.duration, 5))
+        }
+        N::CommandDeadband => {
+            let mut out = Vec::new();
+            for shift in [0.0, 1.0] {
+                for width in logarithmic(0.01 * span.command, 0.3 * span.command, 9) {
+                    out.push(Effect::shaped(name, &[("half_width", width), ("shift", shift)]));
+                }
+            }
+            out
+        }
+        N::CommandSaturation => {
+            one("limit", (0..10).map(|i| span.command * (0.45 + 0.055 * f64::from(i))).collect())
+        }
+        N::RollerSlip => {
+            let mut out = Vec::new();
+            for ratio in [0.6, 0.8] {
+                for i in 0..10 {
+                    let limit = span.command * (0.45 + 0.055 * f64::from(i));
+                    out.push(Effect::shaped(name, &[("limit", limit), ("ratio", ratio)]));
+                }
+            }
+            out
+        }
+        N::CommandDelay => one("delay", logarithmic((0.2 * span.row).max(1e-5), 0.03, 9)),
+        N::ElectricalLag => one("time_constant", logarithmic((0.2 * span.row).max(1e-5), 0.05, 9)),
+        N::TiltGravity if span.tilt => vec![Effect::shaped(name, &[])],
+        N::PositionSpring => {
+            let mut out = vec![Effect::shaped(name, &[("from", 0.0)])];
+            for part in [0.25, 0.5, 0.75] {
+                let from = span.low + part * span.travel();
+                out.push(Effect::shaped(name, &[("from", from), ("one_sided", 1.0)]));
+            }
+            out
+        }
+        N::Backlash => one("gap", logarithmic(3.0 * span.count, 0.08 * span.travel(), 8)),
+        N::DriveCompliance => {
+            let mut out = Vec::new();
+            for damping in [0.02, 0.12] {
+                for hz in logarithmic(5.0, 0.35 / span.block, 11) {
+                    out.push(Effect::shaped(name, &[("resonance_hz", hz), ("damping", damping)]));
+                }
+            }
+            out
+        }
+        N::MassImbalance | N::EncoderEccentricity if turns > 0.6 => {
+            vec![Effect::shaped(name, &[("turn", turn.unwrap_or(1.0)), ("order_1", 1.0)])]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The shape values that refinement may move, with their bounds.
+pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f64)> {
+    match effect.name {
+        N::StribeckFriction => {
+            vec![("speed", 0.002 * span.speed, span.speed), ("exponent", 0.7, 2.3)]
+        }
+        N::PreslidingFriction => vec![("deflection", 0.5 * span.count, 0.1 * span.travel())],
+        N::FrictionDrift | N::GainDrift => vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)],
+        N::CommandDeadband => vec![("half_width", 0.001 * span.command, 0.35 * span.command)],
+        N::CommandSaturation => vec![("limit", 0.4 * span.command, span.command)],
+        N::RollerSlip => vec![("limit", 0.4 * span.command, span.command), ("ratio", 0.3, 0.97)],
+        N::CommandDelay => vec![("delay", 1e-6, 0.06)],
+        N::ElectricalLag => vec![("time_constant", 1e-6, 0.2)],
+        N::PositionSpring if effect.shape_or("one_sided", 0.0) > 0.5 => Vec::new(),
+        N::Backlash => vec![("gap", span.count, 0.2 * span.travel())],
+        N::DriveCompliance => vec![("resonance_hz", 4.0, 0.5 / span.block), ("damping", 0.003, 0.7)],
+        _ => Vec::new(),
+    }
+}
+
+/// Whether a single coefficient must be positive for the effect to be what its name says.
+pub(crate) fn positive(name: N) -> bool {
+    matches!(
+        name,
+        N::ViscousFriction
+            | N::CoulombFriction
+            | N::StribeckFriction
+            | N::PreslidingFriction
+            | N::QuadraticDrag
+            | N::LoadDependentFriction
+            | N::PositionSpring
+    )
+}

@@ -1,0 +1,280 @@
+//! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
+
+use crate::effects::{CommandLaw, Effect, EffectName, Law, State};
+use crate::kalman::Noise;
+use crate::rig::Rig;
+use crate::solve::Prior;
+use crate::track::{Input, Total, Track};
+
+/// A column's meaning. Coefficients are accelerations: force divided by inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Key {
+    /// Effective command: gain over inertia.
+    Gain,
+    Viscous,
+    Coulomb,
+    Offset,
+    Weight,
+    /// The measured external load.
+    External,
+    /// Term of an effect of the model.
+    Term {
+        effect: usize,
+        term: usize,
+    },
+}
+
+/// One column over one recording.
+pub(crate) struct Column {
+    pub(crate) key: Key,
+    pub(crate) input: Input,
+    /// Whether each recording has a coefficient of its own.
+    pub(crate) own: bool,
+    pub(crate) prior: Prior,
+}
+
+/// The nominal model in units of acceleration, with what may move.
+#[derive(Debug, Clone)]
+pub(crate) struct Nominal {
+    pub(crate) rig: Rig,
+    /// Sign with which the measured load acts; zero where it was not seen to act.
+    pub(crate) external: f64,
+}
+
+/// How many standard deviations a nominal value may move in a refit.
+const REACH: f64 = 3.0;
+
+impl Nominal {
+    /// Gain over inertia as the rig states it.
+    pub(crate) fn gain(&self) -> f64 {
+        self.rig.actuator.gain / self.rig.model.inertia
+    }
+
+    /// Factor by which gain over inertia may differ from its nominal value.
+    pub(crate) fn gain_reach(&self) -> f64 {
+        1.0 + REACH * (self.rig.gain_sd().powi(2) + self.rig.inertia_sd().powi(2)).sqrt()
+    }
+
+    fn has_offset(&self) -> bool {
+        self.rig.model.offset.is_some()
+    }
+
+    /// Whether the nominal model holds an effect already, so that it cannot have been left out.
+    pub(crate) fn holds(&self, name: EffectName) -> bool {
+        let model = &self.rig.model;
+        match name {
+            EffectName::ViscousFriction => model.viscous.is_some_and(|x| x > 0.0),
+            EffectName::CoulombFriction => model.coulomb.is_some_and(|x| x > 0.0),
+            EffectName::TiltGravity => model.weight.is_some_and(|x| x != 0.0),
+            _ => false,
+        }
+    }
+
+    fn priors(&self, key: Key, noise: &Noise) -> Prior {
+        let rig = &self.rig;
+        let j = rig.model.inertia;
+        let common = rig.inertia_sd();
+        let relative = |value: f64, sd: f64| {
+            let mean = value / j;
+            let sd = (sd * sd + common * common).sqrt();
+            // Friction is known by its size rather than its value, and never vanishes where the rig declares it.
+            let reach = 2.0 * (1.0 + REACH * sd);
+            let (a, b) = (mean / reach, mean * reach);
+            Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
+        };
+        match key {
+            Key::Gain => {
+                let mean = self.gain();
+                let sd = (rig.gain_sd().powi(2) + common * common).sqrt();
+                let (a, b) = (mean / self.gain_reach(), mean * self.gain_reach());
+                Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
+            }
+            Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
+            Key::Coulomb => relative(rig.model.coulomb.unwrap_or(0.0), rig.coulomb_sd()),
+            Key::Weight => relative(rig.model.weight.unwrap_or(0.0), rig.weight_sd()),
+            Key::Offset => {
+                // A rig without an offset still sees a bias that wanders by a fraction of the disturbance.
+                let wander = 0.5 * noise.slow.sqrt();
+                let sd = if self.has_offset() {
+                    let declared = rig.uncertainty.offset.unwrap_or(0.0) / j;
+                    declared.max(wander).max(0.3 * self.force_scale() / j)
+                } else {
+                    wander
+                };
+                Prior { mean: rig.model.offset.unwrap_or(0.0) / j, sd, ..Prior::FREE }
+            }
+            Key::External => Prior { mean: self.external / j, sd: 0.5 / j, ..Prior::FREE },
+            Key::Term { .. } => Prior::FREE,
+        }
+    }
+
+    /// What a coefficient of an effect may be for the effect to be what its name says.
+    pub(crate) fn limits(&self, name: EffectName) -> (f64, f64) {
+        let gain = self.gain();
+        match name {
+            EffectName::GainDrift => {
+                // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
+                let least = 0.6 * gain.abs() / self.gain_reach();
+                (-least, least)
+            }
+            EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
+            name if crate::library::positive(name) => (0.0, f64::INFINITY),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+
+    /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
+    pub(crate) fn force_scale(&self) -> f64 {
+        let limit = self.rig.actuator.limit.map_or(0.0, |limit| 0.1 * limit * self.rig.actuator.gain.abs());
+        self.rig.model.coulomb.unwrap_or(0.0).max(limit)
+    }
+}
+
+/// A model: the nominal terms plus effects whose shapes are fixed and whose coefficients are fitted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Model {
+    pub(crate) effects: Vec<Effect>,
+}
+
+/// The effective command of a recording under the command effects of a model, per row.
+pub(crate) fn effective_command(track: &Track, effects: &[Effect]) -> Option<Vec<f64>> {
+    let mut laws: Vec<CommandLaw> = effects.iter().filter_map(CommandLaw::new).collect();
+    if laws.is_empty() {
+        return None;
+    }
+    let held = track.command.iter().zip(&track.row_hold);
+    Some(held.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
+}
+
+/// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
+fn scales_drive(name: EffectName, term: usize) -> bool {
+    matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
+        || (name == EffectName::Backlash && term == 1)
+}
+
+/// Whether each recording has its own phase, so that coefficients are not shared.
+pub(crate) fn own_phase(name: EffectName) -> bool {
+    matches!(
+        name,
+        EffectName::Cogging
+            | EffectName::TorqueRipple
+            | EffectName::MassImbalance
+            | EffectName::EncoderEccentricity
+            | EffectName::MissedCounts
+    )
+}
+
+/// Sign of the velocity where it is known, per block.
+pub(crate) fn direction(track: &Track) -> Vec<f64> {
+    track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
+}
+
+/// The inputs of one effect on force or sensor over a recording.
+pub(crate) fn effect_inputs(
+    track: &Track,
+    effect: &Effect,
+    command: &[f64],
+    drive_input: &Input,
+) -> Vec<Input> {
+    let Some(mut law) = Law::new(effect) else { return Vec::new() };
+    let count = law.names().len();
+    let n = track.blocks();
+    if effect.name == EffectName::DriveCompliance {
+        // A resonance may be fast: row by row.
+        let mut out = vec![0.0];
+        let signal: Vec<f64> = command
+            .iter()
+            .zip(&track.row_hold)
+            .map(|(u, h)| {
+                law.terms(&State { drive: *u, dt: *h, ..State::default() }, &mut out);
+                out[0]
+            })
+            .collect();
+        return vec![track.rows_input(&signal)];
+    }
+    let mut columns = vec![Vec::with_capacity(n); count];
+    let mut out = vec![0.0; count];
+    for j in 0..n {
+        let state = State {
+            position: track.x[j],
+            velocity: if track.rest[j] { 0.0 } else { track.v[j] },
+            drive: 1.0,
+            tilt: track.tilt.as_ref().map_or(0.0, |tilt| tilt[j]),
+            external: track.force.as_ref().map_or(0.0, |force| force[j]),
+            time: track.start[j] + 0.5 * track.span[j],
+            dt: track.span[j],
+        };
+        law.terms(&state, &mut out);
+        for (column, term) in columns.iter_mut().zip(&out) {
+            column.push(*term);
+        }
+    }
+    let sensor = law.in_sensor();
+    columns
+        .into_iter()
+        .enumerate()
+        .map(|(term, column)| {
+            if sensor {
+                Input::Sensor(column)
+            } else if scales_drive(effect.name, term) {
+                drive_input.scaled(&column)
+            } else {
+                Input::Held(column)
+            }
+        })
+        .collect()
+}
+
+impl Model {
+    /// The columns of this model over a recording, nominal terms first.
+    pub(crate) fn columns(&self, nominal: &Nominal, track: &Track, noise: &Noise) -> Vec<Column> {
+        let effective = effective_command(track, &self.effects);
+        let command = effective.as_deref().unwrap_or(&track.command);
+        let drive = track.rows_input(command);
+        let direction = direction(track);
+        let mut columns = Vec::new();
+        let mut push = |key: Key, input: Input, own: bool| {
+            columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
+        };
+        if nominal.holds(EffectName::ViscousFriction) {
+            push(Key::Viscous, Input::Held(track.v.iter().map(|v| -v).collect()), false);
+        }
+        if nominal.holds(EffectName::CoulombFriction) {
+            push(Key::Coulomb, Input::Held(direction.iter().map(|s| -s).collect()), false);
+        }
+        push(Key::Offset, Input::Held(vec![1.0; track.blocks()]), true);
+        if let (true, Some(tilt)) = (nominal.holds(EffectName::TiltGravity), &track.tilt) {
+            push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
+        }
+        if let Some(force) = &track.force {
+            push(Key::External, Input::Held(force.clone()), false);
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            for (term, input) in effect_inputs(track, effect, command, &drive).into_iter().enumerate() {
+                push(Key::Term { effect: index, term }, input, own_phase(effect.name));
+            }
+        }
+        for column in &mut columns {
+            if let Key::Term { effect, .. } = column.key {
+                (column.prior.low, column.prior.high) = nominal.limits(self.effects[effect].name);
+            }
+        }
+        let mut push = |key: Key, input: Input, own: bool| {
+            columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
+        };
+        push(Key::Gain, drive, false);
+        columns.rotate_right(1);
+        columns
+    }
+}
+
+/// The total input of columns with their coefficients.
+pub(crate) fn total(track: &Track, columns: &[Column], theta: &[f64]) -> Total {
+    let mut total = Total::zero(track.blocks());
+    for (column, theta) in columns.iter().zip(theta) {
+        if *theta != 0.0 {
+            column.input.add_to(&mut total, track, *theta);
+        }
+    }
+    total
+}

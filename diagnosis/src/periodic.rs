@@ -1,0 +1,206 @@
+//! Periodic effects: which orders of a turn, or which period along the travel, stand out of the residual.
+
+use crate::effects::{Effect, EffectName as N};
+use crate::fit::{Fit, dot};
+use crate::library::Span;
+use crate::model::{Model, Nominal, effective_command};
+use crate::screen::{Sums, Terms, project};
+use crate::solve::{Factor, Square};
+use crate::track::{Input, Track};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Highest order of a turn that is looked for, and how many orders one effect may have.
+const HIGHEST: usize = 100;
+const MOST: usize = 14;
+/// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
+const PER_ORDER: f64 = 8.0;
+
+/// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of cycles over the travel.
+fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
+    let travel = span.travel();
+    // A wave must be resolved by the encoder and stay in the band of the filter at ordinary speed.
+    let shortest = (6.0 * span.count).max(span.speed * 0.3 * 4.0 * span.block);
+    if let Some(turn) = nominal.rig.turn().filter(|turn| travel > 0.6 * turn) {
+        let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
+        return Some((turn, (1..=highest).map(|n| n as f64).collect()));
+    }
+    let most = (travel / shortest).min(250.0);
+    // One over the travel is the reference; cycles over the travel play the part of orders.
+    let count = (most * 2.0) as usize;
+    (count >= 8).then(|| (travel, (4..=count).map(|i| 0.5 * i as f64).collect()))
+}
+
+fn wave_inputs(track: &Track, wave: f64, drive: Option<&Input>) -> [Input; 2] {
+    let (cos, sin): (Vec<f64>, Vec<f64>) = track
+        .x
+        .iter()
+        .map(|x| {
+            let (sin, cos) = (wave * x).sin_cos();
+            (cos, sin)
+        })
+        .unzip();
+    match drive {
+        Some(drive) => [drive.scaled(&cos), drive.scaled(&sin)],
+        None => [Input::Held(cos), Input::Held(sin)],
+    }
+}
+
+/// Finds the orders of cogging or torque ripple in the residual of a fit; the gain counts every recording's own phases.
+pub(crate) fn search(
+    name: N,
+    fit: &Fit,
+    residuals: &[Vec<f64>],
+    model: &Model,
+    tracks: &[Track],
+    span: &Span,
+    nominal: &Nominal,
+) -> Option<(Effect, f64)> {
+    let (turn, orders) = candidates(span, nominal)?;
+    let whole = nominal.rig.turn().is_some_and(|known| known == turn);
+    let drives: Vec<Option<Input>> = tracks
+        .iter()
+        .map(|track| {
+            (name == N::TorqueRipple).then(|| {
+                let effective = effective_command(track, &model.effects);
+                track.rows_input(effective.as_deref().unwrap_or(&track.command))
+            })
+        })
+        .collect();
+    let terms_of = |order: f64| -> Terms {
+        tracks
+            .iter()
+            .zip(&fit.prepared)
+            .zip(&drives)
+            .map(|((track, one), drive)| {
+                let inputs = wave_inputs(track, order * TAU / turn, drive.as_ref());
+                inputs.iter().map(|input| one.gains.response(track, input)).collect()
+            })
+            .collect()
+    };
+    let single: Vec<f64> = orders
+        .par_iter()
+        .map(|order| {
+            let sums = project(fit, residuals, &terms_of(*order), true);
+            gain_of(&sums)
+        })
+        .collect();
+    // Only the best by themselves are fitted together.
+    let mut ranked: Vec<usize> = (0..orders.len()).collect();
+    ranked.sort_by(|a, b| single[*b].total_cmp(&single[*a]).then(a.cmp(b)));
+    let mut kept: Vec<usize> = Vec::new();
+    for index in ranked {
+        // Neighbours on a fine grid are the same peak.
+        let apart = whole || kept.iter().all(|k| (orders[*k] - orders[index]).abs() > 1.2);
+        if apart && single[index] > 3.0 {
+            kept.push(index);
+        }
+        if kept.len() >= 2 * MOST {
+            break;
+        }
+    }
+    if kept.is_empty() {
+        return None;
+    }
+    let refined: Vec<f64> = if whole {
+        kept.iter().map(|k| orders[*k]).collect()
+    } else {
+        kept.par_iter()
+            .map(|k| {
+                let at = |order: f64| gain_of(&project(fit, residuals, &terms_of(order), true));
+                golden(orders[*k] - 0.5, orders[*k] + 0.5, 12, at)
+            })
+            .collect()
+    };
+    let columns: Vec<Terms> = refined.par_iter().map(|order| terms_of(*order)).collect();
+    let joined: Terms = (0..tracks.len())
+        .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())
+        .collect();
+    let sums = project(fit, residuals, &joined, true);
+    let (chosen, gain) = forward(&sums, refined.len(), tracks.len(), (orders.len() as f64).ln());
+    if chosen.is_empty() {
+        return None;
+    }
+    let mut shape: Vec<(String, f64)> = Vec::new();
+    if whole {
+        shape.push(("turn".into(), turn));
+        for index in &chosen {
+            let order = refined[*index];
+            shape.push((format!("order_{order}"), order));
+        }
+    } else {
+        let mut periods: Vec<f64> = chosen.iter().map(|index| turn / refined[*index]).collect();
+        periods.sort_by(f64::total_cmp);
+        for (i, period) in periods.iter().enumerate() {
+            shape.push((format!("period_{}", i + 1), *period));
+        }
+    }
+    let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
+    Some((Effect::shaped(name, &shape), gain))
+}
+
+fn gain_of(sums: &Sums) -> f64 {
+    let x = Factor::new(&sums.information).solve(&sums.score);
+    let gain = 0.5 * dot(&x, &sums.score);
+    if gain.is_finite() { gain } else { 0.0 }
+}
+
+/// Picks orders one after another while each brings more than it costs.
+fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<usize>, f64) {
+    let places = |order: usize| -> Vec<usize> {
+        (0..recordings).flat_map(|r| [0, 1].map(|i| r * 2 * orders + 2 * order + i)).collect()
+    };
+    let gain_with = |chosen: &[usize]| -> f64 {
+        let index: Vec<usize> = chosen.iter().flat_map(|order| places(*order)).collect();
+        let mut part = Square::zero(index.len());
+        for (a, i) in index.iter().enumerate() {
+            for (b, j) in index.iter().enumerate() {
+                part.a[a * index.len() + b] = sums.information.at(*i, *j);
+            }
+        }
+        let score: Vec<f64> = index.iter().map(|i| sums.score[*i]).collect();
+        gain_of(&Sums { information: part, score })
+    };
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut gain = 0.0;
+    while chosen.len() < MOST.min(orders) {
+        let trials: Vec<(usize, f64)> = (0..orders)
+            .filter(|order| !chosen.contains(order))
+            .map(|order| {
+                let mut with = chosen.clone();
+                with.push(order);
+                (order, gain_with(&with))
+            })
+            .collect();
+        let Some((order, best)) = trials.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+        else {
+            break;
+        };
+        // A later order must also be a fair part of what the first ones brought.
+        if best - gain < PER_ORDER + looked || best - gain < 0.004 * best {
+            break;
+        }
+        gain = best;
+        chosen.push(order);
+    }
+    (chosen, gain)
+}
+
+/// Golden-section search for the largest value.
+pub(crate) fn golden(mut a: f64, mut b: f64, steps: usize, f: impl Fn(f64) -> f64) -> f64 {
+    let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut x, mut y) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut fx, mut fy) = (f(x), f(y));
+    for _ in 0..steps {
+        if fx >= fy {
+            (b, y, fy) = (y, x, fx);
+            x = b - ratio * (b - a);
+            fx = f(x);
+        } else {
+            (a, x, fx) = (x, y, fy);
+            y = a + ratio * (b - a);
+            fy = f(y);
+        }
+    }
+    if fx >= fy { x } else { y }
+}

@@ -1,0 +1,251 @@
+//! The stages one after another: read, null, search, judge, and what is handed on to the report.
+
+use crate::effects::{Effect, EffectName};
+use crate::error::InputError;
+use crate::estimate::{Estimator, rms};
+use crate::judge::{self, Gain, Laid};
+use crate::kalman::Noise;
+use crate::library::Span;
+use crate::model::{Model, Nominal};
+use crate::noise::Colour;
+use crate::null;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::select::{Bench, Candidate, MOST};
+use crate::track::{Total, Track};
+
+/// Least gain of log-likelihood under coloured noise, after the cost of freedom, for an effect to be looked at on.
+pub(crate) const WORTH: f64 = 6.0;
+
+/// An effect as it came through the search, before it is judged.
+#[derive(Clone)]
+pub(crate) struct Found {
+    pub(crate) effect: Effect,
+    /// Fitted rivals: (name, merit less than the winner's, held-out and fit margin in standard errors).
+    pub(crate) rivals: Vec<Rival>,
+    /// Held-out gain of the full model over the model without it.
+    pub(crate) holdout: Gain,
+    /// The same on the fitted recordings.
+    pub(crate) fit: Gain,
+}
+
+/// How far a rival is behind.
+#[derive(Clone, Debug)]
+pub(crate) struct Rival {
+    pub(crate) name: EffectName,
+    /// Mean lead of the winner over its standard error, over all segments.
+    pub(crate) z: f64,
+    /// Lead of the winner in log-likelihood.
+    pub(crate) lead: f64,
+}
+
+/// What the search ends with.
+pub(crate) struct Search {
+    pub(crate) nominal: Nominal,
+    pub(crate) fit_tracks: Vec<Track>,
+    pub(crate) held_tracks: Vec<Track>,
+    pub(crate) span: Span,
+    /// The null under coloured noise.
+    pub(crate) null: Candidate,
+    /// The final model under coloured noise.
+    pub(crate) last: Candidate,
+    pub(crate) found: Vec<Found>,
+    /// Hypotheses that were fitted in full and lost: name, gain, reason.
+    pub(crate) lost: Vec<(EffectName, f64, String)>,
+}
+
+/// Scale of acceleration that the command makes.
+pub(crate) fn command_scale(nominal: &Nominal, tracks: &[Track]) -> f64 {
+    let (mut square, mut rows) = (0.0, 0.0);
+    for track in tracks {
+        square += track.command.iter().map(|u| u * u).sum::<f64>();
+        rows += track.command.len() as f64;
+    }
+    nominal.gain().abs() * (square / rows).sqrt().max(1e-12)
+}
+
+/// Lays a model on every held-out recording.
+pub(crate) fn lay_all(c: &Candidate, nominal: &Nominal, tracks: &[Track], noise: &Noise) -> Vec<Laid> {
+    tracks.iter().map(|track| judge::lay(c, nominal, track, noise)).collect()
+}
+
+/// Smooths held-out recordings with a fitted model.
+fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track]) {
+    for _ in 0..2 {
+        let totals: Vec<Total> = tracks
+            .iter()
+            .map(|track| judge::lay(candidate, nominal, track, &candidate.noise).total)
+            .collect();
+        null::resmooth(tracks, &totals, &candidate.noise);
+    }
+}
+
+pub(crate) fn search(
+    rig: &Rig,
+    fit: &[Recording],
+    held: &[Recording],
+    progress: &(dyn Fn(&str, f64) + Sync),
+) -> Result<Search, InputError> {
+    let mut tracks: Vec<Track> = fit.iter().map(|r| Track::new(r, rig)).collect();
+    let mut held: Vec<Track> = held.iter().map(|r| Track::new(r, rig)).collect();
+    let nominal = Nominal { rig: rig.clone(), external: 0.0 };
+    progress("refitting the nominal model", 0.1);
+    let (noise, _) = null::settle(&nominal, &mut tracks);
+    let scale = command_scale(&nominal, &tracks);
+    let span = Span::of(&tracks, &nominal);
+    let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
+    let null_slow = bench.fit(Model::default(), &noise, Colour::Slow);
+    let mut white = bench.fit(Model::default(), &noise, Colour::White);
+    let mut slow_merit = null_slow.merit;
+    let mut slow_noise = null_slow.noise;
+    let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
+    for step in 0..MOST {
+        progress("searching for what was left out", 0.15 + 0.2 * step as f64);
+        let candidates = bench.screen(&white);
+        let finalists = bench.finalists(&white, &candidates);
+        let mut taken = None;
+        for finalist in finalists {
+            let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
+            if taken.is_some() || finalist.merit - white.merit < WORTH {
+                continue;
+            }
+            let slow = bench.fit(finalist.model.clone(), &slow_noise, Colour::Slow);
+            let gain = slow.merit - slow_merit;
+            if gain < WORTH {
+                lost.push((name, gain, "what it explains is no more than a slow disturbance would".into()));
+                continue;
+            }
+            taken = Some((finalist, slow));
+        }
+        let Some((finalist, slow)) = taken else { break };
+        slow_merit = slow.merit;
+        slow_noise = slow.noise;
+        white = finalist;
+    }
+    progress("judging on held-out recordings", 0.8);
+    smooth_held(&null_slow, &nominal, &mut held);
+    let mut model = white.model.clone();
+    let mut last = bench.fit(model.clone(), &slow_noise, Colour::Slow);
+    let mut found;
+    // Whatever does not carry to the held-out recordings goes, the weakest first, until all that is left does.
+    loop {
+        found = judge_all(&bench, &last, &held);
+        let weakest = found
+            .iter()
+            .enumerate()
+            .map(|(i, f)| (i, if f.holdout.low > 0.0 { f.holdout.z } else { f.holdout.z.min(0.0) }))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match weakest {
+            Some((i, z)) if z <= 0.0 || found[i].holdout.low <= 0.0 || found[i].fit.z < 2.0 => {
+                let name = model.effects[i].name;
+                lost.push((
+                    name,
+                    found[i].holdout.sum,
+                    "it does not carry to the held-out recordings".into(),
+                ));
+                model.effects.remove(i);
+                last = bench.fit(model.clone(), &null_slow.noise, Colour::Slow);
+            }
+            _ => break,
+        }
+    }
+    if !model.effects.is_empty() {
+        smooth_held(&last, &nominal, &mut held);
+    }
+    Ok(Search {
+        nominal: nominal.clone(),
+        fit_tracks: tracks.clone(),
+        held_tracks: held,
+        span: span.clone(),
+        null: null_slow,
+        last,
+        found,
+        lost,
+    })
+}
+
+/// Costs per segment of a model on the recordings it was fitted to, under some noise.
+fn fit_costs(bench: &Bench, c: &Candidate) -> Vec<f64> {
+    let _ = bench;
+    let mut out = Vec::new();
+    for (one, places) in c.fit.prepared.iter().zip(&c.fit.places) {
+        for (square, (weight, count)) in one.squares(places, &c.fit.solution.x).iter().zip(one.weights()) {
+            out.push(0.5 * count * crate::kalman::tolerant(square / weight / count).0);
+        }
+    }
+    out
+}
+
+fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
+    let with = lay_all(last, bench.nominal, held, &last.noise);
+    let with_fit = fit_costs(bench, last);
+    (0..last.model.effects.len())
+        .map(|i| {
+            let mut less = last.model.clone();
+            let effect = less.effects.remove(i);
+            let fit = crate::fit::Fit::new(&less, bench.nominal, bench.tracks, &last.noise);
+            let without = Candidate { model: less, noise: last.noise, fit, merit: 0.0 };
+            let without_fit = fit_costs(bench, &without);
+            let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
+            let laid = lay_all(&without, bench.nominal, held, &last.noise);
+            let holdout = judge::compare(&with, &laid);
+            Found { effect, rivals: Vec::new(), holdout, fit: judge::bootstrap(&gains) }
+        })
+        .collect()
+}
+
+/// Residual force of a model over recordings, per block.
+pub(crate) fn residuals(
+    estimator: &Estimator,
+    tracks: &[Track],
+    totals: &[Total],
+    inertia: f64,
+) -> Vec<Vec<f64>> {
+    tracks
+        .iter()
+        .zip(totals)
+        .map(|(track, total)| estimator.residual(track, total).into_iter().map(|a| a * inertia).collect())
+        .collect()
+}
+
+/// Root mean square of residual force under the nominal, refitted and patched model, for a look.
+pub(crate) fn table(s: &Search) -> [(f64, f64); 4] {
+    let scale = command_scale(&s.nominal, &s.fit_tracks);
+    let est = Estimator::new(&s.fit_tracks, &s.last.noise, scale);
+    let j0 = s.nominal.rig.model.inertia;
+    let mut out = [(0.0, 0.0); 4];
+    for (k, tracks) in [&s.fit_tracks, &s.held_tracks].into_iter().enumerate() {
+        let drive: Vec<Total> = tracks
+            .iter()
+            .map(|t| {
+                let mut total = Total::zero(t.blocks());
+                t.rows_input(&t.command).add_to(&mut total, t, s.nominal.gain());
+                total
+            })
+            .collect();
+        let none: Vec<Total> = tracks.iter().map(|t| Total::zero(t.blocks())).collect();
+        let a = residuals(&est, tracks, &none, j0);
+        let b = residuals(&est, tracks, &drive, j0);
+        let force: Vec<Vec<f64>> =
+            a.iter().zip(&b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+        let lay = |c: &Candidate| -> Vec<Total> {
+            if k == 0 {
+                c.fit.totals(tracks)
+            } else {
+                lay_all(c, &s.nominal, tracks, &c.noise).into_iter().map(|l| l.total).collect()
+            }
+        };
+        let j =
+            |c: &Candidate| s.nominal.rig.actuator.gain / c.fit.value(crate::model::Key::Gain).unwrap_or(1.0);
+        let values = [
+            rms(&force, tracks),
+            0.0,
+            rms(&residuals(&est, tracks, &lay(&s.null), j(&s.null)), tracks),
+            rms(&residuals(&est, tracks, &lay(&s.last), j(&s.last)), tracks),
+        ];
+        for (out, value) in out.iter_mut().zip(values) {
+            if k == 0 { out.0 = value } else { out.1 = value }
+        }
+    }
+    out
+}

@@ -1,0 +1,157 @@
+//! `diagnosis.json`: the words and the shape of the report, as the contract fixes them.
+
+use crate::effects::{EffectName, Subsystem};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What the recordings say about the simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The nominal model explains the recordings down to their noise.
+    NoMismatch,
+    /// Values were wrong, the structure is right.
+    ParametersOnly,
+    /// One to three effects were left out.
+    MissingPhysics,
+    /// A repeatable mismatch that no known effect explains.
+    Unexplained,
+    /// A mismatch that does not repeat and depends on nothing recorded.
+    RandomDisturbance,
+    /// These recordings cannot tell.
+    InsufficientExcitation,
+}
+
+/// A fitted value with its interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// In `unit`.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// The unit; "1" where there is none.
+    pub unit: String,
+}
+
+/// Where a recording shows something.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// The recording's file name.
+    pub file: String,
+    /// From and to, s from the first row's time stamp zero.
+    pub intervals_s: Vec<[f64; 2]>,
+}
+
+/// In which states something shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// `speed`, `travel`, `angle`, `command`, `time` or `tilt`.
+    pub variable: String,
+    /// Lower end, SI or command units.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Where simulation and recording differ.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// In time.
+    pub recordings: Vec<Stretch>,
+    /// In state.
+    pub states: Vec<Region>,
+}
+
+/// An effect that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Named {
+    /// Its name.
+    pub name: EffectName,
+    /// Every effect that the data cannot tell from it, itself included.
+    pub class: Vec<EffectName>,
+    /// Where it sits.
+    pub subsystem: Subsystem,
+    /// Probability that the class holds the truth.
+    pub confidence: f64,
+    /// Values by the contract's names.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Where it shows.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// What would decide within the class.
+    pub separating_experiment: Option<String>,
+}
+
+/// A number on both kinds of recordings.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Both {
+    /// On the recordings that were fitted.
+    pub fit: f64,
+    /// On those that were held out.
+    pub holdout: f64,
+}
+
+/// How well the three models fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitTable {
+    /// `force_rmse`.
+    pub metric: String,
+    /// N·m or N.
+    pub unit: String,
+    /// The rig as it stands.
+    pub nominal: Both,
+    /// With its values refitted.
+    pub refit: Both,
+    /// With the effects found.
+    pub patched: Both,
+    /// Root mean square of the force itself under the same estimator.
+    pub force_rms: Both,
+    /// Relative reduction of the held-out mean square from refit to patched, 95 %.
+    pub holdout_gain_ci95: [f64; 2],
+}
+
+/// A hypothesis and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// The effect.
+    pub name: EffectName,
+    /// Log-likelihood per held-out second that it brings over the refit.
+    pub holdout_gain: f64,
+    /// Why it lost; missing where it was named.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub rejected_because: Option<String>,
+}
+
+/// The report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// 1.
+    pub format: u32,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The verdict in one sentence that a technician understands.
+    pub sentence: String,
+    /// Effects left out, the largest first.
+    pub effects: Vec<Named>,
+    /// Before and after.
+    pub fit: FitTable,
+    /// Refitted nominal values that moved, by key.
+    pub refitted: BTreeMap<String, f64>,
+    /// Bandwidth of the residuals, Hz.
+    pub residual_bandwidth_hz: f64,
+    /// What the sensor's noise alone puts into the residual, root mean square.
+    pub noise_floor: f64,
+    /// Part of the held-out mean square above the noise that the patched model leaves.
+    pub unexplained_fraction: f64,
+    /// Every hypothesis that was looked at closely.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Where the mismatch is, when nothing was named.
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none", default)]
+    pub place: Option<Place>,
+    /// What to record next, when the recordings cannot tell.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub separating_experiment: Option<String>,
+    /// Why the recordings cannot tell.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub reason: Option<String>,
+}

@@ -1,0 +1,176 @@
+//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
+
+use crate::effects::{Effect, EffectName as N};
+use crate::fit::Fit;
+use crate::kalman::Noise;
+use crate::library::{self, Span};
+use crate::model::{Model, Nominal};
+use crate::noise::{self, Colour};
+use crate::periodic::{self, golden};
+use crate::screen;
+use crate::track::Track;
+use rayon::prelude::*;
+
+/// A model fitted with the noise that goes with it.
+pub(crate) struct Candidate {
+    pub(crate) model: Model,
+    pub(crate) noise: Noise,
+    pub(crate) fit: Fit,
+    /// Log-likelihood less what its freedom costs.
+    pub(crate) merit: f64,
+}
+
+/// Everything that selection works on.
+pub(crate) struct Bench<'a> {
+    pub(crate) nominal: &'a Nominal,
+    pub(crate) tracks: &'a [Track],
+    pub(crate) span: &'a Span,
+    /// Acceleration that the command makes: the scale of the noise search.
+    pub(crate) scale: f64,
+}
+
+/// What one value that is fitted costs in log-likelihood: half the logarithm of the number of independent stretches is
+/// about 3; shapes are searched and cost more.
+const PER_COEFFICIENT: f64 = 2.5;
+const PER_SHAPE: f64 = 4.0;
+/// How many effects are fitted in full at each step.
+const FINALISTS: usize = 8;
+/// Most effects that are named together.
+pub(crate) const MOST: usize = 3;
+
+/// What an effect's freedom costs.
+fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
+    let movable = library::movable(effect, span).len() as f64;
+    let waves = effect.waves().len();
+    let coefficients = match effect.name {
+        N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
+        N::PositionDependentFriction | N::PositionDependentDamping => 3,
+        N::FrictionDrift | N::AsymmetricFriction | N::Backlash => 2,
+        N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag | N::RollerSlip => 0,
+        _ => 1,
+    };
+    PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
+}
+
+/// Effects that change a dry friction, which must be there first.
+fn needs_dry(name: N) -> bool {
+    matches!(
+        name,
+        N::StribeckFriction
+            | N::FrictionDrift
+            | N::PositionDependentFriction
+            | N::PreslidingFriction
+            | N::Backlash
+    )
+}
+
+impl Bench<'_> {
+    /// Fits a model with noise of its own, starting from known noise.
+    pub(crate) fn fit(&self, model: Model, from: &Noise, colour: Colour) -> Candidate {
+        let first = Fit::new(&model, self.nominal, self.tracks, from);
+        let totals = first.totals(self.tracks);
+        let noise = noise::estimate(self.tracks, &totals, from, self.scale, colour);
+        let fit = Fit::new(&model, self.nominal, self.tracks, &noise);
+        let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
+        let merit = fit.log_likelihood - spent;
+        Candidate { model, noise, fit, merit }
+    }
+
+    /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
+    pub(crate) fn screen(&self, now: &Candidate) -> Vec<(Effect, f64)> {
+        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
+        let mut found: Vec<(Effect, f64)> = Vec::new();
+        for name in N::ALL {
+            let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
+            let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
+            if there(*name) || (needs_dry(*name) && !dry) {
+                continue;
+            }
+            let best = match name {
+                N::Cogging | N::TorqueRipple => periodic::search(
+                    *name,
+                    &now.fit,
+                    &residuals,
+                    &now.model,
+                    self.tracks,
+                    self.span,
+                    self.nominal,
+                ),
+                _ => {
+                    let grid = library::shapes(*name, self.span, self.nominal);
+                    screen::best_on_grid(
+                        &now.fit,
+                        &residuals,
+                        &now.model,
+                        self.tracks,
+                        &grid,
+                        self.nominal.limits(*name),
+                    )
+                    .map(|(effect, score)| (effect, score.gain))
+                }
+            };
+            if let Some((effect, _)) = best {
+                let (effect, gain) = self.refine(now, &residuals, effect);
+                let worth = gain - cost(&effect, self.tracks.len(), self.span);
+                if worth > 0.0 {
+                    found.push((effect, worth));
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found
+    }
+
+    /// Moves the shape of an effect to its largest score gain, one value after another.
+    fn refine(&self, now: &Candidate, residuals: &[Vec<f64>], mut effect: Effect) -> (Effect, f64) {
+        let limits = self.nominal.limits(effect.name);
+        let gain = |effect: &Effect| {
+            screen::score(&now.fit, residuals, &now.model, self.tracks, effect, limits).gain
+        };
+        let movable = library::movable(&effect, self.span);
+        let mut best = gain(&effect);
+        for round in 0..2 {
+            for (key, low, high) in &movable {
+                let at = effect.shape[*key];
+                let reach = if round == 0 { 2.2_f64 } else { 1.3 };
+                let (a, b) = ((at / reach).max(*low).ln(), (at * reach).min(*high).ln());
+                if b <= a {
+                    continue;
+                }
+                let with = |x: f64| {
+                    let mut trial = effect.clone();
+                    trial.shape.insert((*key).to_owned(), x.exp());
+                    trial
+                };
+                let x = golden(a, b, 9, |x| gain(&with(x)));
+                let trial = with(x);
+                let value = gain(&trial);
+                if value > best {
+                    best = value;
+                    effect = trial;
+                }
+            }
+            if movable.is_empty() {
+                break;
+            }
+        }
+        (effect, best)
+    }
+
+    /// Fits the best effects of a screening in full, each with noise of its own; best first.
+    pub(crate) fn finalists(&self, now: &Candidate, found: &[(Effect, f64)]) -> Vec<Candidate> {
+        let mut full: Vec<Candidate> = found
+            .iter()
+            .take(FINALISTS)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|(effect, _)| {
+                let mut model = now.model.clone();
+                model.effects.push(effect.clone());
+                self.fit(model, &now.noise, Colour::White)
+            })
+            .collect();
+        full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        full
+    }
+}

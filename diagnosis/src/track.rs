@@ -1,0 +1,247 @@
+//! A recording cut into blocks of rows, so that a filter can run over it fast and without differencing.
+//!
+//! A block's position is the mean of its rows; an input is held row by row and enters as what it does to velocity, to
+//! position and to the block's mean, so that time stamps are used as they stand and nothing is resampled.
+
+use crate::recording::Recording;
+use crate::rig::Rig;
+
+/// What an input does over each block, from the state at the block's start.
+#[derive(Debug, Clone)]
+pub(crate) enum Input {
+    /// Acceleration held over each block, rad/s² or m/s² per unit.
+    Held(Vec<f64>),
+    /// Change of velocity and position over the block and of the block's mean position.
+    Rows { dv: Vec<f64>, dq: Vec<f64>, dz: Vec<f64> },
+    /// Travel that the encoder reads beside the position.
+    Sensor(Vec<f64>),
+}
+
+/// A recording in blocks. All vectors have one entry per block unless said otherwise.
+#[derive(Debug, Clone)]
+pub(crate) struct Track {
+    pub(crate) file: String,
+    /// Rows per block.
+    pub(crate) rows_per_block: usize,
+    /// Start of each block since the first row, s.
+    pub(crate) start: Vec<f64>,
+    /// Length, s.
+    pub(crate) span: Vec<f64>,
+    /// Mean over the rows of the time since the block's start, s, and of half its square, s².
+    pub(crate) tau1: Vec<f64>,
+    pub(crate) tau2: Vec<f64>,
+    /// Mean position since the first row, rad or m.
+    pub(crate) z: Vec<f64>,
+    /// Variance of that mean from quantisation alone.
+    pub(crate) quantum: Vec<f64>,
+    /// Time of each row since the first, and the length for which its command is held (one fewer than rows).
+    pub(crate) row_time: Vec<f64>,
+    pub(crate) row_hold: Vec<f64>,
+    /// Command per row.
+    pub(crate) command: Vec<f64>,
+    /// Block means.
+    pub(crate) tilt: Option<Vec<f64>>,
+    pub(crate) force: Option<Vec<f64>>,
+    pub(crate) reference: Option<Vec<f64>>,
+    /// Position and velocity at the middle of each block, from the smoother.
+    pub(crate) x: Vec<f64>,
+    pub(crate) v: Vec<f64>,
+    /// Blocks where the axis rests or the sign of its speed is not known.
+    pub(crate) rest: Vec<bool>,
+    /// Bounds of the segments that gains are counted in, as block indices; one more than segments.
+    pub(crate) segments: Vec<usize>,
+    /// Speed below which its sign is not known.
+    pub(crate) speed_floor: f64,
+}
+
+/// Blocks per second that are wanted: enough for friction, few enough for a minute at 10 kHz.
+const BLOCK_BUDGET: f64 = 20_000.0;
+const SLOWEST_BLOCKS_HZ: f64 = 330.0;
+const FASTEST_BLOCKS_HZ: f64 = 400.0;
+/// Shortest segment, s, and how many segments a recording is cut into at the most.
+const SEGMENT_S: f64 = 0.2;
+const SEGMENTS: f64 = 60.0;
+
+impl Track {
+    /// Cuts a checked recording into blocks.
+    pub(crate) fn new(recording: &Recording, rig: &Rig) -> Self {
+        let scale = 1.0 / rig.encoder.counts_per_unit;
+        let rows = recording.len() - 1;
+        let t0 = recording.time_s[0];
+        let row_time: Vec<f64> = recording.time_s.iter().map(|t| t - t0).collect();
+        let row_hold: Vec<f64> = row_time.windows(2).map(|w| w[1] - w[0]).collect();
+        let wanted = (BLOCK_BUDGET / recording.duration_s()).clamp(SLOWEST_BLOCKS_HZ, FASTEST_BLOCKS_HZ);
+        let m = ((recording.rate_hz() / wanted).round() as usize).max(1);
+        let n = rows / m;
+        let limit = rig.actuator.limit.unwrap_or(f64::INFINITY);
+        let zero = recording.position_counts[0];
+        let mut track = Self {
+            file: recording.file.clone(),
+            rows_per_block: m,
+            start: Vec::with_capacity(n),
+            span: Vec::with_capacity(n),
+            tau1: Vec::with_capacity(n),
+            tau2: Vec::with_capacity(n),
+            z: Vec::with_capacity(n),
+            quantum: Vec::with_capacity(n),
+            command: recording.command[..rows].iter().map(|u| u.clamp(-limit, limit)).collect(),
+            tilt: None,
+            force: None,
+            reference: None,
+            x: Vec::new(),
+            v: vec![0.0; n],
+            rest: vec![false; n],
+            segments: Vec::new(),
+            speed_floor: 0.0,
+            row_time,
+            row_hold,
+        };
+        let mean = |column: &[f64]| -> Vec<f64> {
+            column.chunks_exact(m).take(n).map(|c| c.iter().sum::<f64>() / m as f64).collect()
+        };
+        for j in 0..n {
+            let (first, end) = (j * m, (j + 1) * m);
+            let start = track.row_time[first];
+            let (mut one, mut two, mut sum) = (0.0, 0.0, 0.0);
+            for row in first..end {
+                let tau = track.row_time[row] - start;
+                one += tau;
+                two += 0.5 * tau * tau;
+                sum += recording.position_counts[row] - zero;
+            }
+            let count = m as f64;
+            track.start.push(start);
+            track.span.push(track.row_time[end] - start);
+            track.tau1.push(one / count);
+            track.tau2.push(two / count);
+            track.z.push(sum / count * scale);
+            // Rows within one count tell no more than one of them.
+            let moved = (recording.position_counts[end - 1] - recording.position_counts[first]).abs();
+            track.quantum.push(scale * scale / 12.0 / (1.0 + moved.min(count - 1.0)));
+        }
+        track.inflate_where_slow(scale);
+        track.x = track.z.clone();
+        track.tilt = recording.tilt_rad.as_deref().map(mean);
+        track.force = recording.force.as_deref().map(mean);
+        track.reference = recording.reference_counts.as_deref().map(mean);
+        let duration = track.row_time[rows];
+        let wanted = (duration / SEGMENT_S).floor().clamp(1.0, SEGMENTS);
+        let length = (n as f64 / wanted).ceil().max(1.0) as usize;
+        track.segments = (0..n).step_by(length).chain([n]).collect();
+        track
+    }
+
+    /// Where a count lasts several blocks its error is the same in all of them: count it once.
+    fn inflate_where_slow(&mut self, count: f64) {
+        let n = self.blocks();
+        let reach = 20.min(n / 4).max(1);
+        let factor: Vec<f64> = (0..n)
+            .map(|j| {
+                let (a, b) = (j.saturating_sub(reach), (j + reach).min(n - 1));
+                let moved = (self.z[b] - self.z[a]).abs() / count;
+                ((b - a) as f64 / moved.max(1.0)).max(1.0)
+            })
+            .collect();
+        for (quantum, factor) in self.quantum.iter_mut().zip(factor) {
+            *quantum *= factor;
+        }
+    }
+
+    /// Number of blocks.
+    pub(crate) fn blocks(&self) -> usize {
+        self.span.len()
+    }
+
+    /// Blocks per second.
+    pub(crate) fn block_rate(&self) -> f64 {
+        let n = self.blocks();
+        n as f64 / (self.start[n - 1] + self.span[n - 1])
+    }
+
+    /// What a signal held row by row does over each block.
+    pub(crate) fn rows_input(&self, signal: &[f64]) -> Input {
+        let m = self.rows_per_block;
+        let n = self.blocks();
+        let (mut dv, mut dq, mut dz) = (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
+        for (a, h) in signal.chunks_exact(m).zip(self.row_hold.chunks_exact(m)).take(n) {
+            let (mut v, mut q, mut sum) = (0.0, 0.0, 0.0);
+            for (a, h) in a.iter().zip(h) {
+                sum += q;
+                q += (v + 0.5 * a * h) * h;
+                v += a * h;
+            }
+            dv.push(v);
+            dq.push(q);
+            dz.push(sum / m as f64);
+        }
+        Input::Rows { dv, dq, dz }
+    }
+
+    /// Mean over each block of a signal held row by row.
+    pub(crate) fn block_mean(&self, signal: &[f64]) -> Vec<f64> {
+        let m = self.rows_per_block;
+        signal
+            .chunks_exact(m)
+            .zip(self.row_hold.chunks_exact(m))
+            .zip(&self.span)
+            .map(|((a, h), span)| a.iter().zip(h).map(|(a, h)| a * h).sum::<f64>() / span)
+            .collect()
+    }
+
+    /// The segment of a block.
+    pub(crate) fn segment_count(&self) -> usize {
+        self.segments.len() - 1
+    }
+}
+
+impl Input {
+    /// The same input with each block scaled.
+    pub(crate) fn scaled(&self, by: &[f64]) -> Self {
+        let times = |a: &[f64]| a.iter().zip(by).map(|(a, b)| a * b).collect();
+        match self {
+            Self::Held(a) => Self::Held(times(a)),
+            Self::Rows { dv, dq, dz } => Self::Rows { dv: times(dv), dq: times(dq), dz: times(dz) },
+            Self::Sensor(a) => Self::Sensor(times(a)),
+        }
+    }
+
+    /// Adds `factor` times this input to a total.
+    pub(crate) fn add_to(&self, total: &mut Total, track: &Track, factor: f64) {
+        match self {
+            Self::Held(a) => {
+                for (j, a) in a.iter().enumerate() {
+                    let (a, h) = (a * factor, track.span[j]);
+                    total.dv[j] += a * h;
+                    total.dq[j] += 0.5 * a * h * h;
+                    total.dz[j] += a * track.tau2[j];
+                }
+            }
+            Self::Rows { dv, dq, dz } => {
+                for j in 0..dv.len() {
+                    total.dv[j] += factor * dv[j];
+                    total.dq[j] += factor * dq[j];
+                    total.dz[j] += factor * dz[j];
+                }
+            }
+            Self::Sensor(a) => {
+                for (z, a) in total.dz.iter_mut().zip(a) {
+                    *z += factor * a;
+                }
+            }
+        }
+    }
+}
+
+/// The sum of all inputs of a model.
+#[derive(Debug, Clone)]
+pub(crate) struct Total {
+    pub(crate) dv: Vec<f64>,
+    pub(crate) dq: Vec<f64>,
+    pub(crate) dz: Vec<f64>,
+}
+
+impl Total {
+    pub(crate) fn zero(n: usize) -> Self {
+        Self { dv: vec![0.0; n], dq: vec![0.0; n], dz: vec![0.0; n] }
+    }
+}
