@@ -3,4 +3,14 @@
 //!
 //! It speaks to any device, virtual or not, through the same `link` bytes, and leaves force laws to `control-core`.
 
+pub mod device;
+pub mod driver;
+pub mod failure;
+pub mod library;
+pub mod plant;
+pub mod procedure;
+pub mod profile;
+pub mod recording;
 pub mod session;
+pub mod station;
+pub mod tally;

@@ -1,2 +1,27 @@
-//! host-sim
-fn main() {}
+//! The command line of the needle device's PC side. It parses, calls the library, prints, and turns failures into one line
+//! and an exit status: 1 when what was asked for did not work out, 2 for unusable input.
+
+mod cli;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let result = match cli::Cli::try_parse() {
+        Ok(cli) => cli.run(),
+        Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            // Help that goes into a closed pipe is nobody's loss.
+            let _ = error.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => Err(cli::usage(&error)),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("host-sim: {failure}");
+            ExitCode::from(failure.status())
+        }
+    }
+}

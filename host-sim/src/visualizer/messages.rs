@@ -4,13 +4,14 @@
 //! sixty `frame`s a second; four a second while nothing arrives from the device. The page sends a [`FromPage`] when a
 //! person does something. Times are seconds of the device's own clock, lengths are along the needle.
 
+use crate::session::{LinkStatus, Scene};
 use serde::{Deserialize, Serialize};
 
 /// Server to page; `type` names the variant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToPage {
-    /// What is simulated; once, at the beginning.
+    /// What is simulated; once, at the beginning. Its fields are those of [`Scene`].
     Scene(Scene),
     /// Who the device is; again whenever it starts anew.
     Device(Device),
@@ -18,37 +19,9 @@ pub enum ToPage {
     Frame(Frame),
 }
 
-/// What is simulated.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Scene {
-    /// Name of the profile.
-    pub profile: String,
-    /// The layers, outermost first.
-    pub layers: Vec<Layer>,
-    /// Radius of the roller in mm.
-    pub roller_radius_mm: f64,
-    /// Inclination below the horizontal at the start, in rad.
-    pub tilt_rad: f64,
-    /// Whether a person can move the needle in the page; not so on real hardware or in a replay.
-    pub can_drag: bool,
-}
-
-/// One layer of tissue.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Layer {
-    /// `skin`, `fat`, `muscle`, `vessel` or `other`.
-    pub tissue: &'static str,
-    /// Depth of its outer face in mm.
-    pub top_mm: f64,
-    /// Travel past that face at which its wall gives way, in mm; null where it has no wall.
-    pub puncture_mm: Option<f64>,
-}
-
 /// Who the device is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Device {
-    /// Whether it is the virtual one.
-    pub is_virtual: bool,
     /// Its unique number in hexadecimal; zeros on the virtual device.
     pub identity: String,
     /// Version of its firmware.
@@ -144,34 +117,14 @@ pub struct Event {
     pub limits: Option<u8>,
 }
 
-/// How the link does.
+/// How the link does, totals since the session began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Link {
-    /// Whether the device answers.
-    pub connected: bool,
-    /// Frames that arrived.
-    pub frames: u64,
-    /// Frames that are missing.
-    pub lost_frames: u64,
-    /// Samples that are missing.
-    pub lost_samples: u64,
-    /// Pieces that were no frame.
-    pub garbage: u64,
+    /// What the session says of it.
+    #[serde(flatten)]
+    pub status: LinkStatus,
     /// Samples that this page was too slow for; they are in the recording all the same.
     pub skipped_samples: u64,
-    /// What is being recorded.
-    pub recording: Option<Recording>,
-}
-
-/// A recording under way.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Recording {
-    /// Name of the file.
-    pub file: String,
-    /// Samples in it so far.
-    pub samples: u64,
-    /// Why it ended early; null while it runs.
-    pub error: Option<String>,
 }
 
 /// Who moves the needle.

@@ -9,8 +9,22 @@
 mod assets;
 pub mod condense;
 mod connection;
-mod event_message;
 pub mod messages;
 mod server;
 
 pub use server::{ServeError, Server, serve};
+
+#[cfg(test)]
+fn test_scene() -> crate::session::Scene {
+    crate::session::Scene {
+        source: crate::session::Source::Virtual,
+        profile: "adult".into(),
+        procedure: None,
+        layers: Vec::new(),
+        roller_radius_mm: 10.0,
+        travel_mm: 60.0,
+        largest_force_n: 2.88,
+        tilt_rad: 0.5,
+        hand: true,
+    }
+}

@@ -1,0 +1,44 @@
+//! One module a command.
+
+mod progress;
+mod run;
+
+use clap::{Parser, Subcommand};
+use host_sim::failure::Failure;
+
+/// The needle insertion device on the PC: run it (virtual or real), look at it, record it, export and score recordings.
+///
+/// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
+#[derive(Parser)]
+#[command(version, after_help = "Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::Run),
+}
+
+impl Cli {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self.command {
+            None => run::Run::default().run(),
+            Some(Command::Run(command)) => command.run(),
+        }
+    }
+}
+
+/// What the parser has to say, in one line.
+pub(crate) fn usage(error: &clap::Error) -> Failure {
+    let drawn = error.to_string();
+    let said: Vec<&str> = drawn
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let said = said.join("; ");
+    Failure::input(format_args!("{}; see host-sim --help", said.trim_start_matches("error: ")))
+}

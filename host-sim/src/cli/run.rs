@@ -1,0 +1,187 @@
+//! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
+
+use super::progress::Progress;
+use clap::{Args, ValueEnum};
+use control_core::TICK_HZ;
+use host_sim::device::serial::SerialPort;
+use host_sim::device::virtual_device::{VirtualDevice, VirtualPort};
+use host_sim::driver::Driver;
+use host_sim::failure::Failure;
+use host_sim::procedure::Procedure;
+use host_sim::profile::Profile;
+use host_sim::recording::messages::Setup;
+use host_sim::recording::write::Recorder;
+use host_sim::session::{self, Session, Source};
+use host_sim::station::{Outcome, Outlets, Station};
+use host_sim::tally::Tally;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Run a device, virtual or real: show it, record it.
+///
+/// A scripted hand performs the procedure on a virtual device until a person takes the needle in the page.
+/// The last line on standard output sums the run up.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim run --profile firm-skin
+  host-sim run --device /dev/ttyACM0 --record session.mcap
+  host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap")]
+pub(crate) struct Run {
+    /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
+    #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
+    device: String,
+    /// What the scripted hand does: venepuncture, slow, or a TOML file
+    #[arg(long, default_value = "venepuncture", value_name = "NAME|FILE")]
+    procedure: String,
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, or a TOML file
+    #[arg(long, default_value = "adult", value_name = "NAME|FILE")]
+    profile: String,
+    /// The force model
+    #[arg(long, value_enum, default_value_t = Model::Jog)]
+    model: Model,
+    /// Serve no page
+    #[arg(long)]
+    headless: bool,
+    /// Stop after this many seconds of samples
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// Run a virtual device as fast as it goes
+    #[arg(long)]
+    fast: bool,
+    /// Record to this MCAP file
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// Port of the page on this computer
+    #[arg(long, default_value_t = 8710, value_name = "N")]
+    port: u16,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Model {
+    /// The jog effect and friction cone of the venepuncture device.
+    Jog,
+    /// Cutting and LuGre friction of the joint injection simulator.
+    Sparte,
+    /// The fitted force table of the layered-tissue simulator.
+    Xr,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self {
+            device: "virtual".into(),
+            procedure: "venepuncture".into(),
+            profile: "adult".into(),
+            model: Model::Jog,
+            headless: false,
+            seconds: None,
+            fast: false,
+            record: None,
+            port: 8710,
+        }
+    }
+}
+
+impl Run {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let seconds = self.check()?;
+        let profile = Profile::find(&self.profile)?;
+        let procedure = Procedure::find(&self.procedure, &profile)?;
+        let is_virtual = self.device == "virtual";
+        let mut serial = if is_virtual { None } else { Some(SerialPort::find(&self.device)?) };
+
+        let source = if is_virtual { Source::Virtual } else { Source::Serial { path: self.device.clone() } };
+        let shown_procedure = is_virtual.then(|| procedure.name.clone());
+        let (session, publisher) = session::open(profile.scene(source, shown_procedure.clone()));
+        // The port is taken before the file is made: a page that cannot be served must not cost a recording.
+        let _server = if self.headless { None } else { Some(self.serve(session)?) };
+        let setup = Setup {
+            program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
+            source: self.device.clone(),
+            profile_toml: profile.source.text.clone(),
+            profile_origin: profile.source.origin.clone(),
+            procedure: shown_procedure,
+        };
+        let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
+        let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+
+        let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
+        let station = Station::new(Driver::new(profile.config.clone()), outlets, &stop);
+        let mut bar = Progress::new("running");
+        let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
+        let outcome = match &mut serial {
+            Some(port) => station.run_in_real_time(port, seconds, |_| {}, progress)?,
+            None if self.fast => station.run_in_step(VirtualDevice::new(&profile, procedure), progress)?,
+            None => {
+                let (mut port, hand) = VirtualPort::start(VirtualDevice::new(&profile, procedure))?;
+                station.run_in_real_time(&mut port, seconds, |c| hand.control(c), progress)?
+            }
+        };
+        drop(bar);
+        self.report(&outcome);
+        Ok(())
+    }
+
+    /// What clap cannot check.
+    fn check(&self) -> Result<Option<f64>, Failure> {
+        let not_yet = |name: &str| {
+            Err(Failure::input(format_args!(
+                "--model {name} is not built yet: only the jog effect and the friction cone are; use --model jog"
+            )))
+        };
+        match self.model {
+            Model::Jog => {}
+            Model::Sparte => return not_yet("sparte"),
+            Model::Xr => return not_yet("xr"),
+        }
+        if self.fast && self.device != "virtual" {
+            return Err(Failure::input("--fast is for the virtual device: a real one keeps its own time"));
+        }
+        match self.seconds {
+            Some(s) if !(s.is_finite() && (1e-4..=1e7).contains(&s)) => {
+                Err(Failure::input(format_args!("--seconds is {s}; it must lie from 0.0001 to 10000000")))
+            }
+            None if self.headless && self.fast => {
+                Err(Failure::input("--headless --fast without --seconds would never end; add --seconds 60"))
+            }
+            seconds => Ok(seconds),
+        }
+    }
+
+    fn serve(&self, _session: Session) -> Result<(), Failure> {
+        Err(Failure::failed(format_args!("no page yet on port {}; use --headless", self.port)))
+    }
+
+    fn report(&self, outcome: &Outcome) {
+        if let (Some(path), Some(bytes)) = (&self.record, outcome.recorded_bytes) {
+            println!("recorded {bytes} bytes to {}", path.display());
+        }
+        let (link, tally) = (&outcome.link, &outcome.tally);
+        println!(
+            "samples={} frames={} lost={} punctures={} peak_force_n={:.3} lost_samples={} garbage={} vessels={} faults={}",
+            tally.samples,
+            link.frames,
+            link.lost_frames,
+            tally.punctures,
+            tally.peak_force_n,
+            link.lost_samples,
+            link.garbage,
+            tally.vessels,
+            tally.faults
+        );
+    }
+}
+
+/// Ctrl-C and a polite kill end the run in good order: torque off, recording closed, last line printed.
+fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // A second one ends the program at once.
+        signal_hook::flag::register_conditional_shutdown(signal, 1, stop.clone())
+            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+            .map_err(|cause| Failure::failed(format_args!("signals cannot be listened for ({cause})")))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,316 @@
+//! The device without the hardware: the control core, tick by tick, against the plant, behind the same end of the link that
+//! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
+
+use super::pipe::{self, End};
+use super::{Port, Wire};
+use crate::failure::Failure;
+use crate::plant::{Plant, PlantConfig};
+use crate::procedure::Procedure;
+use crate::profile::Profile;
+use crate::session::Control;
+use control_core::event::Fault;
+use control_core::units::{Counts, DacCode, Milliradians};
+use control_core::{Config, Controller, Order, Plan, TICK_HZ, TickInput};
+use link::codec::MAX_FRAME;
+use link::device::{Endpoint, Identity};
+use link::frames::{Stage, StageTime, Timing};
+use std::io;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// One tick in s.
+const TICK_S: f64 = 1.0 / TICK_HZ as f64;
+/// Fastest that a dragged hand moves, mm/s: a quick reach, and well within what the encoder check allows.
+const DRAG_MM_PER_S: f64 = 250.0;
+/// A dragged hand closes in on the mouse with this time constant, s.
+const DRAG_LAG_S: f64 = 0.02;
+/// Ticks done between two looks at the cable, in real time: 1 ms.
+const BURST: u32 = 10;
+/// Further behind than this (a suspended computer) the clock is set anew rather than caught up with.
+const LARGEST_LAG: Duration = Duration::from_millis(200);
+/// One tick in this many is timed: a look at the clock costs a quarter of a tick.
+const TIMED_TICKS: u64 = 16;
+
+/// What moves the needle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Hand {
+    /// The procedure, since this tick.
+    Script { since: u64 },
+    /// A person, to this depth in mm.
+    Drag { wanted_mm: f64 },
+}
+
+/// The control core on the plant.
+pub struct VirtualDevice {
+    plant: Plant,
+    controller: Controller,
+    endpoint: Endpoint,
+    procedure: Procedure,
+    tick: u64,
+    hand: Hand,
+    /// Where the hand is, mm past the plant's zero.
+    hand_mm: f64,
+    /// Where a person set the zero, mm past the plant's zero.
+    zero_mm: f64,
+    set_value: f64,
+    enable: bool,
+    powered_before: bool,
+    timing: Timing,
+    timed: bool,
+}
+
+impl VirtualDevice {
+    /// Powered down, the needle where `procedure` begins, the device configured as it leaves the bench: with the defaults.
+    pub fn new(profile: &Profile, procedure: Procedure) -> Self {
+        let factory = Config { device: profile.config.device, ..Config::default() };
+        // A profile whose roller is too large for the default tissue brings its own.
+        let plan = Plan::new(&factory).unwrap_or_else(|_| profile.plan.clone());
+        let device = &profile.config.device;
+        let mechanism = PlantConfig::new(
+            device.roller_radius.0.to_num::<f64>() * 1e-3,
+            device.counts_per_turn,
+            device.full_scale_torque.0.to_num::<f64>() * 1e-3,
+        );
+        let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
+        plant.set_tilt(profile.entry_rad);
+        let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
+        Self {
+            plant,
+            endpoint: Endpoint::new(identity, &plan, None),
+            controller: Controller::new(plan),
+            tick: 0,
+            hand: Hand::Script { since: 0 },
+            hand_mm: procedure.start_mm,
+            zero_mm: 0.0,
+            set_value: 0.0,
+            enable: false,
+            powered_before: false,
+            procedure,
+            timing: Timing::default(),
+            timed: false,
+        }
+    }
+
+    /// The plant behind it.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Whether the amplifier is on.
+    pub fn is_enabled(&self) -> bool {
+        self.enable
+    }
+
+    /// The converter's output as a share of full scale, −1 to 1.
+    pub fn set_value(&self) -> f64 {
+        self.set_value
+    }
+
+    /// Ticks since power-on.
+    pub fn ticks(&self) -> u64 {
+        self.tick
+    }
+
+    /// One tick of the control law, then 100 µs of physics.
+    pub fn tick(&mut self) {
+        while let Some(order) = self.endpoint.next_order() {
+            self.order(order);
+        }
+        let begin = (self.timed && self.tick.is_multiple_of(TIMED_TICKS)).then(Instant::now);
+        let output = self.controller.tick(TickInput {
+            count: Counts(self.plant.count()),
+            tilt: Milliradians((self.plant.tilt() * 1e3).round() as i16),
+        });
+        if let Some(begin) = begin {
+            self.note_time(begin.elapsed());
+        }
+        self.set_value = self.share(output.dac);
+        self.enable = output.enable;
+        self.endpoint.record(self.tick, &output);
+        if self.enable && !self.powered_before {
+            // The scripted hand waits for a person to start the device.
+            self.restart_script();
+        }
+        self.powered_before = self.enable;
+        let wanted = self.move_hand();
+        self.plant.tick(self.set_value, self.enable, Some(wanted));
+        self.tick += 1;
+    }
+
+    /// Takes bytes from the PC.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.endpoint.receive(bytes);
+    }
+
+    /// Writes the next frame for the PC to `out`; 0 where nothing waits.
+    pub fn transmit(&mut self, out: &mut [u8; MAX_FRAME]) -> usize {
+        self.endpoint.transmit(out)
+    }
+
+    /// The cable is pulled: the device sees its bus go silent, and takes the torque away.
+    pub fn disconnect(&mut self) {
+        self.endpoint.disconnect();
+        if self.enable {
+            self.controller.order(Order::Trip(Fault::LinkLost));
+        }
+    }
+
+    /// Moves the simulated hand or the device. What concerns the control law goes over the link and not through here.
+    pub fn control(&mut self, control: Control) {
+        match control {
+            Control::Drag { depth_mm } if depth_mm.is_finite() => {
+                let travel = self.controller.plan().config().limits.travel.0.to_num::<f64>() - 1.0;
+                self.hand = Hand::Drag { wanted_mm: depth_mm.clamp(-travel, travel) + self.zero_mm };
+            }
+            Control::Release => self.hand = Hand::Drag { wanted_mm: self.hand_mm },
+            Control::Script => self.restart_script(),
+            Control::Tilt { rad } if rad.is_finite() => {
+                self.plant.set_tilt(rad.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
+            }
+            _ => {}
+        }
+    }
+
+    fn order(&mut self, order: Order) {
+        if matches!(order, Order::Zero) && !self.enable {
+            self.zero_mm = self.plant.tip() * 1e3;
+        }
+        self.controller.order(order);
+    }
+
+    fn restart_script(&mut self) {
+        self.hand = Hand::Script { since: self.tick };
+    }
+
+    /// The converter's code as a share of full scale, as the amplifier sees it.
+    fn share(&self, code: DacCode) -> f64 {
+        let width = self.controller.plan().config().device.dac;
+        (f64::from(code.0) - f64::from(width.mid_scale())) / f64::from(width.span())
+    }
+
+    /// Where the hand wants the tip and how fast, in m and m/s.
+    fn move_hand(&mut self) -> (f64, f64) {
+        let (wanted_mm, speed) = match self.hand {
+            Hand::Script { since } => {
+                let into = if self.enable { (self.tick - since) as f64 * TICK_S } else { 0.0 };
+                let (depth, speed) = self.procedure.target(into);
+                (depth + self.zero_mm, speed)
+            }
+            Hand::Drag { wanted_mm } => (wanted_mm, 0.0),
+        };
+        // A hand neither jumps to the mouse nor back to the procedure's beginning.
+        let most = DRAG_MM_PER_S * TICK_S;
+        let gap = wanted_mm - self.hand_mm;
+        match self.hand {
+            Hand::Script { .. } if gap.abs() <= most => {
+                self.hand_mm = wanted_mm;
+                (wanted_mm * 1e-3, speed * 1e-3)
+            }
+            _ => {
+                let step = (gap * TICK_S / DRAG_LAG_S).clamp(-most, most);
+                self.hand_mm += step;
+                (self.hand_mm * 1e-3, step / TICK_S * 1e-3)
+            }
+        }
+    }
+
+    fn note_time(&mut self, taken: Duration) {
+        let taken = u32::try_from(taken.as_nanos()).unwrap_or(u32::MAX);
+        let stage = &mut self.timing.stages[Stage::Tick as usize];
+        *stage = StageTime { last: taken, longest: stage.longest.max(taken) };
+        self.endpoint.set_timing(self.timing);
+    }
+}
+
+/// A virtual device that lives in a thread of its own, in real time, with a cable to be plugged in.
+pub struct VirtualPort {
+    cables: mpsc::Sender<End>,
+}
+
+/// Moves the hand of a virtual device that lives in a thread of its own.
+pub struct HandHandle {
+    controls: mpsc::Sender<Control>,
+}
+
+impl VirtualPort {
+    /// Powers the device up; it goes on until both of what is returned are dropped.
+    pub fn start(device: VirtualDevice) -> Result<(Self, HandHandle), Failure> {
+        let (cables, plugged) = mpsc::channel();
+        let (controls, asked) = mpsc::channel();
+        std::thread::Builder::new()
+            .name("virtual device".into())
+            .spawn(move || device.run_in_real_time(&plugged, &asked))
+            .map_err(|cause| Failure::failed(format_args!("the virtual device cannot start ({cause})")))?;
+        Ok((Self { cables }, HandHandle { controls }))
+    }
+}
+
+impl Port for VirtualPort {
+    fn open(&mut self) -> io::Result<Box<dyn Wire>> {
+        let (near, far) = pipe::cable();
+        self.cables.send(far).map_err(|_| io::Error::from(io::ErrorKind::NotConnected))?;
+        Ok(Box::new(near))
+    }
+}
+
+impl HandHandle {
+    /// Moves the hand; never blocks.
+    pub fn control(&self, control: Control) {
+        // A device that is gone has no hand.
+        let _ = self.controls.send(control);
+    }
+}
+
+impl VirtualDevice {
+    /// Ticks in real time at the far end of whatever cable is plugged in, until nobody can plug in another.
+    pub fn run_in_real_time(mut self, cables: &mpsc::Receiver<End>, controls: &mpsc::Receiver<Control>) {
+        self.timed = true;
+        let mut cable: Option<End> = None;
+        let mut due = Instant::now();
+        let burst = Duration::from_secs(u64::from(BURST)) / TICK_HZ;
+        loop {
+            match cables.try_recv() {
+                Ok(end) => cable = Some(end),
+                Err(mpsc::TryRecvError::Disconnected) if cable.is_none() => return,
+                Err(_) => {}
+            }
+            while let Ok(control) = controls.try_recv() {
+                self.control(control);
+            }
+            if let Some(end) = &mut cable
+                && exchange(&mut self, end).is_err()
+            {
+                self.disconnect();
+                cable = None;
+            }
+            for _ in 0..BURST {
+                self.tick();
+            }
+            due += burst;
+            let now = Instant::now();
+            if now > due + LARGEST_LAG {
+                self.timing.missed_ticks += 1;
+                due = now;
+            }
+            std::thread::sleep(due.saturating_duration_since(now));
+        }
+    }
+}
+
+/// Takes what has arrived and sends what fits.
+fn exchange(device: &mut VirtualDevice, cable: &mut End) -> io::Result<()> {
+    let mut bytes = [0; MAX_FRAME];
+    loop {
+        match cable.read(&mut bytes, Duration::ZERO)? {
+            0 => break,
+            count => device.receive(&bytes[..count]),
+        }
+    }
+    while cable.room() >= MAX_FRAME {
+        match device.transmit(&mut bytes) {
+            0 => break,
+            count => cable.write(&bytes[..count])?,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,213 @@
+//! The PC's side of a conversation with a device, without clock or cable of its own: it is told the time and handed bytes.
+//!
+//! On a new connection it says hello, stops the device, configures it, and starts it only where a person asks: no set point of
+//! an earlier connection is ever played again. Commands are repeated until they are answered; a heartbeat says every 50 ms
+//! that the PC lives.
+
+use control_core::Config;
+use link::codec::MAX_FRAME;
+use link::frames::{Ack, Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
+use link::host::{Commands, Counts, Reception};
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Time between heartbeats; the device waits for four of them.
+pub const HEARTBEAT: Duration = Duration::from_millis(50);
+/// An unanswered command is repeated after this.
+pub const REPEAT: Duration = Duration::from_millis(100);
+/// A device that sends no samples for this long has started anew or is gone: hello again.
+pub const SILENCE: Duration = Duration::from_secs(1);
+
+/// What a person may ask of any device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Power up.
+    Start,
+    /// Torque off.
+    Stop,
+    /// The needle is at depth 0 now.
+    Zero,
+}
+
+/// The PC's side of a conversation.
+pub struct Driver {
+    config: Config,
+    reception: Reception,
+    commands: Commands,
+    open: bool,
+    /// The device has taken its configuration in this connection.
+    ready: bool,
+    waiting: VecDeque<Command>,
+    pending: Option<Pending>,
+    last_samples: Duration,
+    last_heartbeat: Option<Duration>,
+    notice: Option<String>,
+    refused: Option<String>,
+    out: Vec<u8>,
+}
+
+/// A command that has not been answered.
+struct Pending {
+    id: u32,
+    command: Command,
+    bytes: Vec<u8>,
+    sent: Duration,
+}
+
+impl Driver {
+    /// Nothing is open yet.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            reception: Reception::default(),
+            commands: Commands::default(),
+            open: false,
+            ready: false,
+            waiting: VecDeque::new(),
+            pending: None,
+            last_samples: Duration::ZERO,
+            last_heartbeat: None,
+            notice: None,
+            refused: None,
+            out: Vec::new(),
+        }
+    }
+
+    /// A connection is open: hello, torque off, configuration.
+    pub fn connected(&mut self, now: Duration) {
+        self.open = true;
+        self.greet(now);
+    }
+
+    /// The connection is gone, and with it whatever was asked and not done.
+    pub fn disconnected(&mut self) {
+        self.open = false;
+        self.ready = false;
+        self.waiting.clear();
+        self.pending = None;
+    }
+
+    /// Asks for something, once the device is ready. A stop overtakes everything.
+    pub fn request(&mut self, request: Request) {
+        match request {
+            Request::Stop => {
+                self.waiting
+                    .retain(|c| matches!(c, Command::Hello { .. } | Command::Configure(_) | Command::Stop));
+                self.waiting.push_front(Command::Stop);
+                if self.pending.as_ref().is_some_and(|p| matches!(p.command, Command::Start | Command::Zero))
+                {
+                    self.pending = None;
+                }
+            }
+            Request::Start => self.waiting.push_back(Command::Start),
+            Request::Zero => self.waiting.push_back(Command::Zero),
+        }
+    }
+
+    /// Takes bytes; gives every whole frame to `see`.
+    pub fn receive(&mut self, now: Duration, bytes: &[u8], mut see: impl FnMut(&DeviceFrame)) {
+        for &byte in bytes {
+            let Some(frame) = self.reception.push(byte) else { continue };
+            match &frame {
+                DeviceFrame::Ack(ack) => self.answered(now, ack),
+                DeviceFrame::Samples(_) => self.last_samples = now,
+                _ => {}
+            }
+            see(&frame);
+        }
+    }
+
+    /// What to send now.
+    pub fn transmit(&mut self, now: Duration) -> &[u8] {
+        self.out.clear();
+        if !self.open {
+            return &self.out;
+        }
+        if now.saturating_sub(self.last_samples) > SILENCE {
+            self.greet(now);
+        }
+        match &mut self.pending {
+            Some(pending) if now.saturating_sub(pending.sent) >= REPEAT => {
+                pending.sent = now;
+                self.out.extend(&pending.bytes);
+            }
+            Some(_) => {}
+            None => self.next_command(now),
+        }
+        if self.ready && self.last_heartbeat.is_none_or(|last| now.saturating_sub(last) >= HEARTBEAT) {
+            self.last_heartbeat = Some(now);
+            self.encode(Command::Heartbeat);
+        }
+        &self.out
+    }
+
+    /// What has arrived and what has not.
+    pub fn counts(&self) -> Counts {
+        self.reception.counts()
+    }
+
+    /// Whether the device has taken its configuration and sends samples.
+    pub fn is_ready(&self, now: Duration) -> bool {
+        self.ready && now.saturating_sub(self.last_samples) <= SILENCE
+    }
+
+    /// Something a person should know, once.
+    pub fn take_notice(&mut self) -> Option<String> {
+        self.notice.take()
+    }
+
+    /// Why this device will never do with this configuration, where it said so.
+    pub fn refused(&self) -> Option<&str> {
+        self.refused.as_deref()
+    }
+
+    fn greet(&mut self, now: Duration) {
+        self.ready = false;
+        self.last_samples = now;
+        self.pending = None;
+        self.waiting.clear();
+        self.waiting.push_back(Command::Hello { version: PROTOCOL_VERSION });
+        self.waiting.push_back(Command::Stop);
+        self.waiting.push_back(Command::Configure(self.config.clone()));
+    }
+
+    fn next_command(&mut self, now: Duration) {
+        let Some(command) = self.waiting.pop_front() else { return };
+        let from = self.out.len();
+        if let Some(id) = self.encode(command.clone()) {
+            let bytes = self.out[from..].to_vec();
+            self.pending = Some(Pending { id, command, bytes, sent: now });
+        }
+    }
+
+    fn encode(&mut self, command: Command) -> Option<u32> {
+        let mut frame = [0; MAX_FRAME];
+        // Every command fits MAX_FRAME: `link` tests the longest.
+        let (id, length) = self.commands.encode(command, &mut frame).ok()?;
+        self.out.extend(&frame[..length]);
+        Some(id)
+    }
+
+    fn answered(&mut self, now: Duration, ack: &Ack) {
+        if self.pending.as_ref().is_none_or(|pending| pending.id != ack.id) {
+            return;
+        }
+        let Some(pending) = self.pending.take() else { return };
+        match (ack.result, &pending.command) {
+            (Ok(()), Command::Configure(_)) => self.ready = true,
+            (Ok(()), _) => {}
+            // The same bytes again, soon.
+            (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
+            (Err(Rejection::Powered), Command::Configure(_)) => {
+                self.waiting.push_front(pending.command);
+                self.waiting.push_front(Command::Stop);
+            }
+            (Err(why @ (Rejection::Config(_) | Rejection::Version)), _) => {
+                self.waiting.clear();
+                self.refused = Some(format!("the device refused: {why}"));
+                self.notice = self.refused.clone();
+            }
+            (Err(why), _) => self.notice = Some(format!("the device refused: {why}")),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! What a person meets when something cannot be done: one sentence and an exit status.
+
+use std::fmt;
+
+/// One sentence that says what is wrong, where, and what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// What was given cannot be used: exit status 2.
+    Input(String),
+    /// What was asked for did not work out: exit status 1.
+    Failed(String),
+}
+
+impl Failure {
+    /// Unusable input.
+    pub fn input(sentence: impl fmt::Display) -> Self {
+        Self::Input(one_line(&sentence.to_string()))
+    }
+
+    /// Something that did not work out.
+    pub fn failed(sentence: impl fmt::Display) -> Self {
+        Self::Failed(one_line(&sentence.to_string()))
+    }
+
+    /// The process's exit status.
+    pub fn status(&self) -> u8 {
+        match self {
+            Failure::Failed(_) => 1,
+            Failure::Input(_) => 2,
+        }
+    }
+}
+
+/// Parsers like to draw; a log or a pipe wants one line.
+fn one_line(sentence: &str) -> String {
+    sentence.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Failure::Input(sentence) | Failure::Failed(sentence)) = self;
+        f.write_str(sentence)
+    }
+}
+
+impl std::error::Error for Failure {}

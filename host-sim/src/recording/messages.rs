@@ -1,0 +1,263 @@
+//! What stands in a recording, channel by channel: the frames of the link in decimal numbers, with the unit in the name.
+
+use control_core::config::DacWidth;
+use control_core::controller::Sample;
+use control_core::event::{Fault, Limits, State};
+use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
+use fixed::types::{I2F30, I16F16};
+use link::frames;
+use serde::{Deserialize, Serialize};
+
+/// Topic and JSON schema of every channel.
+pub const CHANNELS: [(&str, &str, &str); 6] = [
+    ("/setup", "Setup", include_str!("schemas/setup.json")),
+    ("/hello", "Hello", include_str!("schemas/hello.json")),
+    ("/samples", "Samples", include_str!("schemas/samples.json")),
+    ("/pose", "Pose", include_str!("schemas/pose.json")),
+    ("/event", "Event", include_str!("schemas/event.json")),
+    ("/link", "Link", include_str!("schemas/link.json")),
+];
+
+/// What was set up before anything moved.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setup {
+    /// Version of the program that recorded.
+    pub program: String,
+    /// Where the samples came from.
+    pub source: String,
+    /// The profile's file as it stood, which the configuration can be made from again.
+    pub profile_toml: String,
+    /// What errors call it.
+    pub profile_origin: String,
+    /// Name of the scripted procedure, where a hand followed one.
+    pub procedure: Option<String>,
+}
+
+/// Who spoke and in which scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hello {
+    /// Of the link.
+    pub version: u16,
+    /// The microcontroller's unique number, hexadecimal.
+    pub identity: String,
+    /// Version of the firmware.
+    pub firmware: [u8; 3],
+    /// CRC-32 of the configuration in force.
+    pub config_hash: u32,
+    /// Samples a second.
+    pub tick_hz: u32,
+    /// Poses a second.
+    pub pose_hz: u16,
+    /// Length of one count along the needle.
+    pub mm_per_count: f64,
+    /// Radius of the roller.
+    pub roller_radius_mm: f64,
+    /// Torque at full scale of the converter.
+    pub full_scale_torque_mnm: f64,
+    /// 8 or 12.
+    pub dac_bits: u8,
+    /// The fault that had latched.
+    pub fault: Option<Fault>,
+}
+
+/// Consecutive samples, a column each.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Samples {
+    /// Tick of the first one; the others follow, 100 µs apart.
+    pub first_tick: u64,
+    /// Counts past the zero.
+    pub count: Vec<i32>,
+    /// What was written to the converter.
+    pub dac: Vec<u16>,
+    /// State, by its number.
+    pub state: Vec<u8>,
+    /// Inclination below the horizontal.
+    pub tilt_mrad: Vec<i16>,
+}
+
+/// Where the needle was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// When.
+    pub tick: u64,
+    /// Depth past the zero.
+    pub depth_mm: f64,
+    /// Speed, positive inwards.
+    pub speed_mm_s: f64,
+    /// Force that the law asked for.
+    pub force_n: f64,
+    /// Inclination below the horizontal.
+    pub tilt_mrad: i16,
+    /// State, by its number.
+    pub state: u8,
+    /// What held torque back, a bit each.
+    pub limits: u8,
+}
+
+/// Totals of the link since the session began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Link {
+    /// Frames that arrived whole.
+    pub frames: u64,
+    /// Frames whose number is missing.
+    pub lost_frames: u64,
+    /// Samples that arrived.
+    pub samples: u64,
+    /// Samples that did not.
+    pub lost_samples: u64,
+    /// Pieces between frames that were none.
+    pub garbage: u64,
+}
+
+/// Anything that stands in a recording.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(missing_docs, reason = "each variant carries the message that it is named after")]
+pub enum Message {
+    Setup(Setup),
+    Hello(Hello),
+    Samples(Samples),
+    Pose(Pose),
+    Event(frames::Event),
+    Link(Link),
+}
+
+impl From<&frames::Hello> for Hello {
+    fn from(hello: &frames::Hello) -> Self {
+        Self {
+            version: hello.version,
+            identity: hello.identity.iter().map(|byte| format!("{byte:02x}")).collect(),
+            firmware: hello.firmware,
+            config_hash: hello.config_hash,
+            tick_hz: hello.tick_hz,
+            pose_hz: hello.pose_hz,
+            mm_per_count: hello.mm_per_count.to_num(),
+            roller_radius_mm: hello.roller_radius.0.to_num(),
+            full_scale_torque_mnm: hello.full_scale_torque.0.to_num(),
+            dac_bits: match hello.dac {
+                DacWidth::Bits8 => 8,
+                DacWidth::Bits12 => 12,
+            },
+            fault: hello.fault,
+        }
+    }
+}
+
+impl Hello {
+    /// The converter.
+    pub fn dac(&self) -> DacWidth {
+        if self.dac_bits == 8 { DacWidth::Bits8 } else { DacWidth::Bits12 }
+    }
+
+    /// Force at the roller in N that resists insertion, for what was written to the converter.
+    pub fn force_n(&self, dac: u16) -> f64 {
+        let steps = f64::from(self.dac().mid_scale()) - f64::from(dac);
+        steps * self.full_scale_torque_mnm / f64::from(self.dac().span()) / self.roller_radius_mm
+    }
+
+    /// As it came over the link; what does not fit a frame is held at its bounds.
+    pub fn to_frame(&self) -> frames::Hello {
+        let mut identity = [0; 12];
+        for (index, byte) in identity.iter_mut().enumerate() {
+            let digits = self.identity.get(index * 2..index * 2 + 2);
+            *byte = digits.and_then(|two| u8::from_str_radix(two, 16).ok()).unwrap_or(0);
+        }
+        frames::Hello {
+            version: self.version,
+            identity,
+            firmware: self.firmware,
+            config_hash: self.config_hash,
+            tick_hz: self.tick_hz,
+            pose_hz: self.pose_hz,
+            mm_per_count: I2F30::saturating_from_num(self.mm_per_count),
+            roller_radius: Millimetres(held(self.roller_radius_mm)),
+            full_scale_torque: MillinewtonMetres(held(self.full_scale_torque_mnm)),
+            dac: self.dac(),
+            fault: self.fault,
+        }
+    }
+}
+
+/// JSON numbers are never NaN, the one value that a saturating conversion would not take.
+fn held(value: f64) -> I16F16 {
+    I16F16::saturating_from_num(value)
+}
+
+impl Samples {
+    /// A block as it came, or its first `keep` samples.
+    pub fn from_block(first_tick: u64, samples: &[Sample]) -> Self {
+        Self {
+            first_tick,
+            count: samples.iter().map(|s| s.count).collect(),
+            dac: samples.iter().map(|s| s.dac).collect(),
+            state: samples.iter().map(|s| s.state).collect(),
+            tilt_mrad: samples.iter().map(|s| s.tilt_mrad).collect(),
+        }
+    }
+
+    /// Row by row; as many as the shortest column has.
+    pub fn rows(&self) -> impl Iterator<Item = (u64, Sample)> + '_ {
+        let columns = self.count.iter().zip(&self.dac).zip(&self.state).zip(&self.tilt_mrad);
+        (self.first_tick..).zip(columns.map(|(((count, dac), state), tilt)| Sample {
+            count: *count,
+            dac: *dac,
+            state: *state,
+            tilt_mrad: *tilt,
+        }))
+    }
+}
+
+impl From<&frames::Pose> for Pose {
+    fn from(pose: &frames::Pose) -> Self {
+        Self {
+            tick: pose.tick,
+            depth_mm: pose.depth.0.to_num(),
+            speed_mm_s: pose.speed.0.to_num(),
+            force_n: pose.force.0.to_num(),
+            tilt_mrad: pose.tilt.0,
+            state: pose.state,
+            limits: pose.limits.0,
+        }
+    }
+}
+
+impl Pose {
+    /// As it came over the link.
+    pub fn to_frame(&self) -> frames::Pose {
+        frames::Pose {
+            tick: self.tick,
+            depth: Millimetres(held(self.depth_mm)),
+            speed: MillimetresPerSecond(held(self.speed_mm_s)),
+            force: Newtons(held(self.force_n)),
+            tilt: Milliradians(self.tilt_mrad),
+            state: self.state,
+            limits: Limits(self.limits),
+        }
+    }
+}
+
+impl From<link::host::Counts> for Link {
+    fn from(counts: link::host::Counts) -> Self {
+        Self {
+            frames: counts.frames,
+            lost_frames: counts.lost_frames,
+            samples: counts.samples,
+            lost_samples: counts.lost_samples,
+            garbage: counts.garbage,
+        }
+    }
+}
+
+/// What people call a state of the device.
+pub fn state_name(code: u8) -> &'static str {
+    match State::from_code(code) {
+        Some(State::Idle) => "idle",
+        Some(State::Approach) => "approach",
+        Some(State::Elastic) => "elastic",
+        Some(State::Puncture) => "puncture",
+        Some(State::Friction) => "friction",
+        Some(State::Withdrawal) => "withdrawal",
+        Some(State::Excitation) => "excitation",
+        Some(State::Fault) => "fault",
+        None => "unknown",
+    }
+}

@@ -1,0 +1,82 @@
+//! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is said.
+
+use super::messages::{Message, Setup};
+use crate::failure::Failure;
+use crate::library::Text;
+use crate::profile::Profile;
+use mcap::read::{MessageStream, Options};
+use std::path::Path;
+
+/// A recording in memory.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What errors call it.
+    pub file: String,
+    /// What was set up.
+    pub setup: Setup,
+    /// Everything else, in the order in which it was written.
+    pub messages: Vec<Message>,
+    /// Why it ends early, where it does.
+    pub cut: Option<String>,
+}
+
+impl Recording {
+    /// Reads a recording. A file that was cut is read up to the cut.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let shown = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|cause| {
+            Failure::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
+        })?;
+        Self::parse(shown, &bytes)
+    }
+
+    /// Reads the bytes of a recording; `file` is what errors call it.
+    pub fn parse(file: String, bytes: &[u8]) -> Result<Self, Failure> {
+        let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
+            .map_err(|cause| Failure::input(format_args!("{file}: not an MCAP recording ({cause})")))?;
+        let (mut setup, mut messages, mut cut) = (None, Vec::new(), None);
+        for message in stream {
+            let message = match message {
+                Ok(message) => message,
+                Err(cause) => {
+                    cut = Some(cause.to_string());
+                    break;
+                }
+            };
+            let topic = message.channel.topic.as_str();
+            match parse(topic, &message.data) {
+                Ok(Some(Message::Setup(first))) => setup = Some(first),
+                Ok(Some(other)) => messages.push(other),
+                // Somebody else's channel.
+                Ok(None) => {}
+                Err(cause) => {
+                    return Err(Failure::input(format_args!(
+                        "{file}: a message on {topic} cannot be understood ({cause}); was it recorded by host-sim?"
+                    )));
+                }
+            }
+        }
+        let setup = setup.ok_or_else(|| {
+            Failure::input(format_args!("{file}: has no /setup message; was it recorded by host-sim?"))
+        })?;
+        Ok(Self { file, setup, messages, cut })
+    }
+
+    /// The profile that it was recorded with.
+    pub fn profile(&self) -> Result<Profile, Failure> {
+        let origin = format!("{}, {}", self.file, self.setup.profile_origin);
+        Profile::parse(Text { origin, text: self.setup.profile_toml.clone() })
+    }
+}
+
+fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, serde_json::Error> {
+    Ok(Some(match topic {
+        "/setup" => Message::Setup(serde_json::from_slice(json)?),
+        "/hello" => Message::Hello(serde_json::from_slice(json)?),
+        "/samples" => Message::Samples(serde_json::from_slice(json)?),
+        "/pose" => Message::Pose(serde_json::from_slice(json)?),
+        "/event" => Message::Event(serde_json::from_slice(json)?),
+        "/link" => Message::Link(serde_json::from_slice(json)?),
+        _ => return Ok(None),
+    }))
+}

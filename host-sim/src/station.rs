@@ -1,0 +1,293 @@
+//! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives (pages, the recording, the
+//! totals). In step with a simulated device, or in real time over a wire that may be pulled and come back.
+
+use crate::device::virtual_device::VirtualDevice;
+use crate::device::{Port, Wire};
+use crate::driver::{Driver, Request};
+use crate::failure::Failure;
+use crate::recording::messages::Hello;
+use crate::recording::write::Recorder;
+use crate::session::{Control, Publisher, RecordingStatus};
+use crate::tally::Tally;
+use link::codec::MAX_FRAME;
+use link::frames::DeviceFrame;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Ticks between two exchanges with a device that runs in step: 1 ms.
+const LOCKSTEP_TICKS: u64 = 10;
+/// A port that could not be opened is tried again after this.
+const RETRY: Duration = Duration::from_millis(300);
+/// How long to wait for the device in one go: short enough for heartbeats and a quick answer to a person.
+const PATIENCE: Duration = Duration::from_millis(2);
+/// A device that has never become ready after this is not one.
+const FIRST_ANSWER: Duration = Duration::from_secs(5);
+/// How much longer than asked for a run with gaps in it may take.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// Everybody who wants what arrives.
+pub struct Outlets {
+    /// The pages.
+    pub publisher: Publisher,
+    /// The recording.
+    pub recorder: Option<Recorder>,
+    /// The totals.
+    pub tally: Tally,
+    failure: Option<Failure>,
+}
+
+impl Outlets {
+    /// Nothing has arrived yet.
+    pub fn new(publisher: Publisher, recorder: Option<Recorder>, tally: Tally) -> Self {
+        Self { publisher, recorder, tally, failure: None }
+    }
+
+    fn frame(&mut self, frame: &DeviceFrame) {
+        if self.tally.is_full() {
+            return;
+        }
+        if let Err(failure) = self.deliver(frame) {
+            // The rest of the run must not write on: the file ends where the disk did.
+            self.recorder = None;
+            self.failure = Some(failure);
+        }
+    }
+
+    fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Failure> {
+        match frame {
+            DeviceFrame::Hello(hello) => {
+                self.tally.hello(Hello::from(hello));
+                self.publisher.hello(hello);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.hello(hello))
+            }
+            DeviceFrame::Samples(block) => {
+                let taken = self.tally.samples(&block.samples);
+                self.publisher.samples(block.first_tick, taken);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.samples(block.first_tick, taken))
+            }
+            DeviceFrame::Pose(pose) => {
+                self.publisher.pose(*pose);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.pose(pose))
+            }
+            DeviceFrame::Event(event) => {
+                self.tally.event(event);
+                self.publisher.event(*event);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.event(event))
+            }
+            DeviceFrame::Timing(timing) => {
+                self.publisher.timing(*timing);
+                Ok(())
+            }
+            DeviceFrame::Ack(_) => Ok(()),
+        }
+    }
+
+    fn status(&self, driver: &mut Driver, now: Duration) {
+        let counts = driver.counts();
+        let notice = driver.take_notice();
+        let recording =
+            self.recorder.as_ref().map(|r| RecordingStatus { file: r.file().to_owned(), bytes: r.bytes() });
+        let connected = driver.is_ready(now);
+        self.publisher.link(|status| {
+            status.connected = connected;
+            status.frames = counts.frames;
+            status.lost_frames = counts.lost_frames;
+            status.samples = counts.samples;
+            status.lost_samples = counts.lost_samples;
+            status.garbage = counts.garbage;
+            status.recording = recording;
+            if connected && notice.is_none() && status.notice.as_deref() == Some(WAITING) {
+                status.notice = None;
+            }
+            if notice.is_some() {
+                status.notice = notice;
+            }
+        });
+    }
+}
+
+/// What a page is told while there is no device.
+const WAITING: &str = "no answer from the device; waiting for it";
+
+/// A run in progress.
+pub struct Station<'a> {
+    driver: Driver,
+    outlets: Outlets,
+    /// Set from outside (Ctrl-C) to end the run in good order.
+    stop: &'a AtomicBool,
+    /// The person who started the program asked for a start once, not at every reconnection.
+    started: bool,
+}
+
+/// What a run came to.
+pub struct Outcome {
+    /// Totals of the link.
+    pub link: link::host::Counts,
+    /// Totals of what happened.
+    pub tally: Tally,
+    /// Size of the recording, where there was one.
+    pub recorded_bytes: Option<u64>,
+}
+
+impl<'a> Station<'a> {
+    /// Not connected yet.
+    pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
+        Self { driver, outlets, stop, started: false }
+    }
+
+    /// Runs a simulated device as fast as it goes, in step with it: the clock is the device's. `progress` sees the samples so
+    /// far, now and then.
+    pub fn run_in_step(
+        mut self,
+        mut device: VirtualDevice,
+        mut progress: impl FnMut(u64),
+    ) -> Result<Outcome, Failure> {
+        let mut bytes = [0; MAX_FRAME];
+        self.driver.connected(Duration::ZERO);
+        while !self.is_over() {
+            let now = Duration::from_micros(device.ticks() * 100);
+            while let Some(control) = self.outlets.publisher.next_control() {
+                self.control(control, |c| device.control(c));
+            }
+            self.start_once(now);
+            device.receive(self.driver.transmit(now));
+            for _ in 0..LOCKSTEP_TICKS {
+                device.tick();
+            }
+            loop {
+                match device.transmit(&mut bytes) {
+                    0 => break,
+                    count => self.driver.receive(now, &bytes[..count], |f| self.outlets.frame(f)),
+                }
+            }
+            if device.ticks().is_multiple_of(1_000) {
+                self.outlets.status(&mut self.driver, now);
+                progress(self.outlets.tally.samples);
+            }
+        }
+        self.finish()
+    }
+
+    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes and goes. `hand` takes what
+    /// only a simulated device understands.
+    pub fn run_in_real_time(
+        mut self,
+        port: &mut dyn Port,
+        seconds: Option<f64>,
+        mut hand: impl FnMut(Control),
+        mut progress: impl FnMut(u64),
+    ) -> Result<Outcome, Failure> {
+        let begin = Instant::now();
+        let mut wire: Option<Box<dyn Wire>> = None;
+        let mut next_try = Duration::ZERO;
+        let mut bytes = vec![0; 1 << 14];
+        while !self.is_over() {
+            let now = begin.elapsed();
+            if seconds.is_some_and(|s| now > Duration::from_secs_f64(s) + GRACE) {
+                break;
+            }
+            if let Some(open) = &mut wire {
+                if self.exchange(open.as_mut(), &mut bytes, now, begin).is_err() {
+                    wire = None;
+                    self.driver.disconnected();
+                }
+            } else if now >= next_try {
+                next_try = now + RETRY;
+                wire = port.open().ok();
+                if wire.is_some() {
+                    self.driver.connected(now);
+                }
+            } else {
+                std::thread::sleep(PATIENCE);
+            }
+            if !self.started && now > FIRST_ANSWER {
+                return Err(self.never_ready());
+            }
+            while let Some(control) = self.outlets.publisher.next_control() {
+                self.control(control, &mut hand);
+            }
+            self.start_once(now);
+            self.outlets.status(&mut self.driver, now);
+            if wire.is_none() || !self.driver.is_ready(now) {
+                self.outlets.publisher.link(|status| {
+                    status.notice.get_or_insert_with(|| WAITING.to_owned());
+                });
+            }
+            progress(self.outlets.tally.samples);
+        }
+        if let Some(mut open) = wire {
+            self.leave(open.as_mut(), begin);
+        }
+        self.finish()
+    }
+
+    fn exchange(
+        &mut self,
+        wire: &mut dyn Wire,
+        bytes: &mut [u8],
+        now: Duration,
+        begin: Instant,
+    ) -> std::io::Result<()> {
+        let out = self.driver.transmit(now);
+        if !out.is_empty() {
+            wire.write(out)?;
+        }
+        let count = wire.read(bytes, PATIENCE)?;
+        self.driver.receive(begin.elapsed(), &bytes[..count], |f| self.outlets.frame(f));
+        Ok(())
+    }
+
+    /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms later.
+    fn leave(&mut self, wire: &mut dyn Wire, begin: Instant) {
+        self.driver.request(Request::Stop);
+        for _ in 0..3 {
+            if wire.write(self.driver.transmit(begin.elapsed())).is_err() {
+                return;
+            }
+            std::thread::sleep(PATIENCE);
+        }
+    }
+
+    fn start_once(&mut self, now: Duration) {
+        if !self.started && self.driver.is_ready(now) {
+            self.started = true;
+            self.driver.request(Request::Start);
+        }
+    }
+
+    fn control(&mut self, control: Control, mut hand: impl FnMut(Control)) {
+        match control {
+            Control::Start => self.driver.request(Request::Start),
+            Control::Stop => self.driver.request(Request::Stop),
+            Control::Zero => self.driver.request(Request::Zero),
+            other => hand(other),
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.outlets.tally.is_full()
+            || self.outlets.failure.is_some()
+            || self.driver.refused().is_some()
+            || self.stop.load(Ordering::Relaxed)
+    }
+
+    fn never_ready(&self) -> Failure {
+        Failure::failed(format_args!(
+            "the device did not answer within {} s; check that it runs this project's firmware and is not in use elsewhere",
+            FIRST_ANSWER.as_secs()
+        ))
+    }
+
+    fn finish(mut self) -> Result<Outcome, Failure> {
+        let link = self.driver.counts();
+        let recorder = self.outlets.recorder.take();
+        let recorded_bytes = recorder.map(|recorder| recorder.finish(link.into())).transpose();
+        if let Some(failure) = self.outlets.failure {
+            return Err(failure);
+        }
+        if let Some(refused) = self.driver.refused() {
+            return Err(Failure::failed(refused));
+        }
+        Ok(Outcome { link, tally: self.outlets.tally, recorded_bytes: recorded_bytes? })
+    }
+}
