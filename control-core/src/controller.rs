@@ -5,8 +5,10 @@ use crate::event::{Fault, Limits, State, Transitions};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
 use crate::math::times;
+use crate::passivity::Observer;
 use crate::plan::Plan;
 use crate::safety::Limiter;
+use crate::thermal::Winding;
 use crate::tissue::Tissue;
 use crate::units::{
     Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
@@ -88,6 +90,8 @@ pub struct Controller {
     previous: Option<Counts>,
     speed: SpeedEstimator,
     tissue: Tissue,
+    observer: Observer,
+    winding: Winding,
     limiter: Limiter,
     silent_ticks: u32,
     tripped: Option<Fault>,
@@ -117,6 +121,8 @@ impl Controller {
             origin: Counts(0),
             previous: None,
             tissue: Tissue::default(),
+            observer: Observer::default(),
+            winding: Winding::default(),
             limiter: Limiter::default(),
             silent_ticks: 0,
             tripped: None,
@@ -156,6 +162,7 @@ impl Controller {
 
     fn power_up(&mut self, mode: Mode) {
         self.limiter.restart();
+        self.observer = Observer::default();
         self.silent_ticks = 0;
         self.mode = mode;
     }
@@ -167,11 +174,11 @@ impl Controller {
         let speed = self.speed.tick(&self.plan.scale, count);
         let tissue = self.tissue.tick(&self.plan.layers, count, depth, speed);
         self.watch_host();
-        let wanted = self.wanted_torque(tissue.force, depth, speed);
-        let (torque, limits) = match wanted {
-            Some(wanted) => self.limiter.tick(&self.plan.torque_limits, wanted),
+        let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
+            Some((wanted, limits)) => self.limit(wanted, limits),
             None => (MillinewtonMetres::default(), Limits::default()),
         };
+        self.winding.tick(&self.plan.thermal, torque);
         let dac = self.plan.dac.code(torque);
         let state = match self.mode {
             Mode::Running => tissue.state,
@@ -233,22 +240,35 @@ impl Controller {
         force: Newtons,
         depth: Millimetres,
         speed: MillimetresPerSecond,
-    ) -> Option<MillinewtonMetres> {
+    ) -> Option<(MillinewtonMetres, Limits)> {
         let radius = self.plan.config.device.roller_radius;
         match &mut self.mode {
             Mode::Running => {
-                let damping = fixed::types::I2F30::saturating_from_num(self.plan.config.damping.0);
-                let resisting = force.0.saturating_add(times(speed.0, damping));
-                Some(MillinewtonMetres(I16F16::ZERO.saturating_sub(resisting.saturating_mul(radius.0))))
+                let resisting = Newtons(force.0.saturating_add(times(speed.0, self.plan.damping)));
+                let (given, damped) = self.observer.tick(self.plan.passivity_damping, depth, resisting);
+                let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
+                let torque = I16F16::ZERO.saturating_sub(given.0.saturating_mul(radius.0));
+                Some((MillinewtonMetres(torque), limits))
             }
             Mode::Exciting(player) => {
                 let torque = player.tick(radius, depth, speed);
                 if torque.is_none() {
                     self.mode = Mode::Idle;
                 }
-                torque
+                torque.map(|torque| (torque, Limits::default()))
             }
             Mode::Idle | Mode::Faulted => None,
         }
+    }
+
+    fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
+        let most = self.plan.torque_limits.torque;
+        let allowed = self.winding.largest(&self.plan.thermal, most);
+        let cooled = wanted.0.clamp(-allowed, allowed);
+        let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(cooled));
+        let thermal = if cooled != wanted.0 && allowed < most { Limits::THERMAL } else { Limits::default() };
+        // Where the torque limit itself was reached, `cooled` hides it from the limiter.
+        let torque_limit = if wanted.0.saturating_abs() > most { Limits::TORQUE } else { Limits::default() };
+        (torque, in_force.with(thermal).with(torque_limit).with(limits))
     }
 }

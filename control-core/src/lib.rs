@@ -24,8 +24,10 @@ pub mod friction;
 pub mod jog;
 pub mod kinematics;
 mod math;
+mod passivity;
 pub mod plan;
 pub mod safety;
+mod thermal;
 pub mod tissue;
 pub mod units;
 

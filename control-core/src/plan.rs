@@ -7,6 +7,7 @@ use crate::friction::Law;
 use crate::jog;
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
 use crate::safety::{DacScale, TorqueLimits};
+use crate::thermal::ThermalLimits;
 use crate::tissue::{self, Layers};
 use crate::units::{Millimetres, Newtons};
 use core::fmt;
@@ -29,6 +30,9 @@ pub struct Plan {
     pub(crate) scale: Scale,
     pub(crate) layers: Layers,
     pub(crate) torque_limits: TorqueLimits,
+    pub(crate) thermal: ThermalLimits,
+    pub(crate) passivity_damping: I2F30,
+    pub(crate) damping: I2F30,
     pub(crate) dac: DacScale,
     pub(crate) travel_counts: i32,
     pub(crate) heartbeat_ticks: u32,
@@ -130,6 +134,9 @@ pub enum Field {
     Steps,
     DwellMs,
     Frequency,
+    ContinuousTorque,
+    WindingTimeS,
+    PassivityDamping,
 }
 
 impl fmt::Display for Refusal {
@@ -195,6 +202,9 @@ impl Plan {
                 slew_per_tick: config.limits.slew_per_tick.0,
                 fade_per_tick: I2F30::ONE / fade_ticks,
             },
+            thermal: ThermalLimits::new(config.limits.continuous_torque, config.limits.winding_time_s),
+            passivity_damping: I2F30::saturating_from_num(config.passivity_damping.0),
+            damping: I2F30::saturating_from_num(config.damping.0),
             dac,
             travel_counts: counts_reaching(config.limits.travel, mm_per_count),
             heartbeat_ticks: u32::from(config.limits.heartbeat_ms) * TICK_HZ / 1000,
@@ -250,6 +260,13 @@ fn check_device(config: &Config) -> Result<(), Refusal> {
     )?;
     within(Field::FullScaleTorque, device.full_scale_torque.0, milli(10_000), milli(500_000))?;
     within(Field::TorqueLimit, limits.torque.0, milli(100), device.full_scale_torque.0)?;
+    within(Field::ContinuousTorque, limits.continuous_torque.0, milli(3_000), milli(180_000))?;
+    within(
+        Field::WindingTimeS,
+        I16F16::from_num(limits.winding_time_s.min(30_000)),
+        milli(1_000),
+        milli(600_000),
+    )?;
     within(Field::SlewPerTick, limits.slew_per_tick.0, milli(1), milli(100_000))?;
     within(
         Field::FadeInMs,
@@ -280,7 +297,9 @@ fn check_device(config: &Config) -> Result<(), Refusal> {
             high: milli(1),
         });
     }
-    Ok(())
+    // 0.02 N·s/mm: at 50 mm/s a newton.
+    let passivity = I16F16::saturating_from_num(config.passivity_damping.0);
+    within(Field::PassivityDamping, passivity, I16F16::ZERO, milli(20))
 }
 
 fn check_friction(config: &Config) -> Result<(), Refusal> {

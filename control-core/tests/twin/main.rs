@@ -33,9 +33,20 @@ fn device() -> impl Strategy<Value = Device> {
 
 fn limits(device: Device) -> impl Strategy<Value = SafetyConfig> {
     let full = device.full_scale_torque.0.to_num::<f64>();
-    (0.1..=1.0_f64, 0.01..50.0_f64, 10..400_u16, 2..200_u16, 20.0..200.0_f64, 0.5..7.0_f64).prop_map(
-        move |(share, slew, fade_in_ms, max_counts_per_tick, travel, stiffness)| SafetyConfig {
+    let winding = (0.05..1.5_f64, 1..100_u16);
+    (0.1..=1.0_f64, 0.01..50.0_f64, 10..400_u16, 2..200_u16, 20.0..200.0_f64, 0.5..7.0_f64, winding).prop_map(
+        move |(
+            share,
+            slew,
+            fade_in_ms,
+            max_counts_per_tick,
+            travel,
+            stiffness,
+            (continuous, winding_time_s),
+        )| SafetyConfig {
             torque: MillinewtonMetres(q(full * share)),
+            continuous_torque: MillinewtonMetres(q((full * share * continuous).clamp(3.0, 180.0))),
+            winding_time_s,
             slew_per_tick: MillinewtonMetres(q(slew)),
             fade_in_ms,
             max_counts_per_tick,
@@ -119,6 +130,8 @@ fn valid_config() -> impl Strategy<Value = (Config, Plan)> {
                 limits,
                 speed,
                 damping: Damping(I8F24::from_bits(damping)),
+                // The observer decides by the sign of an energy; `passivity.rs` tests it by itself.
+                passivity_damping: Damping::default(),
                 friction,
                 layers: layers.into_iter().collect(),
             })

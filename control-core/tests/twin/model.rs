@@ -10,6 +10,7 @@ pub(crate) struct Twin {
     layers: Vec<LayerState>,
     anchor: f64,
     given: f64,
+    heat: f64,
     ticks: u32,
     counts: Vec<i32>,
     edges: Vec<(usize, i32)>,
@@ -37,6 +38,7 @@ impl Twin {
             layers,
             anchor: 0.0,
             given: 0.0,
+            heat: 0.0,
             ticks: 0,
             counts: Vec::new(),
             edges: vec![(0, 0)],
@@ -52,14 +54,24 @@ impl Twin {
         let force = force + speed * self.config.damping.0.to_num::<f64>();
         let device = self.config.device;
         let limits = self.config.limits;
-        let largest = limits.torque.0.to_num::<f64>();
+        let largest = self.largest_torque();
         let wanted = (-force * device.roller_radius.0.to_num::<f64>()).clamp(-largest, largest);
         self.ticks += 1;
         let faded = wanted * (f64::from(self.ticks) / (f64::from(limits.fade_in_ms) * 10.0)).min(1.0);
         let slew = limits.slew_per_tick.0.to_num::<f64>();
         self.given = faded.clamp(self.given - slew, self.given + slew);
+        let seconds = f64::from(limits.winding_time_s);
+        self.heat += (self.given * self.given - self.heat) / (seconds * 10_000.0);
         let span = f64::from(device.dac.span());
         (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-span, span)
+    }
+
+    /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
+    fn largest_torque(&self) -> f64 {
+        let most = self.config.limits.torque.0.to_num::<f64>();
+        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>().min(most);
+        let allowed = continuous * continuous;
+        continuous + (most - continuous) * ((allowed - self.heat) / (allowed / 5.0)).clamp(0.0, 1.0)
     }
 
     fn counts_at(&self, depth: f64) -> i32 {

@@ -1,0 +1,62 @@
+//! The motor's winding as one heat store: torque squared warms it, time cools it. Before the heat of the continuous
+//! torque is reached the torque limit falls to the continuous torque; that is a limit in force, not a fault.
+
+use crate::TICK_HZ;
+use crate::units::MillinewtonMetres;
+use fixed::types::{I2F30, I16F16, I32F32};
+
+/// The limit begins to fall when this much of the allowed heat is left: a fifth.
+const BLEND: i64 = 5;
+
+/// The model ready for the tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ThermalLimits {
+    continuous: I16F16,
+    /// Heat of the continuous torque in (mN·m)².
+    allowed: I32F32,
+    /// Share of the way to a torque's heat that a tick goes, times 2^10.
+    warming: I2F30,
+    /// 1/(allowed/5).
+    per_blend: I2F30,
+}
+
+impl ThermalLimits {
+    /// `time_constant_s` is the winding's, 1–600 s.
+    pub(crate) fn new(continuous: MillinewtonMetres, time_constant_s: u16) -> Self {
+        let allowed = I32F32::from(continuous.0) * I32F32::from(continuous.0);
+        let ticks = i64::from(time_constant_s.max(1)) * i64::from(TICK_HZ);
+        let blend = (allowed / BLEND).max(I32F32::ONE);
+        Self {
+            continuous: continuous.0,
+            allowed,
+            warming: I2F30::from_bits(i32::try_from((1_i64 << 40) / ticks).unwrap_or(i32::MAX)),
+            per_blend: I2F30::saturating_from_num(I32F32::ONE / blend),
+        }
+    }
+}
+
+/// Heat in (mN·m)²: what the squared torque has been, on average over the time constant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Winding {
+    heat: I32F32,
+}
+
+impl Winding {
+    /// One tick with `given` torque.
+    pub(crate) fn tick(&mut self, limits: &ThermalLimits, given: MillinewtonMetres) {
+        let towards: I32F32 = given.0.wide_mul(given.0).saturating_sub(self.heat);
+        // The step is a share of 2^-17 or less: in Q16 with 2^10 taken off last, nothing of it is lost.
+        let step = I16F16::saturating_from_num(towards >> 4).wide_mul(limits.warming);
+        self.heat = self.heat.saturating_add(I32F32::saturating_from_num(step >> 6));
+    }
+
+    /// The largest torque that the heat allows, between the continuous one and `most`.
+    pub(crate) fn largest(&self, limits: &ThermalLimits, most: I16F16) -> I16F16 {
+        if most <= limits.continuous {
+            return most;
+        }
+        let left: I16F16 = limits.allowed.saturating_sub(self.heat).max(I32F32::ZERO).saturating_to_num();
+        let share: I2F30 = left.wide_mul(limits.per_blend).min(fixed::types::I18F46::ONE).to_num();
+        limits.continuous.saturating_add(crate::math::times(most.saturating_sub(limits.continuous), share))
+    }
+}

@@ -1,0 +1,147 @@
+//! The protections that only show over time: the winding's heat and the energy of a stiff wall. Each is also seen to
+//! matter: without it the bound that it holds is broken.
+
+use control_core::config::{Config, FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::event::Limits;
+use control_core::units::{
+    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+};
+use control_core::{Controller, Order, Plan, TickInput, TickOutput};
+use fixed::types::I16F16;
+
+fn q(value: f64) -> I16F16 {
+    I16F16::from_num(value)
+}
+
+/// One stiff wall that does not give way within reach.
+fn stiff_wall() -> Config {
+    let parabola = |vertex: f64, compliance: f64, base: f64| Parabola {
+        vertex: Millimetres(q(vertex)),
+        compliance: JogCompliance(q(compliance)),
+        base: Newtons(q(base)),
+    };
+    let friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
+    let mut config = Config { friction, ..Config::default() };
+    config.limits.stiffness = Stiffness(q(7.0));
+    let wall = Wall {
+        // (T + 5)²/1.8 − 13.9: 5.6 N/mm at contact, and hardly more where the test presses.
+        elastic: parabola(-5.0, 1.8, -25.0 / 1.8),
+        puncture_travel: Millimetres(q(0.4)),
+        relief: parabola(1.0, 1.0, 0.0),
+        unload: Stiffness(q(1.0)),
+    };
+    config.layers = [Layer {
+        tissue: Tissue::Other,
+        top: Millimetres(q(0.0)),
+        wall: Some(wall),
+        friction: FrictionPerMillimetre(q(0.0)),
+    }]
+    .into_iter()
+    .collect();
+    config
+}
+
+/// 30 g of needle and roller under a light hand, stepped at 10 µs.
+struct Needle {
+    position_m: f64,
+    speed_m_per_s: f64,
+}
+
+impl Needle {
+    fn step(&mut self, aim: f64, resisting_n: f64) {
+        let (mass, spring, hand_damping, damping, dt) = (0.030, 100.0, 0.02, 0.02, 1e-5);
+        for _ in 0..10 {
+            let hand = spring * (aim - self.position_m) - hand_damping * self.speed_m_per_s;
+            self.speed_m_per_s += (hand - damping * self.speed_m_per_s - resisting_n) / mass * dt;
+            self.position_m += self.speed_m_per_s * dt;
+        }
+    }
+}
+
+/// Deviation of the needle in the last half second of three, in µm, and how often the observer was in force.
+fn ringing(config: &Config) -> (f64, usize) {
+    let plan = Plan::new(config).expect("a sound wall");
+    let per_count_m = plan.mm_per_count().to_num::<f64>() / 1000.0;
+    let zero = f64::from(plan.zero_torque_code().0);
+    let mut c = Controller::new(plan);
+    c.order(Order::Start);
+    let mut needle = Needle { position_m: 0.0, speed_m_per_s: 0.0 };
+    let (mut track, mut in_force) = (Vec::new(), 0);
+    for tick in 0..30_000 {
+        c.order(Order::Heartbeat);
+        // The hand leans on the wall over a second: 0.4 N, 60 µm into it.
+        let aim = 0.004 * (f64::from(tick) / 10_000.0).min(1.0);
+        if tick == 20_000 {
+            needle.speed_m_per_s += 0.03;
+        }
+        let count = Counts((needle.position_m / per_count_m).floor() as i32);
+        let output = c.tick(TickInput { count, ..TickInput::default() });
+        in_force += usize::from(output.limits.contains(Limits::PASSIVITY));
+        // 28.8 mN·m over 2,047 steps at 10 mm.
+        needle.step(aim, (zero - f64::from(output.dac.0)) * 28.8 / 2047.0 / 10.0);
+        track.push(needle.position_m * 1e6);
+    }
+    let tail = &track[25_000..];
+    let mean = tail.iter().sum::<f64>() / tail.len() as f64;
+    ((tail.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / tail.len() as f64).sqrt(), in_force)
+}
+
+#[test]
+fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
+    let with = stiff_wall();
+    let without = Config { passivity_damping: Damping::default(), ..with.clone() };
+    let ((quiet, in_force), (loud, never)) = (ringing(&with), ringing(&without));
+    println!(
+        "deviation without the observer {loud:.1} µm, with it {quiet:.1} µm; in force for {in_force} ticks"
+    );
+    assert!(loud > 50.0, "it should ring without the observer: {loud} µm");
+    assert!(quiet < 8.0, "it should be quiet with the observer: {quiet} µm, one count is 15.7 µm");
+    assert!(in_force > 0 && never == 0);
+}
+
+/// Holds a strong wall for `seconds`; every tick's torque in mN·m and limits go to `see`.
+fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &TickOutput)) {
+    let mut config = stiff_wall();
+    config.device.full_scale_torque = MillinewtonMetres(q(60.0));
+    config.limits.torque = MillinewtonMetres(q(60.0));
+    config.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
+    config.limits.winding_time_s = 2;
+    if let Some(wall) = &mut config.layers[0].wall {
+        wall.puncture_travel = Millimetres(q(0.75));
+    }
+    let plan = Plan::new(&config).expect("sound");
+    // 0.7 mm into 7 N/mm: about 5 N, 50 mN·m.
+    let count = Counts((0.7 / plan.mm_per_count().to_num::<f64>()) as i32);
+    let zero = f64::from(plan.zero_torque_code().0);
+    let mut c = Controller::new(plan);
+    c.tick(TickInput { count, ..TickInput::default() });
+    c.order(Order::Start);
+    for _ in 0..seconds * 10_000 {
+        c.order(Order::Heartbeat);
+        let output = c.tick(TickInput { count, ..TickInput::default() });
+        see((zero - f64::from(output.dac.0)) * 60.0 / 2047.0, &output);
+    }
+}
+
+#[test]
+fn torque_falls_to_the_continuous_one_before_the_winding_is_as_hot_as_it_may_be() {
+    // The winding by itself, in floating point: the mean square over its time constant.
+    let (mut heat, mut hottest, mut last, mut told, mut faults) = (0.0, 0.0_f64, 0.0, false, 0);
+    hold_strong(28.8, 20, |torque, output| {
+        heat += (torque * torque - heat) / 20_000.0;
+        hottest = hottest.max(heat);
+        last = torque;
+        told |= output.limits.contains(Limits::THERMAL);
+        faults += usize::from(output.tripped.is_some());
+    });
+    assert!(hottest.sqrt() <= 28.8 * 1.001, "{} mN·m over the time constant", hottest.sqrt());
+    assert!((last - 28.8).abs() < 0.5, "{last} mN·m in the end");
+    assert!(told && faults == 0, "it is a limit in force, not a fault");
+
+    let (mut heat, mut told) = (0.0, false);
+    hold_strong(60.0, 20, |torque, output| {
+        heat += (torque * torque - heat) / 20_000.0;
+        told |= output.limits.contains(Limits::THERMAL);
+    });
+    assert!(heat.sqrt() > 40.0 && !told, "without the limit the winding reaches {}", heat.sqrt());
+}
