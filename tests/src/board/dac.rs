@@ -1,7 +1,7 @@
 //! Channel 1 of the digital-to-analogue converter, RM0090 chapter 14: a code in, a pin out.
 //!
-//! Left out: triggers from timers, DMA, wave generation, channel 2's pin. A code written without a
-//! trigger reaches the output one APB clock later, which the model takes as at once.
+//! Left out: DMA, wave generation, channel 2's pin, and the three or so APB clocks from a write or a
+//! trigger to the output. A trigger from a timer is the board's to bring: [`Dac::trigger`].
 
 use rigless::chip::parallel::Peer;
 use rigless::device::DeviceContext;
@@ -21,10 +21,17 @@ const DOR1: u64 = 0x2C;
 const EN1: u32 = 1;
 /// `CR.TEN1`: a held code waits for its trigger.
 const TEN1: u32 = 1 << 2;
+/// `CR.TSEL1` that selects software.
+const SOFTWARE: u32 = 0b111;
+
+/// Which trigger lets a held code out, `CR.TSEL1`.
+fn selected(control: u32) -> u32 {
+    control >> 3 & 0b111
+}
 
 /// The converter.
 #[derive(Debug, Default)]
-pub struct Dac {
+pub(super) struct Dac {
     control: u32,
     held: u16,
     output: u16,
@@ -33,8 +40,28 @@ pub struct Dac {
 impl Dac {
     /// The code at the output, or `None` while the pin is not driven.
     #[must_use]
-    pub fn code(&self) -> Option<u16> {
+    pub(super) fn code(&self) -> Option<u16> {
         (self.control & EN1 != 0).then_some(self.output)
+    }
+
+    /// The trigger that the held code waits for, as `TSEL1` numbers it; `None` where it waits for
+    /// none, or for software.
+    pub(super) fn waits_for(&self) -> Option<u32> {
+        let trigger = selected(self.control);
+        let waits = self.control & (EN1 | TEN1) == EN1 | TEN1 && trigger != SOFTWARE;
+        (waits && self.held != self.output).then_some(trigger)
+    }
+
+    fn hold(&mut self, code: u16) {
+        self.held = code;
+        if self.control & TEN1 == 0 {
+            self.output = code;
+        }
+    }
+
+    /// The trigger came.
+    pub(super) fn trigger(&mut self) {
+        self.output = self.held;
     }
 }
 
@@ -55,14 +82,11 @@ impl Peer for Dac {
     fn write(&mut self, offset: u64, _width: Width, value: u64, _context: &mut DeviceContext<'_>) {
         match offset {
             CR => self.control = value as u32,
-            SWTRIGR if value & 1 != 0 => self.output = self.held,
-            DHR12R1 | DHR12RD => self.held = (value & 0xFFF) as u16,
-            DHR12L1 | DHR12LD => self.held = (value >> 4 & 0xFFF) as u16,
-            DHR8R1 | DHR8RD => self.held = ((value & 0xFF) << 4) as u16,
+            SWTRIGR if value & 1 != 0 && selected(self.control) == SOFTWARE => self.trigger(),
+            DHR12R1 | DHR12RD => self.hold((value & 0xFFF) as u16),
+            DHR12L1 | DHR12LD => self.hold((value >> 4 & 0xFFF) as u16),
+            DHR8R1 | DHR8RD => self.hold(((value & 0xFF) << 4) as u16),
             _ => {}
-        }
-        if self.control & TEN1 == 0 {
-            self.output = self.held;
         }
     }
 

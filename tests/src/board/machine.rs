@@ -72,6 +72,10 @@ impl Machine {
     pub(super) fn dac(&self) -> &Dac {
         self.mcu.chip()
     }
+
+    pub(super) fn dac_mut(&mut self) -> &mut Dac {
+        self.mcu.chip_mut()
+    }
 }
 
 /// The pin at `index` of a port.

@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod dac;
+pub mod elf;
 pub mod flash;
 mod machine;
 pub mod otg;
@@ -26,11 +27,10 @@ use rigless::session::Session;
 use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
-pub use dac::Dac;
 pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use processor::{HandlerRun, Jump, Probe};
-pub use run::{DacWrite, EncoderRead, Log, Stopped};
+pub use processor::{Effect, HandlerRun, Probe, Upset};
+pub use run::{EncoderRead, Log, Output, Stopped};
 pub use usb_port::UsbPort;
 
 use machine::Machine;
@@ -52,10 +52,14 @@ impl Timer {
     /// The address of its counter.
     #[must_use]
     pub fn count_address(self) -> u64 {
-        const COUNT: u64 = 0x24;
+        self.base() + 0x24
+    }
+
+    /// The address of its first register.
+    fn base(self) -> u64 {
         match self {
-            Self::General(n) => 0x4000_0000 + 0x400 * n as u64 + COUNT,
-            Self::Advanced(n) => 0x4001_0000 + 0x400 * n as u64 + COUNT,
+            Self::General(n) => 0x4000_0000 + 0x400 * n as u64,
+            Self::Advanced(n) => 0x4001_0000 + 0x400 * n as u64,
         }
     }
 }
@@ -121,7 +125,8 @@ pub struct Board {
     thread: Option<JoinHandle<Result<(), String>>>,
     probe: Probe,
     flash: flash::Flash,
-    symbols: Symbols,
+    symbols: Vec<elf::Symbol>,
+    endless_loop: Option<u32>,
     stack: Option<(u64, u64)>,
     now: Nanos,
 }
@@ -133,31 +138,32 @@ impl Board {
         let refuse = |why: String| Refused(format!("{}: {why}", path.display()));
         let bytes = std::fs::read(path)
             .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
-        let symbols =
-            Symbols::read(&bytes, |address| address & !1).map_err(|error| refuse(error.to_string()))?;
+        let (symbols, endless_loop) = (elf::symbols(&bytes), elf::endless_loop(&bytes));
+        // The linker's own names have no type, so the emulator's reader finds them.
+        let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
         let (probe, flash) = (Probe::default(), flash::Flash::default());
         let machine =
             Machine::new(&wiring, probe.clone(), flash.clone()).map_err(|error| refuse(error.to_string()))?;
         let session =
             Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
-        let find = |name: &str| symbols.get(name).ok();
+        let find = |name: &str| places.get(name).ok();
         let stack = find("_stack_start").map(|top| {
             // The stack ends where the image says, or at the foot of the memory its top is in.
             let low =
                 ["_stack_end", "__euninit"].into_iter().filter_map(find).find(|low| same_memory(*low, top));
             (low.unwrap_or((top - 1) & !0xFFFF), top)
         });
-        let places = run::Symbols { rtt: find("_SEGGER_RTT"), stack };
+        let known = run::Symbols { rtt: find("_SEGGER_RTT"), stack };
         let (orders, taken) = channel();
         let (answer, done) = channel();
-        let world = World::new(wiring, places, Box::new(plant), taken, answer);
+        let world = World::new(wiring, known, Box::new(plant), taken, answer);
         let thread = std::thread::spawn(move || {
             let images = [image];
             let finished = emulator::run(session, &Start::new(&images), world);
             finished.map(drop).map_err(|error| error.to_string())
         });
-        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, stack, now: 0 })
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, endless_loop, stack, now: 0 })
     }
 
     fn order(&mut self, order: Order) {
@@ -232,10 +238,16 @@ impl Board {
         self.flash.clone()
     }
 
-    /// The address of the function or object called `name` in the image.
+    /// Every function and object of the image.
     #[must_use]
-    pub fn symbol(&self, name: &str) -> Option<u64> {
-        self.symbols.get(name).ok()
+    pub fn symbols(&self) -> &[elf::Symbol] {
+        &self.symbols
+    }
+
+    /// An address in the image where a jump never ends.
+    #[must_use]
+    pub fn endless_loop(&self) -> Option<u32> {
+        self.endless_loop
     }
 
     /// The most stack the firmware has used, and what it has, in bytes; `None` where the image

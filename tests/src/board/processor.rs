@@ -44,15 +44,24 @@ pub struct HandlerRun {
     pub instructions: u32,
 }
 
-/// Where the program counter goes, and when.
+/// Something that goes wrong inside the core, and when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Jump {
+pub struct Upset {
     /// The exception that has to be running; 0 is thread mode.
     pub exception: u32,
     /// How many of its instructions it may do first.
     pub after: u32,
-    /// Where it goes on. Bit 0 is ignored.
-    pub to: u32,
+    /// What happens then.
+    pub effect: Effect,
+}
+
+/// What goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// The program goes on at this address. Bit 0 is ignored.
+    Jump(u32),
+    /// The core does nothing for this many instructions' time, interrupts included.
+    Stall(u64),
 }
 
 /// What a probe counts and does.
@@ -66,10 +75,10 @@ pub struct Tally {
     pub thread: u64,
     /// The lowest main stack pointer seen while profiling.
     pub lowest_sp: Option<u32>,
-    /// A jump still to come.
-    pub jump: Option<Jump>,
-    /// Instructions done in the exception a jump waits for.
-    jump_progress: u32,
+    /// An upset still to come.
+    pub upset: Option<Upset>,
+    /// Instructions done in the exception the upset waits for.
+    upset_progress: u32,
 }
 
 /// Shared between the test and the core.
@@ -98,13 +107,15 @@ pub(super) struct Probed {
     core: Box<dyn Processor>,
     probe: Probe,
     flash: Flash,
+    /// Instructions' time in which nothing ran.
+    stalled: u64,
     /// The handlers under way, innermost last.
     active: Vec<Active>,
 }
 
 impl Probed {
     pub(super) fn new(core: Box<dyn Processor>, probe: Probe, flash: Flash) -> Self {
-        Self { core, probe, flash, active: Vec::new() }
+        Self { core, probe, flash, stalled: 0, active: Vec::new() }
     }
 
     /// Has every access to the sectors the firmware writes to go over the bus.
@@ -112,6 +123,12 @@ impl Probed {
         for page in WRITABLE.step_by(self.core.page_size() as usize) {
             self.core.ask(Queued::Route(page));
         }
+    }
+
+    /// Whether the core has to be looked at after every instruction.
+    fn steps(&self) -> bool {
+        let tally = self.probe.tally();
+        tally.profile || tally.upset.is_some()
     }
 
     fn register(&self, number: usize) -> u32 {
@@ -125,6 +142,7 @@ impl Probed {
 
     /// Runs one instruction at a time and looks at the core after each.
     fn run_stepping(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
+        let stalled_before = self.stalled;
         let mut retired = 0;
         while retired < u64::from(budget) {
             let (exit, did) = self.core.run(1, bus);
@@ -132,8 +150,12 @@ impl Probed {
             if did > 0 {
                 self.account(did as u32);
             }
-            let more = self.probe.tally().profile || self.probe.tally().jump.is_some();
-            if exit != Exit::Budget || !more {
+            let stalled = self.stalled - stalled_before;
+            if stalled > 0 {
+                // Time has passed: the run looks at what is due.
+                return (Exit::Returned, retired + stalled);
+            }
+            if exit != Exit::Budget || !self.steps() {
                 return (exit, retired);
             }
         }
@@ -146,7 +168,7 @@ impl Probed {
     fn account(&mut self, did: u32) {
         let exception = self.exception();
         let sp = self.register(REGISTER_SP);
-        let count = self.core.retired();
+        let count = self.retired();
         let probe = self.probe.clone();
         let mut tally = probe.tally();
         if tally.profile {
@@ -173,15 +195,19 @@ impl Probed {
             let from = count - u64::from(instructions);
             self.active.push(Active { exception, sp, run: HandlerRun { from, instructions } });
         }
-        let due = tally.jump.is_some_and(|jump| jump.exception == exception);
-        if due {
-            tally.jump_progress += did;
-            if let Some(jump) = tally.jump
-                && tally.jump_progress > jump.after
-            {
-                tally.jump = None;
-                tally.jump_progress = 0;
-                self.core.set_gdb_register(REGISTER_PC, &(jump.to & !1).to_le_bytes());
+        if let Some(upset) = tally.upset
+            && upset.exception == exception
+        {
+            tally.upset_progress += did;
+            if tally.upset_progress > upset.after {
+                tally.upset = None;
+                tally.upset_progress = 0;
+                match upset.effect {
+                    Effect::Jump(to) => {
+                        self.core.set_gdb_register(REGISTER_PC, &(to & !1).to_le_bytes());
+                    }
+                    Effect::Stall(instructions) => self.stalled += instructions,
+                }
             }
         }
     }
@@ -207,12 +233,8 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let mut bus = Rerouted { bus, flash: &flash };
-        let stepping = {
-            let tally = self.probe.tally();
-            tally.profile || tally.jump.is_some()
-        };
-        if stepping { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
+        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled };
+        if self.steps() { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
     }
 
     fn reset(&mut self) {
@@ -222,7 +244,7 @@ impl Processor for Probed {
     }
 
     fn retired(&self) -> u64 {
-        self.core.retired()
+        self.core.retired() + self.stalled
     }
 
     fn ask(&mut self, queued: Queued) {
@@ -309,6 +331,7 @@ impl Processor for Probed {
 struct Rerouted<'a> {
     bus: &'a mut dyn CoreBus,
     flash: &'a Flash,
+    stalled: u64,
 }
 
 impl CoreBus for Rerouted<'_> {
@@ -328,11 +351,15 @@ impl CoreBus for Rerouted<'_> {
             self.flash.array().register_written(access.address, access.value as u32);
         }
         access.address = window(access.address);
+        if self.stalled > 0 {
+            access.instruction_count += self.stalled;
+            access.virtual_time = self.bus.time(access.instruction_count);
+        }
         self.bus.access(access, from_code)
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {
-        self.bus.time(instructions)
+        self.bus.time(instructions + self.stalled)
     }
 
     fn queued(&mut self) -> Vec<Queued> {
@@ -340,11 +367,11 @@ impl CoreBus for Rerouted<'_> {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        self.bus.carry_on(instructions, event)
+        self.bus.carry_on(instructions + self.stalled, event)
     }
 
     fn acknowledge(&mut self, line: InterruptLine, instructions: u64) -> Option<u64> {
-        self.bus.acknowledge(line, instructions)
+        self.bus.acknowledge(line, instructions + self.stalled)
     }
 
     fn read_checked(&mut self, access: Access, report: bool) -> Option<Checked> {

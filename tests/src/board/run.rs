@@ -16,16 +16,14 @@ use super::tilt::Accelerometer;
 use super::usb_port::UsbPort;
 use super::{Timer, Wiring, rtt};
 
-/// A write of a new code to the DAC.
+/// A code on its way to the motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DacWrite {
+pub struct Output {
     /// When.
     pub at: Nanos,
-    /// The run's instruction count then.
-    pub instruction: u64,
     /// The code.
     pub code: u16,
-    /// Nanoseconds since the tick timer last came round, where the wiring names one.
+    /// Nanoseconds since the tick's timer last came round, where the wiring names one.
     pub since_tick: Option<Nanos>,
 }
 
@@ -41,8 +39,10 @@ pub struct EncoderRead {
 /// What the pins did.
 #[derive(Debug, Clone, Default)]
 pub struct Log {
-    /// Every write to DAC channel 1.
-    pub dac: Vec<DacWrite>,
+    /// Every write of a code to DAC channel 1.
+    pub written: Vec<Output>,
+    /// Every change of the code at its pin, which a trigger may delay.
+    pub put_out: Vec<Output>,
     /// Every read of the encoder's counter.
     pub encoder: Vec<EncoderRead>,
     /// Every change of the amplifier's enable line, with what it became.
@@ -115,6 +115,12 @@ impl Stopped<'_> {
         self.session.resets().to_vec()
     }
 
+    /// Pends external interrupt `line` once, as an edge at its source would.
+    pub fn pulse(&mut self, line: u16) {
+        let line = rigless::emulator::InterruptLine::new(line).expect("a line of the part");
+        self.session.pulse(line, self.host);
+    }
+
     /// Pulls the reset pin low for a moment, as a supply supervisor does in a dip.
     pub fn reset_by_pin(&mut self) {
         self.session.reset_by_pin(VirtualNanos(self.at), self.instruction, self.host);
@@ -162,6 +168,8 @@ pub(super) struct World {
     next_drain: Nanos,
     target: Nanos,
     enabled: bool,
+    code: Option<u16>,
+    latch_at: Option<Nanos>,
     busy: bool,
     painted: bool,
     log: Log,
@@ -191,6 +199,8 @@ impl World {
             next_drain: 0,
             target: 0,
             enabled: false,
+            code: None,
+            latch_at: None,
             busy: false,
             painted: false,
             log: Log::default(),
@@ -259,18 +269,55 @@ impl World {
     }
 
     fn since_tick(&self, session: &mut Session<Machine>, at: Nanos) -> Option<Nanos> {
-        use rigless::mcu::Operate;
         let (timer, hertz) = self.wiring.tick?;
-        let mcu = &mut session.board_mut().mcu;
-        let count = mcu.peek(VirtualNanos(at), timer.count_address(), Width::W32).ok()?;
+        let count = timer_register(session, at, timer, COUNT)?;
         Some(count * 1_000_000_000 / hertz)
+    }
+
+    /// Notes a new code at the DAC's pin.
+    fn watch_output(&mut self, session: &mut Session<Machine>, at: Nanos) {
+        let code = session.board().dac().code();
+        if code != self.code {
+            self.code = code;
+            if let Some(code) = code {
+                let since_tick = self.since_tick(session, at);
+                self.log.put_out.push(Output { at, code, since_tick });
+            }
+        }
+    }
+
+    /// When the trigger comes that a held code waits for: the compare of the tick's timer.
+    fn trigger_due(&self, session: &mut Session<Machine>, at: Nanos) -> Option<Nanos> {
+        const TIM4_TRGO: u32 = 0b101;
+        let (timer, hertz) = self.wiring.tick?;
+        if session.board().dac().waits_for()? != TIM4_TRGO || timer != Timer::General(2) {
+            return None;
+        }
+        let mut register = |offset| timer_register(session, at, timer, offset);
+        let (count, reload) = (register(COUNT)?, register(TIM_ARR)?);
+        let (compare, control) = (register(TIM_CCR1)?, register(TIM_CR2)?);
+        if control >> 4 & 0b111 != MMS_COMPARE_1 {
+            return None;
+        }
+        let counts = if count < compare { compare - count } else { compare + reload + 1 - count };
+        Some(at + counts * 1_000_000_000 / hertz)
     }
 }
 
+fn timer_register(session: &mut Session<Machine>, at: Nanos, timer: Timer, offset: u64) -> Option<u64> {
+    use rigless::mcu::Operate;
+    session.board_mut().mcu.peek(VirtualNanos(at), timer.base() + offset, Width::W32).ok()
+}
+
+const COUNT: u64 = 0x24;
 const GPIO_FIRST: u64 = 0x4002_0000;
 const GPIO_LAST: u64 = 0x4002_2BFF;
 const DHR12R1: u64 = 0x08;
-const DHR8R1: u64 = 0x10;
+/// Offsets in a timer, and what makes its compare channel 1 its trigger output.
+const TIM_CR2: u64 = 0x04;
+const TIM_ARR: u64 = 0x2C;
+const TIM_CCR1: u64 = 0x34;
+const MMS_COMPARE_1: u64 = 0b100;
 const RCC_AHB2RSTR: u64 = 0x4002_3814;
 const OTGFSRST: u64 = 1 << 7;
 
@@ -281,11 +328,14 @@ impl Driver<Machine> for World {
                 let at = access.virtual_time.0;
                 let write = access.kind == AccessKind::Write;
                 match access.address {
-                    address if write && (DAC.2 + DHR12R1..=DAC.2 + DHR8R1).contains(&address) => {
-                        let code = session.board().dac().code().unwrap_or_default();
-                        let since_tick = self.since_tick(session, at);
-                        let instruction = access.instruction_count;
-                        self.log.dac.push(DacWrite { at, instruction, code, since_tick });
+                    address if write && (DAC.2..DAC.2 + DAC.1).contains(&address) => {
+                        if address == DAC.2 + DHR12R1 {
+                            let since_tick = self.since_tick(session, at);
+                            self.log.written.push(Output { at, code: value as u16, since_tick });
+                        }
+                        self.watch_output(session, at);
+                        self.latch_at = self.trigger_due(session, at);
+                        session.pause_at(self.latch_at.map(VirtualNanos));
                     }
                     GPIO_FIRST..=GPIO_LAST if write => self.watch_enable(session, at),
                     address if !write && address == self.wiring.encoder.count_address() => {
@@ -300,6 +350,11 @@ impl Driver<Machine> for World {
             Settled::Stop(stop) => {
                 if !self.painted {
                     self.paint_stack(host);
+                }
+                if self.latch_at.is_some_and(|due| due <= stop.at.0) {
+                    self.latch_at = None;
+                    session.board_mut().dac_mut().trigger();
+                    self.watch_output(session, stop.at.0);
                 }
                 let resets = session.resets();
                 if resets.last().is_some_and(|reset| reset.at == stop.at) {
@@ -345,6 +400,8 @@ impl World {
     /// A restart leaves every pin floating; the encoder's tracks stay where the shaft is.
     fn after_reset(&mut self, session: &mut Session<Machine>, at: Nanos) {
         self.watch_enable(session, at);
+        self.watch_output(session, at);
+        self.latch_at = None;
         let levels = self.encoder.levels();
         self.drive_encoder(session, at, levels);
     }
