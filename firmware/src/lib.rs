@@ -1,1 +1,19 @@
-//! firmware
+//! The parts of the firmware that need no hardware: the order in which torque is given and taken away ([`drive`]), the
+//! tilt sensors ([`tilt`]), who has to report before the watchdog is fed ([`supervision`]), what a reset means
+//! ([`reset`]), the configuration in flash ([`store`]), and every timing constant with its reason ([`timing`]).
+//!
+//! Nothing here may name a register, a pin or an interrupt: those stay in the binary's `board` folder. All of it is
+//! tested on the host.
+#![no_std]
+#![deny(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod drive;
+pub mod reset;
+pub mod stages;
+pub mod store;
+pub mod supervision;
+pub mod tilt;
+pub mod timing;

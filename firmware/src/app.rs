@@ -1,0 +1,102 @@
+//! The tasks of the firmware and nothing else: which interrupt starts them and at which priority. What they do is in
+//! [`crate::tasks`], what they do it with in [`crate::board`].
+//!
+//! No task shares anything by lock. Orders go to the tick and samples come from it through queues with one writer and one
+//! reader; single words go through atomics ([`crate::tasks::shared`]).
+
+// RTIC takes priorities as literals only: these hold them to the ones that `timing` explains.
+const _: () = {
+    use firmware::timing::priority::{SUPERVISOR, SUPPLY, TELEMETRY, TICK, TILT, USB};
+    assert!(TICK == 16 && SUPPLY == 15 && SUPERVISOR == 4 && USB == 3 && TELEMETRY == 2 && TILT == 1);
+};
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use crate::board::{self, Statics};
+    use crate::tasks::queues::Queues;
+    use crate::tasks::supervisor::Watch;
+    use crate::tasks::supply::Supply;
+    use crate::tasks::telemetry::Telemetry;
+    use crate::tasks::tick::Tick;
+    use crate::tasks::tilt::Tilt;
+    use crate::tasks::usb::Port;
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        tick: Tick,
+        supply: Supply,
+        supervisor: Watch,
+        usb: Port,
+        telemetry: Telemetry,
+        tilt: Tilt,
+    }
+
+    #[init(local = [queues: Queues = Queues::new(), statics: Statics = Statics::new()])]
+    fn init(context: init::Context) -> (Shared, Local) {
+        let ends = context.local.queues.split();
+        let parts = board::init(context.core, context.device, context.local.statics);
+        let local = Local {
+            tick: Tick::new(parts.tick_timer, parts.encoder, parts.drive, &parts.plan, ends.tick),
+            supply: parts.supply,
+            supervisor: Watch::new(parts.watchdog, parts.debug),
+            usb: Port::new(parts.usb_device, parts.usb_class, ends.usb),
+            telemetry: Telemetry::new(
+                parts.identity,
+                &parts.plan,
+                parts.reset_cause,
+                parts.store,
+                ends.telemetry,
+            ),
+            tilt: Tilt::new(parts.tilt),
+        };
+        (Shared {}, local)
+    }
+
+    /// Nothing to do: sleeps until an interrupt.
+    #[idle]
+    fn idle(_: idle::Context) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses it takes torque away
+    /// and says so. Above every other task; no critical section masks it; never logs, never waits.
+    #[task(binds = TIM4, priority = 16, local = [tick])]
+    fn tick(context: tick::Context) {
+        context.local.tick.run();
+    }
+
+    /// The supply falls: torque goes before the brown-out reset comes.
+    #[task(binds = PVD, priority = 15, local = [supply])]
+    fn supply(context: supply::Context) {
+        context.local.supply.run();
+    }
+
+    /// Every millisecond: sets the others off, hears who is alive, feeds the watchdog. Deadline: its period.
+    #[task(binds = SysTick, priority = 4, local = [supervisor])]
+    fn supervisor(context: supervisor::Context) {
+        context.local.supervisor.run();
+    }
+
+    /// Moves packets between the USB core and the queues. Set off by the core and by the supervisor.
+    #[task(binds = OTG_FS, priority = 3, local = [usb])]
+    fn usb(context: usb::Context) {
+        context.local.usb.run();
+    }
+
+    /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that this board does not use.
+    #[task(binds = USART2, priority = 2, local = [telemetry])]
+    fn telemetry(context: telemetry::Context) {
+        context.local.telemetry.run();
+    }
+
+    /// Reads the tilt sensor. On the interrupt of a serial port that this board does not use.
+    #[task(binds = USART3, priority = 1, local = [tilt])]
+    fn tilt(context: tilt::Context) {
+        context.local.tilt.run();
+    }
+}

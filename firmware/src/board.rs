@@ -1,0 +1,307 @@
+//! The board, STM32F4DISCOVERY (MB997, STM32F407VG): which pin does what, and the clocks. No other file names a pin.
+//!
+//! | pin | does | remark |
+//! | --- | --- | --- |
+//! | PA15, PA1 | encoder A, B (TIM2, 32 bit) | both free on the board; PA0 has the button, PA5 the accelerometer |
+//! | PA4 | motor set value, 12 bit (DAC 1) | shared with the audio codec, which is held in reset |
+//! | PD4 | codec reset | low for good |
+//! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
+//! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ |
+//! | PA5, PA6, PA7, PE3 | accelerometer: SCK, MISO, MOSI, select | on the board |
+//! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
+//! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
+//! | PA11, PA12 | USB | the micro-USB connector CN5 |
+//! | PD12 | green LED: running | on the board |
+
+mod crash;
+mod flash;
+mod outputs;
+pub(crate) mod usb;
+
+use crate::tasks::supply::{PVD_LINE, Supply};
+use control_core::event::Fault;
+use control_core::units::Counts;
+use control_core::{Config, Plan};
+use firmware::drive::{Drive, ParallelDac};
+use firmware::reset::{ResetFlags, cause};
+use firmware::store::{Store, Stored};
+use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
+use firmware::timing;
+use link::device::Identity;
+use outputs::{InclinometerPin, Lines, OnChipDac};
+use stm32f4xx_hal::gpio::{Output, PD7, PE3};
+use stm32f4xx_hal::otg_fs::USB;
+use stm32f4xx_hal::pac;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::qei::Qei;
+use stm32f4xx_hal::rcc::{self, Enable, Rcc, Reset};
+use stm32f4xx_hal::signature::Uid;
+use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+use usb_device::device::UsbDevice;
+use usbd_serial::CdcAcmClass;
+
+/// Converters and amplifier enable of this board.
+pub(crate) type BoardDrive = Drive<OnChipDac, ParallelDac<Lines>, PD7<Output>>;
+/// The configuration's store of this board.
+pub(crate) type BoardStore = Store<flash::Sectors>;
+
+/// Memory that must outlive start-up.
+pub(crate) struct Statics {
+    usb: usb::Statics,
+}
+
+impl Statics {
+    /// Empty.
+    pub(crate) const fn new() -> Self {
+        Self { usb: usb::Statics::new() }
+    }
+}
+
+/// What the tasks get.
+pub(crate) struct Parts {
+    pub(crate) tick_timer: TickTimer,
+    pub(crate) encoder: Encoder,
+    pub(crate) drive: BoardDrive,
+    pub(crate) tilt: BoardTilt,
+    pub(crate) usb_device: UsbDevice<'static, usb::Bus>,
+    pub(crate) usb_class: CdcAcmClass<'static, usb::Bus>,
+    pub(crate) watchdog: IndependentWatchdog,
+    pub(crate) debug: pac::DBGMCU,
+    pub(crate) supply: Supply,
+    pub(crate) store: BoardStore,
+    pub(crate) plan: Plan,
+    pub(crate) identity: Identity,
+    pub(crate) reset_cause: Option<Fault>,
+}
+
+/// Sets everything up, the amplifier first, and starts the clocks of the tick, the supervisor and the watchdog. Interrupts are
+/// masked meanwhile.
+pub(crate) fn init(
+    mut core: cortex_m::Peripherals,
+    device: pac::Peripherals,
+    statics: &'static mut Statics,
+) -> Parts {
+    let flags = reset_flags(&device.RCC);
+    let mut rcc = device.RCC.freeze(
+        rcc::Config::hse(timing::CRYSTAL_HZ.Hz())
+            .sysclk(timing::CORE_HZ.Hz())
+            .hclk(timing::CORE_HZ.Hz())
+            .pclk1(timing::APB1_HZ.Hz())
+            .pclk2(timing::APB2_HZ.Hz())
+            .require_pll48clk(),
+    );
+    let gpioa = device.GPIOA.split(&mut rcc);
+    let gpiob = device.GPIOB.split(&mut rcc);
+    let gpioc = device.GPIOC.split(&mut rcc);
+    let gpiod = device.GPIOD.split(&mut rcc);
+    let gpioe = device.GPIOE.split(&mut rcc);
+
+    // The amplifier before anything else: off, then zero torque.
+    let mut enable = gpiod.pd7.into_push_pull_output();
+    enable.set_low();
+    gpiod.pd4.into_push_pull_output().set_low();
+    let lines = Lines::new((
+        gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
+    ));
+    let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), &mut rcc));
+    let drive = Drive::new(dac, ParallelDac(lines), enable);
+
+    let is_analogue = gpiob.pb1.into_pull_down_input().is_high();
+    let tilt = if is_analogue {
+        BoardTilt::Analogue(Inclinometer::new(InclinometerPin::new(
+            device.ADC1,
+            gpioc.pc1.into_analog(),
+            &mut rcc,
+        )))
+    } else {
+        let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
+        let pins = (Some(gpioa.pa5), Some(gpioa.pa6), Some(gpioa.pa7));
+        let bus = device.SPI1.spi(pins, mode, timing::TILT_SPI_HZ.Hz(), &mut rcc);
+        BoardTilt::OnBoard(Accelerometer::new(bus, gpioe.pe3.into_push_pull_output()))
+    };
+
+    let encoder = Encoder(device.TIM2.qei((gpioa.pa15.into_input(), gpioa.pa1), &mut rcc));
+
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+    // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle counter counts on.
+    device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+    gpiod.pd12.into_push_pull_output().set_high();
+
+    let (crash, torque_was_on) = crate::tasks::shared::LAST_WORDS.take();
+    let (store, stored) = Store::open(flash::Sectors::new(device.FLASH));
+    let (plan, damage) = plan(&stored);
+    let reset_cause = cause(flags, crash, torque_was_on).or(damage);
+    match crash {
+        Some(crash) => {
+            defmt::warn!("last run ended: kind {}, detail {=u32:#x}", crash.kind as u8, crash.detail)
+        }
+        None => defmt::info!("started; torque is off"),
+    }
+
+    let (usb_device, usb_class) = usb::init(
+        USB::new(
+            (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK),
+            (gpioa.pa11, gpioa.pa12),
+            &rcc.clocks,
+        ),
+        serial_number(),
+        &mut statics.usb,
+    );
+
+    let supply = supply_warning(device.PWR, device.EXTI, &mut rcc);
+    let mut systick = core.SYST;
+    systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
+    systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);
+    systick.clear_current();
+    systick.enable_counter();
+    systick.enable_interrupt();
+
+    let mut watchdog = IndependentWatchdog::new(device.IWDG);
+    watchdog.stop_on_debug(&device.DBGMCU, true);
+    watchdog.start(timing::WATCHDOG_MS.millis());
+    watchdog.feed();
+    Parts {
+        tick_timer: TickTimer::start(device.TIM4, &mut rcc),
+        encoder,
+        drive,
+        tilt,
+        usb_device,
+        usb_class,
+        watchdog,
+        debug: device.DBGMCU,
+        supply,
+        store,
+        plan,
+        identity: Identity { serial: serial_number(), firmware: version() },
+        reset_cause,
+    }
+}
+
+/// The stored configuration where it may run, else the default, and what is to be said of it.
+fn plan(stored: &Stored) -> (Plan, Option<Fault>) {
+    let default = || match Plan::new(&Config::default()) {
+        Ok(plan) => plan,
+        Err(_) => panic!("the default configuration is refused"),
+    };
+    match stored {
+        Stored::Config(config) => match Plan::new(config) {
+            Ok(plan) => (plan, None),
+            Err(_) => (default(), Some(Fault::StoredConfig)),
+        },
+        Stored::None => (default(), None),
+        Stored::Damaged => (default(), Some(Fault::StoredConfig)),
+    }
+}
+
+/// Why the microcontroller was reset; forgets it.
+fn reset_flags(rcc: &pac::RCC) -> ResetFlags {
+    let csr = rcc.csr().read();
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    ResetFlags {
+        watchdog: csr.wdgrstf().bit() || csr.wwdgrstf().bit(),
+        software: csr.sftrstf().bit(),
+        power_on: csr.porrstf().bit(),
+        brownout: csr.borrstf().bit(),
+    }
+}
+
+/// An interrupt when the supply falls below 2.9 V, the highest threshold there is.
+fn supply_warning(pwr: pac::PWR, exti: pac::EXTI, rcc: &mut Rcc) -> Supply {
+    const HIGHEST_THRESHOLD: u8 = 7;
+    pac::PWR::enable(rcc);
+    // Three bits: any value is one.
+    pwr.cr().modify(|_, w| w.pls().set(HIGHEST_THRESHOLD).pvde().set_bit());
+    const { assert!(PVD_LINE == 16) };
+    exti.rtsr().modify(|_, w| w.tr16().set_bit());
+    exti.imr().modify(|_, w| w.mr16().set_bit());
+    Supply(exti)
+}
+
+/// Version of this crate.
+fn version() -> [u8; 3] {
+    let number = |text: &str| text.parse().unwrap_or(u8::MAX);
+    [
+        number(env!("CARGO_PKG_VERSION_MAJOR")),
+        number(env!("CARGO_PKG_VERSION_MINOR")),
+        number(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+/// The microcontroller's unique number.
+fn serial_number() -> [u8; 12] {
+    let uid = Uid::get();
+    let mut serial = [0; 12];
+    serial[0..2].copy_from_slice(&uid.x().to_le_bytes());
+    serial[2..4].copy_from_slice(&uid.y().to_le_bytes());
+    serial[4] = uid.waf_num();
+    let lot = uid.lot_num().as_bytes();
+    serial[5..].iter_mut().zip(lot).for_each(|(place, &byte)| *place = byte);
+    serial
+}
+
+/// TIM2 in encoder mode.
+pub(crate) struct Encoder(Qei<pac::TIM2>);
+
+impl Encoder {
+    /// The count, which wraps with 32 bits.
+    pub(crate) fn count(&self) -> Counts {
+        Counts(self.0.count().cast_signed())
+    }
+}
+
+/// Core cycles of a count of the tick's timer.
+const TIMER_CYCLES: u32 = timing::CORE_HZ / timing::TICK_TIMER_HZ;
+
+/// TIM4: its update is the tick, its channel 1 the instant at which the converter takes the code.
+pub(crate) struct TickTimer(pac::TIM4);
+
+impl TickTimer {
+    fn start(timer: pac::TIM4, rcc: &mut Rcc) -> Self {
+        pac::TIM4::enable(rcc);
+        pac::TIM4::reset(rcc);
+        timer.psc().write(|w| w.psc().set(0));
+        timer.arr().write(|w| w.arr().set((timing::TICK_TIMER_COUNTS - 1) as u16));
+        // Channel 1 falls with the edge and rises when the converter is to take its code; the converter listens.
+        let output_at = timing::OUTPUT_CYCLES / TIMER_CYCLES;
+        timer.ccr1().write(|w| w.ccr().set(output_at as u16));
+        timer.ccmr1_output().write(|w| w.oc1m().pwm_mode2());
+        timer.cr2().write(|w| w.mms().compare_oc1());
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.sr().write(|w| w.uif().clear_bit());
+        timer.dier().write(|w| w.uie().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+        Self(timer)
+    }
+
+    /// Clears the edge that brought us here.
+    pub(crate) fn acknowledge(&self) {
+        self.0.sr().write(|w| w.uif().clear_bit());
+    }
+
+    /// Whether the next edge has come already.
+    pub(crate) fn edge_waits(&self) -> bool {
+        self.0.sr().read().uif().bit()
+    }
+
+    /// Core cycles since the edge.
+    pub(crate) fn cycles_since_edge(&self) -> u32 {
+        u32::from(self.0.cnt().read().cnt().bits()) * TIMER_CYCLES
+    }
+}
+
+/// Either tilt sensor.
+pub(crate) enum BoardTilt {
+    OnBoard(Accelerometer<Spi<pac::SPI1>, PE3<Output>>),
+    Analogue(Inclinometer<InclinometerPin>),
+}
+
+impl TiltSource for BoardTilt {
+    fn read(&mut self) -> Reading {
+        match self {
+            BoardTilt::OnBoard(accelerometer) => accelerometer.read(),
+            BoardTilt::Analogue(inclinometer) => inclinometer.read(),
+        }
+    }
+}

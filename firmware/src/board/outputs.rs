@@ -1,0 +1,98 @@
+//! The converters of the board, as the traits that the hardware-free parts know.
+#![allow(unsafe_code, reason = "the HAL leaves the converter's trigger to its user")]
+
+use control_core::config::DacWidth;
+use control_core::units::DacCode;
+use firmware::drive::{ByteBus, MotorDac};
+use firmware::tilt::ReadCode;
+use stm32f4xx_hal::adc::Adc;
+use stm32f4xx_hal::adc::config::{AdcConfig, SampleTime};
+use stm32f4xx_hal::dac::{C1, DacOut, DacPin};
+use stm32f4xx_hal::gpio::outport::OutPort8;
+use stm32f4xx_hal::gpio::{Analog, PC1, PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
+use stm32f4xx_hal::pac::{ADC1, DAC};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
+
+/// The microcontroller's own converter, channel 1. It takes a code at the instant that the tick's timer sets (TRGO), so
+/// that the motor is driven at equal distances, however long the tick took to compute.
+pub(crate) struct OnChipDac(C1);
+
+impl OnChipDac {
+    /// At zero torque from the first moment that it is on.
+    pub(crate) fn new(mut channel: C1) -> Self {
+        channel.set_value(DacWidth::Bits12.mid_scale());
+        channel.enable();
+        let mut dac = Self(channel);
+        dac.wait_for_timer(true);
+        dac
+    }
+
+    fn wait_for_timer(&mut self, wait: bool) {
+        // SAFETY: `C1` stands for channel 1, whose bits alone are changed; channel 2 is not used.
+        unsafe { &*DAC::ptr() }.cr().modify(|_, w| w.tsel1().tim4trgo().ten1().bit(wait));
+    }
+}
+
+impl MotorDac for OnChipDac {
+    const WIDTH: DacWidth = DacWidth::Bits12;
+
+    fn put(&mut self, code: DacCode) {
+        self.0.set_value(code.0);
+    }
+
+    fn hurry(&mut self) {
+        // Without a trigger the code goes out one bus cycle later.
+        self.wait_for_timer(false);
+        self.wait_for_timer(true);
+    }
+}
+
+type LinePins = (PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15);
+
+/// Eight lines of port E, set in one write.
+pub(crate) struct Lines(OutPort8<'E', 8, 9, 10, 11, 12, 13, 14, 15>);
+
+impl Lines {
+    /// As outputs.
+    pub(crate) fn new(pins: LinePins) -> Self {
+        let (p0, p1, p2, p3, p4, p5, p6, p7) = pins;
+        let outputs = (
+            p0.into_push_pull_output(),
+            p1.into_push_pull_output(),
+            p2.into_push_pull_output(),
+            p3.into_push_pull_output(),
+            p4.into_push_pull_output(),
+            p5.into_push_pull_output(),
+            p6.into_push_pull_output(),
+            p7.into_push_pull_output(),
+        );
+        Self(outputs.outport())
+    }
+}
+
+impl ByteBus for Lines {
+    fn put(&mut self, byte: u8) {
+        self.0.write(byte.into());
+    }
+}
+
+/// The analogue inclinometer's pin.
+pub(crate) struct InclinometerPin {
+    converter: Adc<ADC1>,
+    pin: PC1<Analog>,
+}
+
+impl InclinometerPin {
+    /// On ADC 1.
+    pub(crate) fn new(adc: ADC1, pin: PC1<Analog>, rcc: &mut Rcc) -> Self {
+        Self { converter: Adc::new(adc, true, AdcConfig::default(), rcc), pin }
+    }
+}
+
+impl ReadCode for InclinometerPin {
+    fn read_code(&mut self) -> u16 {
+        // The longest sampling: 20 µs, for a source of tens of kΩ.
+        self.converter.convert(&self.pin, SampleTime::Cycles_480)
+    }
+}

@@ -1,0 +1,70 @@
+//! The USB port of the board: a serial port (CDC ACM) on the full-speed core.
+#![allow(unsafe_code, reason = "an interrupt is unmasked")]
+
+use core::fmt::Write;
+use heapless::String;
+use stm32f4xx_hal::otg_fs::{USB, UsbBus};
+use stm32f4xx_hal::pac::{Interrupt, NVIC};
+use usb_device::bus::UsbBusAllocator;
+use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
+
+/// The bus of this board.
+pub(crate) type Bus = UsbBus<USB>;
+
+/// Identifiers shared by serial ports that are told apart by their names (V-USB's free list).
+const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x16C0, 0x27DD);
+const MANUFACTURER: &str = "Needle insertion simulator";
+const PRODUCT: &str = "Needle device";
+/// Largest packet of a bulk endpoint at full speed.
+const PACKET_BYTES: u16 = crate::tasks::queues::PACKET_BYTES as u16;
+/// Words for the packets that wait to be read: the control endpoint's and the port's, with room to spare.
+const RECEIVE_WORDS: usize = 64;
+const SERIAL_CHARACTERS: usize = 24;
+
+/// Memory of the driver.
+pub(crate) struct Statics {
+    memory: [u32; RECEIVE_WORDS],
+    bus: Option<UsbBusAllocator<Bus>>,
+    serial: String<SERIAL_CHARACTERS>,
+}
+
+impl Statics {
+    /// Empty.
+    pub(crate) const fn new() -> Self {
+        Self { memory: [0; RECEIVE_WORDS], bus: None, serial: String::new() }
+    }
+}
+
+/// Connects to the bus as a serial port whose name ends in `serial`.
+pub(crate) fn init(
+    core: USB,
+    serial: [u8; 12],
+    statics: &'static mut Statics,
+) -> (UsbDevice<'static, Bus>, CdcAcmClass<'static, Bus>) {
+    for byte in serial {
+        // Two characters a byte: as many as there is room for.
+        let _ = write!(statics.serial, "{byte:02X}");
+    }
+    let bus: &'static _ = statics.bus.insert(UsbBus::new(core, &mut statics.memory));
+    let class = CdcAcmClass::new(bus, PACKET_BYTES);
+    let strings = StringDescriptors::default()
+        .manufacturer(MANUFACTURER)
+        .product(PRODUCT)
+        .serial_number(&statics.serial);
+    let Ok(builder) = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).strings(&[strings]) else {
+        panic!("one set of strings is allowed")
+    };
+    (builder.device_class(USB_CLASS_CDC).build(), class)
+}
+
+/// Keeps the core's interrupt away until [`resume_interrupt`]: there is no room for what it brings.
+pub(crate) fn stop_interrupt() {
+    NVIC::mask(Interrupt::OTG_FS);
+}
+
+/// There is room again.
+pub(crate) fn resume_interrupt() {
+    // SAFETY: no critical section is built on masking this interrupt.
+    unsafe { NVIC::unmask(Interrupt::OTG_FS) };
+}

@@ -1,0 +1,176 @@
+//! What a reset means: from the microcontroller's flags and the words that survive in RAM to the fault that is reported
+//! when the PC comes back. Torque is off after any reset until a person starts the device.
+
+use control_core::event::Fault;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Flags that the microcontroller keeps of its last reset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ResetFlags {
+    /// One of the watchdogs.
+    pub watchdog: bool,
+    /// The program asked for it.
+    pub software: bool,
+    /// The supply came up from nothing.
+    pub power_on: bool,
+    /// The supply dipped below the brown-out level, or came up.
+    pub brownout: bool,
+}
+
+/// Why the program gave up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum CrashKind {
+    /// A panic; the detail is its line.
+    Panic = 1,
+    /// A fault of the core; the detail is the address of the instruction.
+    HardFault = 2,
+    /// An interrupt that nothing serves; the detail is its number.
+    StrayInterrupt = 3,
+    /// A task hung; the detail is its number.
+    HungTask = 4,
+}
+
+impl CrashKind {
+    fn from_code(code: u32) -> Option<Self> {
+        [Self::Panic, Self::HardFault, Self::StrayInterrupt, Self::HungTask]
+            .into_iter()
+            .find(|kind| *kind as u32 == code)
+    }
+}
+
+/// A crash, as the words of RAM tell it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crash {
+    /// Why.
+    pub kind: CrashKind,
+    /// Where; see [`CrashKind`].
+    pub detail: u32,
+}
+
+/// Words that no start-up code clears. After a power-up they hold anything: each says itself whether it means something.
+pub struct LastWords {
+    crash: [AtomicU32; 3],
+    torque: [AtomicU32; 2],
+}
+
+const CRASH_MARK: u32 = 0x5AFE_C4A5;
+const TORQUE_MARK: u32 = 0x700D_0E0F;
+
+impl Default for LastWords {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl LastWords {
+    /// Nothing said.
+    pub const fn new() -> Self {
+        Self { crash: [const { AtomicU32::new(0) }; 3], torque: [const { AtomicU32::new(0) }; 2] }
+    }
+
+    /// Leaves word of a crash. The first one counts: what follows is a consequence.
+    pub fn crash(&self, crash: Crash) {
+        if self.crashed().is_some() {
+            return;
+        }
+        let [check, kind, detail] = &self.crash;
+        kind.store(crash.kind as u32, Relaxed);
+        detail.store(crash.detail, Relaxed);
+        check.store(CRASH_MARK ^ crash.kind as u32 ^ crash.detail, Relaxed);
+    }
+
+    fn crashed(&self) -> Option<Crash> {
+        let [check, kind, detail] = self.crash.each_ref().map(|word| word.load(Relaxed));
+        let whole = check == CRASH_MARK ^ kind ^ detail;
+        CrashKind::from_code(kind).filter(|_| whole).map(|kind| Crash { kind, detail })
+    }
+
+    /// Whether torque is on, from now on.
+    pub fn torque(&self, on: bool) {
+        let mark = if on { TORQUE_MARK } else { 0 };
+        let [word, inverse] = &self.torque;
+        word.store(mark, Relaxed);
+        inverse.store(!mark, Relaxed);
+    }
+
+    fn torque_was_on(&self) -> bool {
+        let [word, inverse] = &self.torque;
+        word.load(Relaxed) == TORQUE_MARK && inverse.load(Relaxed) == !TORQUE_MARK
+    }
+
+    /// What was said before the reset; forgets it.
+    pub fn take(&self) -> (Option<Crash>, bool) {
+        let said = (self.crashed(), self.torque_was_on());
+        self.crash[0].store(0, Relaxed);
+        self.torque(false);
+        said
+    }
+}
+
+/// The fault to report for the last reset; `None` where it was a person's (power, the button, a debugger).
+pub fn cause(flags: ResetFlags, crash: Option<Crash>, torque_was_on: bool) -> Option<Fault> {
+    let hung = crash.is_some_and(|crash| crash.kind == CrashKind::HungTask);
+    if hung || (flags.watchdog && crash.is_none()) {
+        Some(Fault::Watchdog)
+    } else if crash.is_some() {
+        Some(Fault::Crash)
+    } else if flags.software {
+        None
+    } else if torque_was_on || (flags.brownout && !flags.power_on) {
+        // RAM that still knows of torque has not been without supply for long: the supply dipped.
+        Some(Fault::Brownout)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PANIC: Crash = Crash { kind: CrashKind::Panic, detail: 42 };
+
+    #[test]
+    fn last_words_survive_and_are_said_once() {
+        let words = LastWords::new();
+        assert_eq!(words.take(), (None, false));
+        words.crash(PANIC);
+        words.torque(true);
+        words.crash(Crash { kind: CrashKind::HardFault, detail: 1 });
+        assert_eq!(words.take(), (Some(PANIC), true));
+        assert_eq!(words.take(), (None, false));
+    }
+
+    /// RAM after a power-up holds anything.
+    #[test]
+    fn noise_in_ram_is_no_crash() {
+        let words = LastWords::new();
+        for noise in [u32::MAX, 0xAAAA_AAAA, 1, CRASH_MARK] {
+            words.crash.iter().for_each(|word| word.store(noise, Relaxed));
+            words.torque.iter().for_each(|word| word.store(noise, Relaxed));
+            assert_eq!(words.take(), (None, false), "{noise:#x}");
+        }
+    }
+
+    #[test]
+    fn every_reset_has_its_cause() {
+        let flags = ResetFlags::default();
+        let power_up = ResetFlags { power_on: true, brownout: true, ..flags };
+        let watchdog = ResetFlags { watchdog: true, ..flags };
+        let software = ResetFlags { software: true, ..flags };
+        let dip = ResetFlags { brownout: true, ..flags };
+        let hung = Crash { kind: CrashKind::HungTask, detail: 3 };
+        assert_eq!(cause(power_up, None, false), None);
+        assert_eq!(cause(power_up, None, true), Some(Fault::Brownout));
+        assert_eq!(cause(dip, None, false), Some(Fault::Brownout));
+        assert_eq!(cause(watchdog, None, true), Some(Fault::Watchdog));
+        assert_eq!(cause(watchdog, Some(hung), true), Some(Fault::Watchdog));
+        assert_eq!(cause(software, Some(PANIC), true), Some(Fault::Crash));
+        // A crash whose own reset did not come and that the watchdog ended.
+        assert_eq!(cause(watchdog, Some(PANIC), true), Some(Fault::Crash));
+        assert_eq!(cause(software, None, true), None);
+        assert_eq!(cause(flags, None, false), None);
+        assert_eq!(cause(flags, None, true), Some(Fault::Brownout));
+    }
+}

@@ -1,0 +1,200 @@
+//! The power is cut at every single write and erasure; every single bit of a stored configuration is flipped.
+
+use super::*;
+use control_core::units::Millimetres;
+use std::vec;
+use std::vec::Vec;
+
+const CELLS: usize = 4;
+const SLOT_WORDS: usize = CELLS * CELL_WORDS;
+
+/// Flash that loses its power after a number of operations, in the middle of the next one.
+#[derive(Clone)]
+struct Flash {
+    words: [Vec<u32>; 2],
+    operations_left: usize,
+    noise: u64,
+}
+
+impl Flash {
+    fn new() -> Self {
+        Self {
+            words: [vec![BLANK; SLOT_WORDS], vec![BLANK; SLOT_WORDS]],
+            operations_left: usize::MAX,
+            noise: 0x9E37_79B9_7F4A_7C15,
+        }
+    }
+
+    fn random(&mut self) -> u32 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        self.noise as u32
+    }
+
+    /// Whether the next operation is carried out whole.
+    fn spend(&mut self) -> Result<bool, StoreError> {
+        match self.operations_left {
+            usize::MAX => Ok(true),
+            0 => Ok(false),
+            _ => {
+                self.operations_left -= 1;
+                Ok(true)
+            }
+        }
+    }
+}
+
+impl ConfigFlash for &mut Flash {
+    const CELLS: usize = CELLS;
+
+    fn word(&self, slot: Slot, index: usize) -> u32 {
+        self.words[slot as usize][index]
+    }
+
+    fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
+        assert_eq!(self.words[slot as usize][index], BLANK, "a word is programmed once");
+        if self.spend()? {
+            self.words[slot as usize][index] = word;
+            Ok(())
+        } else {
+            // Some of the bits have fallen.
+            let fallen = self.random();
+            self.words[slot as usize][index] = word | fallen;
+            Err(StoreError::Flash)
+        }
+    }
+
+    fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
+        if self.spend()? {
+            self.words[slot as usize].fill(BLANK);
+            Ok(())
+        } else {
+            // Some of the bits have risen.
+            for index in 0..SLOT_WORDS {
+                let risen = self.random();
+                self.words[slot as usize][index] |= risen;
+            }
+            Err(StoreError::Flash)
+        }
+    }
+}
+
+/// A configuration that is told from others by its travel.
+fn config(travel: i16) -> Config {
+    let mut config = Config::default();
+    config.limits.travel = Millimetres(travel.into());
+    config
+}
+
+fn load(flash: &mut Flash) -> Stored {
+    Store::open(flash).1
+}
+
+fn saved(travels: impl IntoIterator<Item = i16>) -> Flash {
+    let mut flash = Flash::new();
+    for travel in travels {
+        assert_eq!(Store::open(&mut flash).0.save(&config(travel)), Ok(()));
+    }
+    flash
+}
+
+#[test]
+fn the_last_of_many_is_found_again() {
+    let mut flash = Flash::new();
+    assert_eq!(load(&mut flash), Stored::None);
+    for travel in 10..60 {
+        assert_eq!(Store::open(&mut flash).0.save(&config(travel)), Ok(()));
+        assert_eq!(load(&mut flash), Stored::Config(config(travel)));
+    }
+}
+
+#[test]
+fn the_same_configuration_costs_no_flash() {
+    let mut flash = saved([20]);
+    let before = flash.words.clone();
+    let (mut store, _) = Store::open(&mut flash);
+    assert_eq!((0..100).try_for_each(|_| store.save(&config(20))), Ok(()));
+    assert_eq!(flash.words, before);
+}
+
+#[test]
+fn a_full_slot_says_so_and_a_restart_makes_room() {
+    let mut flash = Flash::new();
+    let (mut store, _) = Store::open(&mut flash);
+    for travel in 10..10 + CELLS as i16 {
+        assert_eq!(store.save(&config(travel)), Ok(()));
+    }
+    assert_eq!(store.save(&config(50)), Err(StoreError::Full));
+    let (mut store, stored) = Store::open(&mut flash);
+    assert_eq!(stored, Stored::Config(config(9 + CELLS as i16)));
+    assert_eq!(store.save(&config(50)), Ok(()));
+    assert_eq!(load(&mut flash), Stored::Config(config(50)));
+}
+
+/// From every fill of the slot: power lost in the middle of every write of saving, and in every write and erasure of the
+/// start that follows, which is then repeated.
+#[test]
+fn losing_power_anywhere_leaves_the_old_or_the_new() {
+    let mut cuts = 0;
+    for fill in 0..3 * CELLS as i16 {
+        let before = saved(10..10 + fill);
+        let old = if fill == 0 { Stored::None } else { Stored::Config(config(9 + fill)) };
+        for operations in 0.. {
+            let mut flash = before.clone();
+            let (mut store, _) = Store::open(&mut flash);
+            store.flash.operations_left = operations;
+            let done = store.save(&config(50));
+            if done.is_ok() {
+                break;
+            }
+            cuts += 1;
+            flash.operations_left = usize::MAX;
+            let torn = flash.clone();
+            let found = load(&mut flash);
+            assert!(found == old || found == Stored::Config(config(50)), "{fill} {operations}: {found:?}");
+            // The start after it loses its power too, at every point.
+            for operations in 0..4 * CELL_WORDS {
+                let mut flash = torn.clone();
+                flash.operations_left = operations;
+                assert_eq!(load(&mut flash), found);
+                let is_finished = flash.operations_left > 0;
+                flash.operations_left = usize::MAX;
+                assert_eq!(load(&mut flash), found, "{fill} {operations}");
+                let (mut store, _) = Store::open(&mut flash);
+                assert_eq!(store.save(&config(51)), Ok(()));
+                assert_eq!(load(&mut flash), Stored::Config(config(51)));
+                if is_finished {
+                    break;
+                }
+            }
+        }
+    }
+    assert!(cuts > 300, "{cuts} cuts");
+}
+
+/// A flipped bit is noticed, and never becomes another configuration.
+#[test]
+fn every_flipped_bit_is_noticed() {
+    let flash = saved([20, 30]);
+    let length = flash.words[0][CELL_WORDS] as usize & 0xFFF;
+    for word in 0..HEADER_WORDS + length.div_ceil(4) {
+        for bit in 0..32 {
+            let is_padding = word == HEADER_WORDS + length / 4 && bit >= 8 * (length % 4);
+            let mut flash = flash.clone();
+            flash.words[0][CELL_WORDS + word] ^= 1 << bit;
+            let expected = if is_padding { Stored::Config(config(30)) } else { Stored::Damaged };
+            assert_eq!(load(&mut flash), expected, "word {word} bit {bit}");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_configuration_is_replaced_by_the_next_one() {
+    let mut flash = saved([20]);
+    flash.words[0][5] ^= 4;
+    let (mut store, stored) = Store::open(&mut flash);
+    assert_eq!(stored, Stored::Damaged);
+    assert_eq!(store.save(&config(40)), Ok(()));
+    assert_eq!(load(&mut flash), Stored::Config(config(40)));
+}

@@ -1,0 +1,178 @@
+//! Who has to report before the watchdog is fed, and what is wrong when one does not. One missing task is enough: a
+//! device that half works does not hold torque.
+
+use crate::timing;
+use control_core::event::Fault;
+use core::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
+
+/// A task that reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Task {
+    /// The control tick.
+    Tick = 0,
+    /// USB.
+    Usb = 1,
+    /// Telemetry.
+    Telemetry = 2,
+    /// Tilt.
+    Tilt = 3,
+}
+
+impl Task {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Tick, Self::Usb, Self::Telemetry, Self::Tilt];
+
+    /// How many milliseconds it may be silent.
+    pub const fn allowance_ms(self) -> u32 {
+        match self {
+            Task::Tick => timing::TICK_SILENCE_MS,
+            Task::Usb | Task::Telemetry => timing::TASK_SILENCE_MS,
+            Task::Tilt => timing::TILT_SILENCE_MS,
+        }
+    }
+}
+
+/// Where tasks report: a bit each, set by the task, taken by the supervisor.
+#[derive(Default)]
+pub struct Reports(AtomicU32);
+
+impl Reports {
+    /// Nobody has reported.
+    pub const fn new() -> Self {
+        Self(AtomicU32::new(0))
+    }
+
+    /// `task` is alive.
+    pub fn alive(&self, task: Task) {
+        let bit = 1 << task as u32;
+        // Mostly set already: the tick reports ten times between two looks.
+        if self.0.load(Relaxed) & bit == 0 {
+            self.0.fetch_or(bit, Relaxed);
+        }
+    }
+
+    fn take(&self) -> u32 {
+        self.0.swap(0, Relaxed)
+    }
+}
+
+/// Looks at the reports every millisecond.
+#[derive(Default)]
+pub struct Supervisor {
+    silent_ms: [u32; Task::ALL.len()],
+    hung: Option<Task>,
+}
+
+impl Supervisor {
+    /// Everybody counts as just having reported.
+    pub const fn new() -> Self {
+        Self { silent_ms: [0; Task::ALL.len()], hung: None }
+    }
+
+    /// A millisecond has passed: the watchdog may be fed, or the task that hangs. Once one has hung, the watchdog is never
+    /// fed again: whatever else that task has left undone, only a reset puts right.
+    pub fn look(&mut self, reports: &Reports) -> Result<(), Task> {
+        let reported = reports.take();
+        for (task, silent) in Task::ALL.into_iter().zip(&mut self.silent_ms) {
+            *silent = if reported & (1 << task as u32) != 0 { 0 } else { silent.saturating_add(1) };
+            if *silent > task.allowance_ms() && self.hung.is_none() {
+                self.hung = Some(task);
+            }
+        }
+        self.hung.map_or(Ok(()), Err)
+    }
+}
+
+/// Faults that tasks below the tick have found, on their way to it: a bit each.
+#[derive(Default)]
+pub struct Trips(AtomicU16);
+
+/// Each fault at the place of its number.
+const FAULTS: [Fault; 11] = [
+    Fault::EncoderJump,
+    Fault::Travel,
+    Fault::HostSilent,
+    Fault::Tilt,
+    Fault::Overrun,
+    Fault::LinkLost,
+    Fault::Watchdog,
+    Fault::Crash,
+    Fault::Brownout,
+    Fault::StoredConfig,
+    Fault::EncoderFrozen,
+];
+
+impl Trips {
+    /// None.
+    pub const fn new() -> Self {
+        Self(AtomicU16::new(0))
+    }
+
+    /// Asks the tick to take torque away.
+    pub fn raise(&self, fault: Fault) {
+        self.0.fetch_or(1 << fault as u16, Relaxed);
+    }
+
+    /// Whether any waits; cheap, for the tick.
+    pub fn is_empty(&self) -> bool {
+        self.0.load(Relaxed) == 0
+    }
+
+    /// The fault with the lowest number; the others of the same moment follow from it and are forgotten.
+    pub fn take(&self) -> Option<Fault> {
+        let raised = self.0.swap(0, Relaxed);
+        FAULTS.get(raised.trailing_zeros() as usize).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report_all_but(reports: &Reports, silent: Option<Task>) {
+        Task::ALL.into_iter().filter(|&task| Some(task) != silent).for_each(|task| reports.alive(task));
+    }
+
+    #[test]
+    fn feeds_only_while_every_task_reports() {
+        for silent in Task::ALL {
+            let (reports, mut supervisor) = (Reports::new(), Supervisor::new());
+            for _ in 0..1000 {
+                report_all_but(&reports, None);
+                assert_eq!(supervisor.look(&reports), Ok(()));
+            }
+            for _ in 0..silent.allowance_ms() {
+                report_all_but(&reports, Some(silent));
+                assert_eq!(supervisor.look(&reports), Ok(()), "{silent:?}");
+            }
+            report_all_but(&reports, Some(silent));
+            assert_eq!(supervisor.look(&reports), Err(silent));
+            // A late report does not make up for it.
+            report_all_but(&reports, None);
+            assert_eq!(supervisor.look(&reports), Err(silent));
+        }
+    }
+
+    #[test]
+    fn every_fault_arrives_as_itself() {
+        for fault in FAULTS {
+            let trips = Trips::new();
+            assert!(trips.is_empty());
+            trips.raise(fault);
+            assert!(!trips.is_empty());
+            assert_eq!(trips.take(), Some(fault));
+            assert!(trips.is_empty());
+            assert_eq!(trips.take(), None);
+        }
+    }
+
+    #[test]
+    fn of_two_faults_one_is_reported() {
+        let trips = Trips::new();
+        trips.raise(Fault::Watchdog);
+        trips.raise(Fault::Tilt);
+        assert_eq!(trips.take(), Some(Fault::Tilt));
+        assert_eq!(trips.take(), None);
+    }
+}

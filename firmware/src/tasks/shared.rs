@@ -1,0 +1,51 @@
+//! The single words that tasks share. Each has one writer, or is a set of bits.
+
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering::Relaxed};
+use firmware::reset::LastWords;
+use firmware::stages::Stages;
+use firmware::supervision::{Reports, Trips};
+
+/// Who is alive. Written by every task, taken by the supervisor.
+pub(crate) static REPORTS: Reports = Reports::new();
+
+/// Faults on their way to the tick.
+pub(crate) static TRIPS: Trips = Trips::new();
+
+/// Times of the stages.
+pub(crate) static STAGES: Stages = Stages::new();
+
+/// Milliseconds that the supervisor has run; the tick watches it.
+pub(crate) static SUPERVISED_MS: AtomicU32 = AtomicU32::new(0);
+
+/// Whether the amplifier is on. Written by the tick.
+pub(crate) static POWERED: AtomicBool = AtomicBool::new(false);
+
+/// Ticks that came late or not at all. Written by the tick.
+pub(crate) static MISSED_TICKS: AtomicU32 = AtomicU32::new(0);
+
+/// What the USB host has done to us: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
+pub(crate) static LINK: AtomicU8 = AtomicU8::new(0);
+/// Enumerated, configured and not suspended.
+pub(crate) const LINK_CONFIGURED: u8 = 1;
+/// A program has the port open (DTR).
+pub(crate) const LINK_READY: u8 = 2;
+
+/// Asks the USB task to throw away what waits for a PC that is gone. Set by telemetry.
+pub(crate) static DISCARD: AtomicBool = AtomicBool::new(false);
+
+/// Smoothed inclination in mrad. Written by the tilt task.
+static TILT_MRAD: AtomicI32 = AtomicI32::new(0);
+
+/// What survives a reset: start-up code leaves this section alone.
+#[unsafe(link_section = ".uninit.last_words")]
+pub(crate) static LAST_WORDS: LastWords = LastWords::new();
+
+/// Gives the tick a new inclination.
+pub(crate) fn set_tilt(tilt: control_core::units::Milliradians) {
+    TILT_MRAD.store(tilt.0.into(), Relaxed);
+}
+
+/// The latest inclination.
+pub(crate) fn tilt() -> control_core::units::Milliradians {
+    control_core::units::Milliradians(TILT_MRAD.load(Relaxed) as i16)
+}

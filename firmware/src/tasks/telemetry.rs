@@ -1,0 +1,202 @@
+//! Telemetry: the device's end of the link between the USB queues and the tick's queues, and the configuration's way into
+//! flash. It decides nothing about torque; it only passes orders on.
+
+use super::queues::{Packet, SmallOrder, TelemetryEnds};
+use super::shared::{self, LINK_CONFIGURED, LINK_READY};
+use crate::board::BoardStore;
+use crate::board::usb::resume_interrupt;
+use control_core::event::Fault;
+use control_core::{Config, Order, Plan};
+use core::sync::atomic::Ordering::Relaxed;
+use cortex_m::peripheral::DWT;
+use firmware::store::StoreError;
+use firmware::supervision::Task;
+use firmware::timing;
+use link::codec::MAX_FRAME;
+use link::device::{Endpoint, Identity};
+use link::frames::{Stage, Timing};
+use stm32f4xx_hal::pac::Interrupt;
+
+/// Packets that the longest frame may need: only with room for all of them is a frame begun.
+const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
+
+/// Telemetry's own state.
+pub(crate) struct Telemetry {
+    endpoint: Endpoint,
+    store: BoardStore,
+    ends: TelemetryEnds,
+    /// An order that the tick had no room for.
+    held: Option<Order>,
+    next_tick: u64,
+    filling: Packet,
+    was_open: bool,
+    was_ready: bool,
+    in_session: bool,
+}
+
+impl Telemetry {
+    /// `plan` is the one that the tick starts with, `reset_cause` what ended the last run.
+    pub(crate) fn new(
+        identity: Identity,
+        plan: &Plan,
+        reset_cause: Option<Fault>,
+        store: BoardStore,
+        ends: TelemetryEnds,
+    ) -> Self {
+        Self {
+            endpoint: Endpoint::new(identity, plan, reset_cause),
+            store,
+            ends,
+            held: None,
+            next_tick: 0,
+            filling: Packet::new(),
+            was_open: false,
+            was_ready: false,
+            in_session: false,
+        }
+    }
+
+    /// One turn: link state, commands, samples, frames.
+    pub(crate) fn run(&mut self) {
+        let entered = DWT::cycle_count();
+        self.watch_link();
+        // Samples first: whether torque is on decides what a command may do.
+        self.take_samples();
+        self.take_commands();
+        self.send_frames();
+        shared::REPORTS.alive(Task::Telemetry);
+        shared::STAGES.note(Stage::Telemetry, DWT::cycle_count().wrapping_sub(entered));
+    }
+
+    /// The cable pulled, the bus suspended, or the port closed by the program that had it open.
+    fn watch_link(&mut self) {
+        let link = shared::LINK.load(Relaxed);
+        let is_ready = link & LINK_READY != 0;
+        let was_closed = self.was_ready && !is_ready;
+        let is_open = link & LINK_CONFIGURED != 0;
+        if (self.was_open && !is_open) || was_closed {
+            defmt::info!("the PC is gone");
+            self.endpoint.disconnect();
+            self.filling.clear();
+            shared::DISCARD.store(true, Relaxed);
+            // A start that the tick has not seen yet must not outlive the PC that asked for it.
+            self.held = Some(Order::Stop);
+            self.forward_orders();
+            if shared::POWERED.load(Relaxed) {
+                shared::TRIPS.raise(Fault::LinkLost);
+            }
+        }
+        self.was_open = is_open;
+        self.was_ready = is_ready;
+    }
+
+    fn take_commands(&mut self) {
+        while let Some(packet) = self.ends.from_pc.dequeue() {
+            self.endpoint.receive(&packet);
+            self.forward_orders();
+        }
+        resume_interrupt();
+        self.forward_orders();
+        let in_session = self.endpoint.in_session();
+        if in_session && !self.in_session {
+            shared::STAGES.forget_longest();
+        }
+        self.in_session = in_session;
+    }
+
+    /// Passes orders on until there are no more or the tick has no room.
+    fn forward_orders(&mut self) {
+        while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
+            let small = match order {
+                Order::Start => SmallOrder::Start,
+                Order::Stop => SmallOrder::Stop,
+                Order::Zero => SmallOrder::Zero,
+                Order::Heartbeat => SmallOrder::Heartbeat,
+                Order::Trip(fault) => {
+                    shared::TRIPS.raise(fault);
+                    continue;
+                }
+                large @ (Order::Configure(_) | Order::Excite(_)) => {
+                    if !self.ends.orders.ready() || !self.ends.large_orders.ready() {
+                        self.held = Some(large);
+                        return;
+                    }
+                    if let Order::Configure(plan) = &large {
+                        self.save(plan.config());
+                    }
+                    // There is room: just seen.
+                    let _ = self.ends.large_orders.enqueue(large);
+                    SmallOrder::Large
+                }
+            };
+            if let Err(small) = self.ends.orders.enqueue(small) {
+                self.held = match small {
+                    SmallOrder::Start => Some(Order::Start),
+                    SmallOrder::Stop => Some(Order::Stop),
+                    SmallOrder::Zero => Some(Order::Zero),
+                    SmallOrder::Heartbeat => Some(Order::Heartbeat),
+                    // Its room was seen above.
+                    SmallOrder::Large => None,
+                };
+                return;
+            }
+        }
+    }
+
+    /// The configuration outlives a reset. Torque is off: the link takes no configuration otherwise.
+    fn save(&mut self, config: &Config) {
+        match self.store.save(config) {
+            Ok(()) => {}
+            Err(StoreError::Full) => defmt::warn!("no room to save the configuration until a restart"),
+            Err(StoreError::Flash) => defmt::warn!("the configuration was not saved: flash refused it"),
+            Err(StoreError::TooLong) => defmt::warn!("the configuration was not saved: it is too long"),
+        }
+    }
+
+    fn take_samples(&mut self) {
+        while let Some(ticked) = self.ends.outputs.dequeue() {
+            let dropped = ticked.tick.wrapping_sub(self.next_tick);
+            if dropped != 0 {
+                self.endpoint.note_dropped(dropped as u32);
+            }
+            self.next_tick = ticked.tick + 1;
+            self.endpoint.record(ticked.tick, &ticked.output);
+        }
+        self.endpoint.set_timing(Timing {
+            clock_hz: timing::CORE_HZ,
+            stages: shared::STAGES.read(),
+            missed_ticks: shared::MISSED_TICKS.load(Relaxed),
+            ..Timing::default()
+        });
+    }
+
+    fn send_frames(&mut self) {
+        let mut frame = [0; MAX_FRAME];
+        let mut has_sent = false;
+        while self.ends.to_pc.capacity() - self.ends.to_pc.len() > FRAME_PACKETS {
+            let length = self.endpoint.transmit(&mut frame);
+            if length == 0 {
+                break;
+            }
+            for &byte in &frame[..length] {
+                if self.filling.push(byte).is_err() {
+                    self.flush();
+                    let _ = self.filling.push(byte);
+                }
+            }
+            has_sent = true;
+        }
+        if !self.filling.is_empty() {
+            self.flush();
+        }
+        if has_sent {
+            rtic::pend(Interrupt::OTG_FS);
+        }
+    }
+
+    /// There is room: no frame is begun without it.
+    fn flush(&mut self) {
+        let packet = core::mem::take(&mut self.filling);
+        let _ = self.ends.to_pc.enqueue(packet);
+    }
+}

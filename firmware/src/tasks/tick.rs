@@ -1,0 +1,140 @@
+//! The control tick: count in, code out, then everything that can wait for the code to be out.
+
+use super::queues::{SmallOrder, TickEnds, Ticked};
+use super::shared;
+use crate::board::{BoardDrive, Encoder, TickTimer};
+use control_core::config::DacWidth;
+use control_core::controller::TickInput;
+use control_core::event::Fault;
+use control_core::{Controller, Order, Plan};
+use core::sync::atomic::Ordering::Relaxed;
+use cortex_m::peripheral::DWT;
+use firmware::supervision::Task;
+use firmware::timing;
+use link::frames::Stage;
+
+/// The tick's own state.
+pub(crate) struct Tick {
+    timer: TickTimer,
+    encoder: Encoder,
+    drive: BoardDrive,
+    controller: Controller,
+    width: DacWidth,
+    ends: TickEnds,
+    tick: u64,
+    entered: Option<u32>,
+    supervised_ms: u32,
+    unsupervised_ticks: u32,
+}
+
+impl Tick {
+    /// Torque off, under `plan`.
+    pub(crate) fn new(
+        timer: TickTimer,
+        encoder: Encoder,
+        drive: BoardDrive,
+        plan: &Plan,
+        ends: TickEnds,
+    ) -> Self {
+        Self {
+            timer,
+            encoder,
+            drive,
+            controller: Controller::new(plan.clone()),
+            width: plan.config().device.dac,
+            ends,
+            tick: 0,
+            entered: None,
+            supervised_ms: 0,
+            unsupervised_ticks: 0,
+        }
+    }
+
+    /// One tick.
+    pub(crate) fn run(&mut self) {
+        let entered = DWT::cycle_count();
+        self.timer.acknowledge();
+        let input = TickInput { count: self.encoder.count(), tilt: shared::tilt() };
+        if !shared::TRIPS.is_empty()
+            && let Some(fault) = shared::TRIPS.take()
+        {
+            self.controller.order(Order::Trip(fault));
+        }
+        let output = self.controller.tick(input);
+        self.drive.apply(self.width, &output);
+        let to_dac = self.timer.cycles_since_edge();
+        if to_dac >= timing::OUTPUT_CYCLES {
+            self.drive.hurry();
+        }
+
+        // The code is out; what follows may take its time, up to the deadline.
+        let powered = output.enable;
+        if self.ends.outputs.enqueue(Ticked { tick: self.tick, output }).is_err() {
+            // Telemetry sees the gap in the numbers and counts it.
+        }
+        self.tick += 1;
+        if shared::POWERED.load(Relaxed) != powered {
+            shared::POWERED.store(powered, Relaxed);
+            shared::LAST_WORDS.torque(powered);
+        }
+        self.watch_supervisor();
+        self.take_order();
+        shared::STAGES.note(Stage::TickToDac, to_dac);
+        shared::REPORTS.alive(Task::Tick);
+        self.watch_time(entered);
+    }
+
+    /// At most one order a tick, so that a storm of them costs no more than one.
+    fn take_order(&mut self) {
+        let Some(order) = self.ends.orders.dequeue() else { return };
+        match order {
+            SmallOrder::Start => self.controller.order(Order::Start),
+            SmallOrder::Stop => self.controller.order(Order::Stop),
+            SmallOrder::Zero => self.controller.order(Order::Zero),
+            SmallOrder::Heartbeat => self.controller.order(Order::Heartbeat),
+            SmallOrder::Large => {
+                if let Some(order) = self.ends.large_orders.dequeue() {
+                    self.controller.order(order);
+                    // A plan that came while torque was on has not been taken.
+                    self.width = self.controller.plan().config().device.dac;
+                }
+            }
+        }
+    }
+
+    /// The supervisor watches everybody; somebody has to watch the supervisor.
+    fn watch_supervisor(&mut self) {
+        let supervised_ms = shared::SUPERVISED_MS.load(Relaxed);
+        if supervised_ms != self.supervised_ms {
+            self.supervised_ms = supervised_ms;
+            self.unsupervised_ticks = 0;
+            return;
+        }
+        self.unsupervised_ticks = self.unsupervised_ticks.saturating_add(1);
+        if self.unsupervised_ticks >= timing::SUPERVISOR_SILENCE_TICKS {
+            shared::TRIPS.raise(Fault::Watchdog);
+        }
+    }
+
+    /// Counts ticks that never came and takes torque away when this one was too long.
+    fn watch_time(&mut self, entered: u32) {
+        if let Some(before) = self.entered.replace(entered) {
+            let apart = entered.wrapping_sub(before);
+            if apart > timing::TICK_MISSED_CYCLES {
+                self.missed((apart + timing::TICK_CYCLES / 2) / timing::TICK_CYCLES - 1);
+            }
+        }
+        if self.timer.edge_waits() {
+            self.missed(1);
+        }
+        shared::STAGES.note(Stage::Tick, DWT::cycle_count().wrapping_sub(entered));
+    }
+
+    #[cold]
+    fn missed(&self, ticks: u32) {
+        shared::MISSED_TICKS.store(shared::MISSED_TICKS.load(Relaxed).saturating_add(ticks), Relaxed);
+        if shared::POWERED.load(Relaxed) {
+            shared::TRIPS.raise(Fault::Overrun);
+        }
+    }
+}

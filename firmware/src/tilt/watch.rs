@@ -1,0 +1,68 @@
+//! From single readings to the verdict that the sensor is broken: one bad transfer is none.
+
+use super::TiltTrouble;
+use crate::timing;
+use control_core::units::Milliradians;
+
+/// What a look at the sensor gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// A new measurement.
+    New(Milliradians),
+    /// None since the last look.
+    Unchanged,
+    /// Something is wrong.
+    Failed(TiltTrouble),
+}
+
+/// Counts what is wrong in a row.
+#[derive(Clone, Debug, Default)]
+pub struct TiltWatch {
+    bad: u32,
+    stale: u32,
+}
+
+impl TiltWatch {
+    /// Takes a reading; the trouble once it has lasted.
+    pub fn judge(&mut self, reading: Reading) -> Result<(), TiltTrouble> {
+        match reading {
+            Reading::New(_) => {
+                *self = Self::default();
+                Ok(())
+            }
+            Reading::Unchanged => {
+                self.stale = self.stale.saturating_add(1);
+                if self.stale >= timing::TILT_STALE_READINGS { Err(TiltTrouble::Stuck) } else { Ok(()) }
+            }
+            Reading::Failed(trouble) => {
+                self.bad = self.bad.saturating_add(1);
+                if self.bad >= timing::TILT_BAD_READINGS { Err(trouble) } else { Ok(()) }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trouble_that_lasts_is_reported_and_a_measurement_ends_it() {
+        let mut watch = TiltWatch::default();
+        for _ in 1..timing::TILT_BAD_READINGS {
+            assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Ok(()));
+        }
+        assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Err(TiltTrouble::Absent));
+        assert_eq!(watch.judge(Reading::New(Milliradians(1))), Ok(()));
+        assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Ok(()));
+    }
+
+    #[test]
+    fn a_sensor_that_measures_nothing_new_is_stuck() {
+        let mut watch = TiltWatch::default();
+        for _ in 1..timing::TILT_STALE_READINGS {
+            assert_eq!(watch.judge(Reading::Unchanged), Ok(()));
+        }
+        assert_eq!(watch.judge(Reading::Unchanged), Err(TiltTrouble::Stuck));
+    }
+}

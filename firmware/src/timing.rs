@@ -1,0 +1,124 @@
+//! Every timing constant of the firmware, each with its reason. Nothing else in this crate states a frequency, a period,
+//! a time-out or a priority.
+
+use control_core::TICK_HZ;
+
+/// The crystal on the STM32F4DISCOVERY.
+pub const CRYSTAL_HZ: u32 = 8_000_000;
+
+/// The most that an STM32F407 runs at; the cycle counter counts it.
+pub const CORE_HZ: u32 = 168_000_000;
+
+/// The most that the APB1 bus allows.
+pub const APB1_HZ: u32 = 42_000_000;
+
+/// The most that the APB2 bus allows.
+pub const APB2_HZ: u32 = 84_000_000;
+
+/// Clock of the tick's timer: twice its bus, since that bus is divided.
+pub const TICK_TIMER_HZ: u32 = 2 * APB1_HZ;
+
+/// Cycles from one tick to the next: 16,800.
+pub const TICK_CYCLES: u32 = CORE_HZ / TICK_HZ;
+
+/// Counts of the tick's timer from one tick to the next: 8,400, which divides without a rest, so that the rate is as
+/// exact as the crystal.
+pub const TICK_TIMER_COUNTS: u32 = TICK_TIMER_HZ / TICK_HZ;
+
+/// From the tick's edge to the instant at which the 12-bit converter takes the code, by hardware: 20 µs. Whatever the tick
+/// computes and whatever masked it for a few microseconds, the motor is driven at equal distances. Longer than the longest
+/// tick with the longest masking before it, short against the tick's period.
+pub const OUTPUT_CYCLES: u32 = CORE_HZ / 50_000;
+
+/// Two ticks further apart than this are not neighbours: a period and a half.
+pub const TICK_MISSED_CYCLES: u32 = TICK_CYCLES + TICK_CYCLES / 2;
+
+/// Rate of the supervisor, and of everything that it sets off: often enough that its 1 ms is small against the 20 ms in
+/// which a hung task must have lost its torque, seldom enough to cost nothing.
+pub const SUPERVISOR_HZ: u32 = 1_000;
+
+/// The tilt sensor is read at twice the 100 Hz at which it measures: no measurement is missed, whatever its clock does.
+pub const TILT_PERIOD_MS: u32 = 5;
+
+/// How long the tick may be silent before the supervisor calls it hung: it runs ten times in that time. A tick that never
+/// returns starves the supervisor too, and is left to the watchdog.
+pub const TICK_SILENCE_MS: u32 = 2;
+
+/// How long the USB and telemetry tasks may be silent: both run every millisecond, and five of them are more than the
+/// longest of either ever measured, yet leave time to act within 20 ms.
+pub const TASK_SILENCE_MS: u32 = 5;
+
+/// How long the tilt task may be silent: two of its periods and a millisecond.
+pub const TILT_SILENCE_MS: u32 = 2 * TILT_PERIOD_MS + 1;
+
+/// Ticks without a sign of the supervisor after which the tick takes torque away by itself: 5 ms. It is what catches a task
+/// that keeps the supervisor from running, for instance a USB stack that waits for a flag with interrupts masked.
+pub const SUPERVISOR_SILENCE_TICKS: u32 = 50;
+
+/// The independent watchdog, nominal. Its oscillator runs at 17 to 47 kHz instead of 32: 10 ms lie between 6.8 ms, still
+/// several periods of the supervisor, and 18.8 ms, still within the 20 ms for a hung task.
+pub const WATCHDOG_MS: u32 = 10;
+
+/// Readings that fail in a row before the tilt sensor counts as broken: 50 ms. One bad transfer is no reason to drop torque.
+pub const TILT_BAD_READINGS: u32 = 10;
+
+/// Readings without a new measurement before the tilt sensor counts as stuck: 100 ms, ten measurements.
+pub const TILT_STALE_READINGS: u32 = 20;
+
+/// Equal measurements before a sensor that resolves its own noise (LIS3DSH, 0.06 mg) counts as stuck: half a second.
+pub const TILT_FROZEN_MEASUREMENTS: u32 = 50;
+
+/// Clock of the tilt sensor's SPI, at most; both revisions allow 10 MHz, and a slow edge rings less.
+pub const TILT_SPI_HZ: u32 = 1_500_000;
+
+/// Longest time in which the configuration's flash takes a word (data sheet: 100 µs), in turns of a loop that reads a
+/// register, with a wide margin; a flash that is busy for longer is broken.
+pub const FLASH_WORD_TURNS: u32 = 100_000;
+
+/// Longest time in which it erases a sector of 128 KiB (data sheet: 2 s), in the same turns.
+pub const FLASH_ERASE_TURNS: u32 = 400_000_000;
+
+/// Priorities of the tasks, 1 the lowest. The tick is above everything and masked by nothing; the supervisor is above
+/// whatever it has to watch.
+pub mod priority {
+    /// The control tick. No critical section masks it.
+    pub const TICK: u8 = 16;
+    /// The supply's early warning.
+    pub const SUPPLY: u8 = 15;
+    /// The supervisor.
+    pub const SUPERVISOR: u8 = 4;
+    /// USB.
+    pub const USB: u8 = 3;
+    /// Telemetry.
+    pub const TELEMETRY: u8 = 2;
+    /// Tilt.
+    pub const TILT: u8 = 1;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_divides_into_ticks_without_a_rest() {
+        assert_eq!(TICK_TIMER_COUNTS * TICK_HZ, TICK_TIMER_HZ);
+        assert_eq!(TICK_CYCLES * TICK_HZ, CORE_HZ);
+    }
+
+    /// The slowest way to notice that a task hangs leaves time for the tick that takes torque away.
+    #[test]
+    fn a_hung_task_is_noticed_within_twenty_milliseconds() {
+        let slowest_watchdog_ms = WATCHDOG_MS * 32 / 17 + 1;
+        let supervisor_ms = SUPERVISOR_SILENCE_TICKS * 1_000 / TICK_HZ;
+        for ms in [TICK_SILENCE_MS, TASK_SILENCE_MS, TILT_SILENCE_MS, supervisor_ms, slowest_watchdog_ms] {
+            assert!(ms < 20, "{ms} ms");
+        }
+    }
+
+    /// The fastest watchdog outlives the silence that is still regular.
+    #[test]
+    fn the_watchdog_never_bites_a_healthy_device() {
+        let fastest_watchdog_ms = WATCHDOG_MS * 32 / 47;
+        assert!(fastest_watchdog_ms > 2 * 1_000 / SUPERVISOR_HZ);
+    }
+}
