@@ -68,8 +68,7 @@ impl Port {
     }
 
     fn send(&mut self) {
-        loop {
-            let Some(packet) = self.ends.to_pc.peek() else { break };
+        while let Some(packet) = self.ends.to_pc.peek() {
             if self.class.write_packet(packet).is_err() {
                 return;
             }
