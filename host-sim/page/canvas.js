@@ -1,0 +1,38 @@
+// A canvas that stays as sharp as the screen, and the colours of style.css for those who draw.
+
+const MOST_PIXELS_PER_POINT = 2;
+
+/** Keeps `canvas` at its size on screen; `surface.width` and `height` are in CSS pixels, and so are all drawings. */
+export function surface(canvas) {
+  const context = canvas.getContext("2d", { alpha: false });
+  const result = { canvas, context, width: 1, height: 1 };
+  const fit = () => {
+    const ratio = Math.min(window.devicePixelRatio || 1, MOST_PIXELS_PER_POINT);
+    result.width = Math.max(1, canvas.clientWidth);
+    result.height = Math.max(1, canvas.clientHeight);
+    canvas.width = Math.round(result.width * ratio);
+    canvas.height = Math.round(result.height * ratio);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  };
+  new ResizeObserver(fit).observe(canvas);
+  fit();
+  return result;
+}
+
+const NAMES = [
+  "panel", "line", "text", "muted", "depth", "force", "motor", "grid", "sky", "skin", "skin-edge", "fat", "muscle",
+  "other", "vessel-wall", "lumen", "fibre", "on-tissue", "steel-light", "steel", "steel-dark", "grip",
+];
+
+/** The colours by name, and again whenever light changes to dark. */
+export function colours() {
+  const result = { font: "" };
+  const read = () => {
+    const style = getComputedStyle(document.documentElement);
+    for (const name of NAMES) result[name] = style.getPropertyValue(`--${name}`).trim();
+    result.font = getComputedStyle(document.body).fontFamily;
+  };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", read);
+  read();
+  return result;
+}

@@ -1,0 +1,122 @@
+// What a person does: takes the needle by mouse, finger or arrow keys, starts, stops, gives it back to the demo.
+
+/** Arrow keys move the hand so far, with Shift ten times. */
+const KEY_STEP_MM = 0.2;
+/** How far the hand may be moved from the entry point. */
+const REACH_MM = { low: -30, high: 60 };
+
+export class Hand {
+  /**
+   * @param {HTMLCanvasElement} canvas the section
+   * @param {import("./section.js").Section} section what pixels mean
+   * @param {import("./link.js").Link} link where wishes go
+   */
+  constructor(canvas, section, link) {
+    this.canvas = canvas;
+    this.section = section;
+    this.link = link;
+    this.person = false;
+    this.movable = false;
+    this.depth = 0; // where the hand wants the tip, mm
+    this.actual = 0; // where the tip is, mm
+    this.pointer = null;
+    this.unsent = false;
+    canvas.addEventListener("pointerdown", (event) => this.take(event));
+    canvas.addEventListener("pointermove", (event) => this.move(event));
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.letGo(event));
+    document.addEventListener("keydown", (event) => this.key(event));
+    document.getElementById("stop").addEventListener("click", () => this.stop());
+    document.getElementById("start").addEventListener("click", () => link.send({ do: "start" }));
+    this.demo = document.getElementById("demo");
+    this.demo.addEventListener("click", () => link.send({ do: "demo" }));
+    this.note = document.getElementById("hand-note");
+  }
+
+  /** Whether there is a simulated hand at all. */
+  allow(movable, travel) {
+    this.movable = movable;
+    this.canvas.dataset.fixed = String(!movable);
+    this.canvas.setAttribute("aria-valuemax", travel.toFixed(0));
+    this.demo.hidden = !movable;
+    this.say();
+  }
+
+  /** What the server says of who moves the needle, and where it is. */
+  follow(hand, depth) {
+    this.actual = depth;
+    const person = this.movable && hand === "person";
+    if (person === this.person || this.pointer !== null) return;
+    this.person = person;
+    if (person) this.depth = depth;
+    this.say();
+  }
+
+  say() {
+    this.demo.disabled = !this.person;
+    let text = "Moved by hand, on the device";
+    if (this.movable) text = this.person ? "You hold the needle" : "Demo hand. Drag the needle to take it";
+    if (this.note.textContent !== text) this.note.textContent = text;
+  }
+
+  /** Called before each picture: many pointer events become one message. */
+  tell() {
+    if (!this.unsent) return;
+    this.unsent = false;
+    this.link.send({ do: "drag", depth_mm: Math.round(this.depth * 1000) / 1000 });
+    this.canvas.setAttribute("aria-valuenow", this.depth.toFixed(1));
+    this.canvas.setAttribute("aria-valuetext", `${this.depth.toFixed(1)} mm`);
+  }
+
+  want(depth) {
+    this.depth = Math.min(REACH_MM.high, Math.max(REACH_MM.low, depth));
+    this.unsent = true;
+    if (!this.person) {
+      this.person = true;
+      this.say();
+    }
+  }
+
+  take(event) {
+    if (!this.movable || this.pointer !== null || event.button !== 0) return;
+    this.pointer = event.pointerId;
+    this.canvas.setPointerCapture(event.pointerId);
+    this.canvas.dataset.held = "true";
+    // A hand that already holds the needle goes on from where it is; a new one takes it where the tip is.
+    this.grabbed = { depth: this.person ? this.depth : this.actual, x: event.clientX, y: event.clientY };
+    this.want(this.grabbed.depth);
+  }
+
+  move(event) {
+    if (event.pointerId !== this.pointer) return;
+    const { depth, x, y } = this.grabbed;
+    this.want(depth + this.section.along(event.clientX - x, event.clientY - y));
+  }
+
+  /** The needle stays with the person, where the hand was last. */
+  letGo(event) {
+    if (event.pointerId !== this.pointer) return;
+    this.tell();
+    this.pointer = null;
+    this.canvas.dataset.held = "false";
+    this.link.send({ do: "release" });
+  }
+
+  stop() {
+    this.link.send({ do: "stop" });
+  }
+
+  /** Space and Escape stop wherever the focus is, and nothing else. */
+  key(event) {
+    if (event.key === " " || event.key === "Escape") {
+      event.preventDefault();
+      if (!event.repeat) this.stop();
+      return;
+    }
+    const direction = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+    if (direction && this.movable && document.activeElement === this.canvas) {
+      event.preventDefault();
+      const from = this.person ? this.depth : this.actual;
+      this.want(from + direction * KEY_STEP_MM * (event.shiftKey ? 10 : 1));
+    }
+  }
+}

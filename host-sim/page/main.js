@@ -1,0 +1,151 @@
+// Puts the parts together: messages in, one picture per screen refresh out.
+
+import { colours } from "./canvas.js";
+import { EventList } from "./events.js";
+import { Hand } from "./hand.js";
+import { Link } from "./link.js";
+import { Panel } from "./panel.js";
+import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
+import { Section } from "./section.js";
+import { Tissue } from "./tissue.js";
+import { Clock, Trace } from "./trace.js";
+
+const PANEL_MS = 100;
+const byId = (id) => document.getElementById(id);
+
+const palette = colours();
+const trace = new Trace();
+const clock = new Clock();
+const section = new Section(byId("section"), palette);
+const timePlot = new TimePlot(byId("time-plot"), palette);
+const phasePlot = new PhasePlot(byId("phase-plot"), palette);
+const events = new EventList(byId("events"));
+const panel = new Panel();
+
+let scene = { layers: [] };
+let tissue = new Tissue([]);
+let linkStatus = null;
+/** What is drawn; the latest of everything. */
+const view = {
+  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, state: "idle",
+  hand: 0, person: false, canDrag: false, seconds: 0,
+};
+
+const receive = {
+  scene(message) {
+    scene = message;
+    tissue = new Tissue(scene.layers);
+    view.known = false;
+    view.tilt = scene.tilt_rad;
+    view.canDrag = scene.hand;
+    trace.clear();
+    timePlot.clear();
+    events.clear();
+    hand.allow(scene.hand, scene.travel_mm);
+    panel.scene(scene);
+  },
+  device(message) {
+    panel.device(message);
+  },
+  frame(message) {
+    linkStatus = message.link;
+    for (const event of message.events) happen(event);
+    for (const bucket of message.trace) trace.push(bucket);
+    if (message.timing) panel.timing(message.timing);
+    const pose = message.pose;
+    if (!pose) return;
+    clock.hear(pose.t_s, performance.now());
+    view.known = true;
+    view.depth = pose.depth_mm;
+    view.force = pose.force_n;
+    view.motor = pose.motor_n;
+    view.speed = pose.speed_mm_s;
+    view.torque = pose.torque_mnm;
+    view.tilt = pose.tilt_rad;
+    view.state = pose.state;
+    panel.limits(pose.limits, performance.now());
+    hand.follow(message.hand, pose.depth_mm);
+  },
+};
+
+function happen(event) {
+  tissue.happen(event);
+  events.add(event, scene.layers);
+  if (event.limits) panel.limits(event.limits, performance.now());
+  if (event.kind === "puncture" || event.kind === "vessel") {
+    timePlot.mark(event.t_s, scene.layers[event.layer]?.name ?? "layer");
+  }
+}
+
+const link = new Link((message) => receive[message.type]?.(message));
+const hand = new Hand(byId("section"), section, link);
+
+/** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
+const stats = { fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN };
+window.__stats = stats;
+const counting = { since: performance.now(), frames: 0 };
+
+let lastDrawn = performance.now();
+let lastPanel = -Infinity;
+
+function draw(nowMs) {
+  hand.tell();
+  view.seconds = Math.min(0.1, (nowMs - lastDrawn) / 1000);
+  lastDrawn = nowMs;
+  view.hand = hand.depth;
+  view.person = hand.person;
+  const condition = link.condition;
+  const now = clock.now(performance.now());
+  tissue.move(view.depth, view.force, view.seconds);
+  section.draw(view, tissue);
+  timePlot.draw(trace, now);
+  phasePlot.draw(trace, now);
+  if (nowMs - lastPanel >= PANEL_MS) {
+    lastPanel = nowMs;
+    tellCondition(condition);
+    view.peak = largestForce(now);
+    panel.show(view, linkStatus, condition, nowMs);
+  }
+  count(nowMs);
+  requestAnimationFrame(draw);
+}
+
+/** Largest computed force of the time shown, in N. */
+function largestForce(now) {
+  let peak = -Infinity;
+  for (let i = trace.firstSince(now - WINDOW_S); i < trace.end; i++) {
+    const force = trace.lawHigh[trace.slot(i)];
+    if (force > peak) peak = force;
+  }
+  return peak;
+}
+
+/** Says what is missing and for how long. */
+function tellCondition(condition) {
+  document.body.dataset.link = condition;
+  const seconds = Math.floor(link.dataAge / 1000);
+  const since = `no data since ${seconds} s`;
+  const notice = linkStatus?.notice ?? "";
+  const owed = link.stopOwed ? " Your stop could not be sent; to be safe cut the power." : "";
+  if (condition === "lost") panel.banner(`Program not reached, ${since}. Connecting again.${owed}`);
+  else if (condition === "stale") panel.banner(`Device silent, ${since}.${notice ? ` ${notice}.` : ""}`);
+  else panel.banner(notice);
+}
+
+function count(nowMs) {
+  stats.frames++;
+  counting.frames++;
+  if (nowMs - counting.since >= 1000) {
+    stats.fps = (1000 * counting.frames) / (nowMs - counting.since);
+    counting.since = nowMs;
+    counting.frames = 0;
+  }
+  stats.lastMessageAgeMs = performance.now() - link.lastMessageAt;
+  if (!view.known) return;
+  stats.depthMm = view.depth;
+  stats.forceN = view.force;
+  stats.motorN = view.motor;
+  if (Number.isNaN(stats.firstFrameMs)) stats.firstFrameMs = performance.now();
+}
+
+requestAnimationFrame(draw);

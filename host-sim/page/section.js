@@ -1,0 +1,315 @@
+// The needle at its tilt in a section of the tissue. Millimetres with the entry point at 0, x along the skin, y down.
+
+import { surface } from "./canvas.js";
+import { VESSEL_MM, displace } from "./tissue.js";
+
+const NEEDLE = { length: 32, radius: 0.41, bevel: 2.1 }; // 21 gauge
+/** The grip that a person drags, mm behind the tip. */
+const GRIP_MM = 9;
+/** The tilt is drawn at least this steep: flatter, the layers would fall into one line. */
+const FLATTEST = 0.17;
+const WIDE_MM = 27;
+const COLUMNS = 120;
+const FIBRES = 7;
+const MM_PER_N = 4;
+
+export class Section {
+  constructor(canvas, colours) {
+    this.surface = surface(canvas);
+    this.colours = colours;
+    this.axis = { x: 1, y: 0, tilt: NaN };
+    this.scale = NaN;
+    this.origin = { x: 0, y: 0 };
+    this.point = { x: 0, y: 0 };
+    this.ellipse = { x: 0, y: 0, along: 0 };
+  }
+
+  /** Millimetres along the needle for a movement of `dx`, `dy` CSS pixels. */
+  along(dx, dy) {
+    return (dx * this.axis.x + dy * this.axis.y) / this.scale;
+  }
+
+  /** One picture. `view` is { depth, force, motor, tilt, hand, person, seconds }, `tissue` a Tissue. */
+  draw(view, tissue) {
+    const { context: g, width, height } = this.surface;
+    this.look(view, tissue, width, height);
+    g.fillStyle = this.colours.sky;
+    g.fillRect(0, 0, width, height);
+    this.layers(g, tissue, width, height);
+    this.vessel(g, tissue);
+    this.ruler(g);
+    this.needle(g, view, tissue);
+    this.angle(g, view);
+    this.forceArrow(g, view);
+    this.names(g, tissue, width, height);
+    this.scaleBar(g, height);
+  }
+
+  /** Where the picture looks: the entry point and the vessel stay put, a deep tip makes it step back. */
+  look(view, tissue, width, height) {
+    const tilt = Math.max(view.tilt, FLATTEST);
+    const ease = Number.isNaN(this.axis.tilt) ? 1 : 1 - Math.exp(-view.seconds / 0.2);
+    this.axis.tilt = ease === 1 ? tilt : this.axis.tilt + ease * (tilt - this.axis.tilt);
+    this.axis.x = Math.cos(this.axis.tilt);
+    this.axis.y = Math.sin(this.axis.tilt);
+    const target = tissue.layers.find((layer) => layer.is_vessel) ?? tissue.layers.at(-1);
+    const aim = target ? target.top_mm : 5;
+    const across = Math.hypot(this.axis.x / VESSEL_MM.wide, this.axis.y / VESSEL_MM.high);
+    this.ellipse.along = aim + 0.5 / across;
+    this.ellipse.x = this.ellipse.along * this.axis.x;
+    this.ellipse.y = this.ellipse.along * this.axis.y;
+    const lowest = Math.max(this.ellipse.y + VESSEL_MM.high / 2 + 1.5, view.depth * this.axis.y + 1.5);
+    const wanted = Math.min(width / WIDE_MM, (0.56 * height) / lowest, 46);
+    this.scale = ease === 1 ? wanted : this.scale + ease * (wanted - this.scale);
+    this.origin.x = 0.53 * width - 0.5 * this.ellipse.x * this.scale;
+    this.origin.y = 0.44 * height;
+  }
+
+  x(mm) { return this.origin.x + mm * this.scale; }
+  y(mm) { return this.origin.y + mm * this.scale; }
+
+  /** A line of tissue that is level at rest, from left to right. */
+  level(g, tissue, y, width) {
+    const left = -this.origin.x / this.scale - 3;
+    const right = left + width / this.scale + 6;
+    for (let i = 0; i <= COLUMNS; i++) {
+      displace(tissue, this.axis, left + ((right - left) * i) / COLUMNS, y, this.point);
+      if (i === 0) g.moveTo(this.x(this.point.x), this.y(this.point.y));
+      else g.lineTo(this.x(this.point.x), this.y(this.point.y));
+    }
+  }
+
+  layers(g, tissue, width, height) {
+    const bottom = (height - this.origin.y) / this.scale + 3;
+    const bands = tissue.layers.filter((layer) => !layer.is_vessel);
+    for (let i = 0; i < bands.length; i++) {
+      const top = bands[i].top_mm * this.axis.y;
+      const end = i + 1 < bands.length ? bands[i + 1].top_mm * this.axis.y : bottom;
+      g.beginPath();
+      this.level(g, tissue, top, width);
+      g.lineTo(width + 99, height + 99);
+      g.lineTo(-99, height + 99);
+      g.closePath();
+      g.fillStyle = this.colours[bands[i].name] ?? this.colours.other;
+      g.fill();
+      if (i === 0) {
+        g.beginPath();
+        this.level(g, tissue, top, width);
+        g.strokeStyle = this.colours["skin-edge"];
+        g.lineWidth = 3;
+        g.stroke();
+      }
+      g.beginPath();
+      const lines = end === bottom ? FIBRES * 2 : Math.max(1, Math.floor((end - top) / 0.45));
+      for (let k = 1; k < lines; k++) this.level(g, tissue, top + ((end - top) * k) / lines, width);
+      g.strokeStyle = this.colours.fibre;
+      g.lineWidth = 1;
+      g.stroke();
+    }
+  }
+
+  /** The vessel, cut across: an oval whose near wall gives under the tip. */
+  vessel(g, tissue) {
+    if (!tissue.layers.some((layer) => layer.is_vessel)) return;
+    g.beginPath();
+    for (let i = 0; i <= 72; i++) {
+      const turn = (i / 72) * 2 * Math.PI;
+      const x = this.ellipse.x + (VESSEL_MM.wide / 2) * Math.cos(turn);
+      const y = this.ellipse.y + (VESSEL_MM.high / 2) * Math.sin(turn);
+      displace(tissue, this.axis, x, y, this.point);
+      if (i === 0) g.moveTo(this.x(this.point.x), this.y(this.point.y));
+      else g.lineTo(this.x(this.point.x), this.y(this.point.y));
+    }
+    g.closePath();
+    g.fillStyle = this.colours.lumen;
+    g.fill();
+    g.strokeStyle = this.colours["vessel-wall"];
+    g.lineWidth = Math.max(3, 0.28 * this.scale);
+    g.stroke();
+  }
+
+  /** Depth along the needle, where it will go: a tick each mm, a number each five. */
+  ruler(g) {
+    const reach = Math.ceil(this.ellipse.along + 5);
+    g.save();
+    this.alongNeedle(g, 0);
+    g.strokeStyle = this.colours["on-tissue"];
+    g.fillStyle = this.colours["on-tissue"];
+    g.globalAlpha = 0.65;
+    g.lineWidth = 1;
+    g.setLineDash([5, 4]);
+    g.beginPath();
+    g.moveTo(0, 0);
+    g.lineTo(reach * this.scale, 0);
+    g.stroke();
+    g.setLineDash([]);
+    g.beginPath();
+    for (let mm = 1; mm <= reach; mm++) {
+      g.moveTo(mm * this.scale, 0);
+      g.lineTo(mm * this.scale, mm % 5 ? 4 : 8);
+    }
+    g.stroke();
+    g.font = `12px ${this.colours.font}`;
+    g.textAlign = "center";
+    g.textBaseline = "top";
+    for (let mm = 5; mm <= reach; mm += 5) g.fillText(`${mm} mm`, mm * this.scale, 10);
+    g.restore();
+  }
+
+  /** From here on x runs along the needle from `mm` past the entry point, in CSS pixels. */
+  alongNeedle(g, mm) {
+    g.translate(this.x(mm * this.axis.x), this.y(mm * this.axis.y));
+    g.rotate(this.axis.tilt);
+  }
+
+  /** Tip at the origin, bevel up. */
+  needle(g, view, tissue) {
+    const s = this.scale;
+    const radius = NEEDLE.radius * s;
+    const bevel = NEEDLE.bevel * s;
+    const back = -NEEDLE.length * s;
+    g.save();
+    this.alongNeedle(g, view.depth);
+    g.beginPath();
+    g.moveTo(back, -2 * radius);
+    g.lineTo(-bevel, -2 * radius);
+    g.lineTo(0, 0);
+    g.lineTo(back, 0);
+    g.closePath();
+    const steel = g.createLinearGradient(0, -2 * radius, 0, 0);
+    steel.addColorStop(0, this.colours.steel);
+    steel.addColorStop(0.35, this.colours["steel-light"]);
+    steel.addColorStop(1, this.colours["steel-dark"]);
+    g.fillStyle = steel;
+    g.fill();
+    g.strokeStyle = this.colours["steel-dark"];
+    g.lineWidth = 1;
+    g.stroke();
+    // The ground face and its opening; blood shows in it once the vessel is entered.
+    g.beginPath();
+    g.ellipse(-0.55 * bevel, -1.12 * radius, 0.34 * bevel, 0.34 * radius, Math.atan2(2 * radius, bevel), 0, 2 * Math.PI);
+    g.fillStyle = tissue.inVessel ? this.colours.lumen : this.colours["steel-dark"];
+    g.fill();
+    if (view.person || view.canDrag) this.grip(g, view, radius);
+    g.restore();
+  }
+
+  /** What a person takes hold of, and where the hand wants it to be. */
+  grip(g, view, radius) {
+    const at = -GRIP_MM * this.scale;
+    const half = 1.5 * this.scale;
+    const wide = 2 * radius + 12;
+    if (view.person) {
+      const wish = at + (view.hand - view.depth) * this.scale;
+      g.strokeStyle = this.colours.grip;
+      g.lineWidth = 2;
+      g.setLineDash([4, 3]);
+      g.beginPath();
+      g.roundRect(wish - half, -radius - wide / 2, 2 * half, wide, 6);
+      g.stroke();
+      g.setLineDash([]);
+    }
+    g.beginPath();
+    g.roundRect(at - half, -radius - wide / 2, 2 * half, wide, 6);
+    g.fillStyle = this.colours.grip;
+    g.fill();
+    g.strokeStyle = this.colours.panel;
+    g.lineWidth = 2;
+    g.beginPath();
+    for (let i = -2; i <= 2; i++) {
+      g.moveTo(at + i * 0.4 * half, -radius - 0.28 * wide);
+      g.lineTo(at + i * 0.4 * half, -radius + 0.28 * wide);
+    }
+    g.stroke();
+  }
+
+  angle(g, view) {
+    const from = Math.PI;
+    g.beginPath();
+    g.arc(this.x(0), this.y(0), 3.6 * this.scale, from, from + this.axis.tilt);
+    g.strokeStyle = this.colours.muted;
+    g.lineWidth = 1;
+    g.stroke();
+    const middle = from + this.axis.tilt / 2;
+    g.fillStyle = this.colours.muted;
+    g.font = `13px ${this.colours.font}`;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    const far = 3.9 * this.scale;
+    g.fillText(`${((view.tilt * 180) / Math.PI).toFixed(0)}°`, this.x(0) + far * Math.cos(middle), this.y(0) + far * Math.sin(middle));
+  }
+
+  /** What the hand feels, beside the grip: against insertion up the needle, against withdrawal down it. */
+  forceArrow(g, view) {
+    const s = this.scale;
+    g.save();
+    this.alongNeedle(g, view.depth - GRIP_MM + 4);
+    const length = view.motor * MM_PER_N * s;
+    const y = -2.6 * s;
+    g.strokeStyle = this.colours.force;
+    g.fillStyle = this.colours.force;
+    g.lineWidth = 4;
+    g.beginPath();
+    g.moveTo(0, y - 5);
+    g.lineTo(0, y + 5);
+    g.stroke();
+    if (Math.abs(length) > 2) {
+      const head = Math.sign(length) * Math.min(10, Math.abs(length));
+      g.beginPath();
+      g.moveTo(0, y);
+      g.lineTo(-length + head, y);
+      g.stroke();
+      g.beginPath();
+      g.moveTo(-length, y);
+      g.lineTo(-length + head, y - 7);
+      g.lineTo(-length + head, y + 7);
+      g.fill();
+    }
+    g.font = `600 14px ${this.colours.font}`;
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    g.fillText(`${view.motor.toFixed(2)} N`, (length < 0 ? -length : 0) + 10, y);
+    g.restore();
+  }
+
+  /** Names of the layers at the right, each in its own layer. */
+  names(g, tissue, width, height) {
+    g.font = `13px ${this.colours.font}`;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    g.fillStyle = this.colours["on-tissue"];
+    let free = 0;
+    for (const [i, layer] of tissue.layers.entries()) {
+      const next = tissue.layers.slice(i + 1).find((other) => !other.is_vessel);
+      const top = this.y(layer.top_mm * this.axis.y);
+      const bottom = next ? this.y(next.top_mm * this.axis.y) : height;
+      const label = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
+      const depth = `${label}, from ${layer.top_mm.toFixed(1)} mm`;
+      const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 9);
+      if (layer.is_vessel) {
+        g.fillText(depth, width - 12, Math.max(this.y(this.ellipse.y), free + 9));
+        continue;
+      }
+      g.fillText(depth, width - 12, y);
+      free = y + 9;
+    }
+  }
+
+  scaleBar(g, height) {
+    const x = 12;
+    const y = height - 16;
+    g.strokeStyle = this.colours["on-tissue"];
+    g.fillStyle = this.colours["on-tissue"];
+    g.lineWidth = 2;
+    g.beginPath();
+    g.moveTo(x, y - 4);
+    g.lineTo(x, y);
+    g.lineTo(x + 5 * this.scale, y);
+    g.lineTo(x + 5 * this.scale, y - 4);
+    g.stroke();
+    g.font = `12px ${this.colours.font}`;
+    g.textAlign = "left";
+    g.textBaseline = "bottom";
+    g.fillText("5 mm", x + 6, y - 4);
+  }
+}

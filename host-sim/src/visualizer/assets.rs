@@ -1,0 +1,33 @@
+//! The files of `host-sim/page`, inside the program: the page needs no disk and no network.
+
+/// A file as it is served.
+pub(super) struct Asset {
+    pub(super) path: &'static str,
+    pub(super) content_type: &'static str,
+    pub(super) body: &'static str,
+}
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+macro_rules! asset {
+    ($path:literal, $file:literal, $content_type:expr) => {
+        Asset { path: $path, content_type: $content_type, body: include_str!(concat!("../../page/", $file)) }
+    };
+}
+
+/// All of them.
+pub(super) const ASSETS: &[Asset] = &[
+    asset!("/", "index.html", "text/html; charset=utf-8"),
+    asset!("/style.css", "style.css", "text/css; charset=utf-8"),
+    asset!("/icon.svg", "icon.svg", "image/svg+xml"),
+    asset!("/main.js", "main.js", SCRIPT),
+    asset!("/link.js", "link.js", SCRIPT),
+    asset!("/canvas.js", "canvas.js", SCRIPT),
+    asset!("/panel.js", "panel.js", SCRIPT),
+    asset!("/section.js", "section.js", SCRIPT),
+    asset!("/tissue.js", "tissue.js", SCRIPT),
+    asset!("/plots.js", "plots.js", SCRIPT),
+    asset!("/trace.js", "trace.js", SCRIPT),
+    asset!("/events.js", "events.js", SCRIPT),
+    asset!("/hand.js", "hand.js", SCRIPT),
+];

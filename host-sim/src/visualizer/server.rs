@@ -1,0 +1,208 @@
+//! Serves the page on this computer only.
+
+use super::assets::{ASSETS, Asset};
+use super::connection;
+use crate::session::Session;
+use axum::Router;
+use axum::extract::{State, WebSocketUpgrade};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::serve::ListenerExt;
+use std::fmt;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::thread::JoinHandle;
+use tokio::sync::oneshot;
+
+/// Longest message taken from a page, in bytes; the longest that it sends has about 40.
+const LONGEST_MESSAGE: usize = 1_024;
+
+/// Why the page cannot be served.
+#[derive(Debug)]
+pub enum ServeError {
+    /// Something else listens there.
+    PortInUse {
+        /// The port.
+        port: u16,
+    },
+    /// Any other reason.
+    Io {
+        /// The port.
+        port: u16,
+        /// What the system says.
+        error: io::Error,
+    },
+}
+
+impl fmt::Display for ServeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PortInUse { port } => write!(
+                f,
+                "port {port} on 127.0.0.1 is in use; end what uses it or choose another one with --port"
+            ),
+            Self::Io { port, error } => {
+                write!(f, "cannot serve the page on 127.0.0.1:{port}: {error}; try another one with --port")
+            }
+        }
+    }
+}
+
+impl std::error::Error for ServeError {}
+
+/// What every request needs.
+#[derive(Clone)]
+pub(super) struct Shared {
+    pub(super) session: Session,
+    /// Whether a person has taken the needle in any page.
+    pub(super) person: Arc<AtomicBool>,
+}
+
+/// A page being served; dropped, it is not any more.
+#[derive(Debug)]
+pub struct Server {
+    address: SocketAddr,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Where the page is.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// The port, which the system chose where 0 was asked for.
+    pub fn port(&self) -> u16 {
+        self.address.port()
+    }
+
+    /// Serves until the program ends.
+    pub fn wait(mut self) {
+        if let Some(thread) = self.thread.take() {
+            // A server that panicked serves no more, and its panic has been printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        if let Some(stop) = self.stop.take() {
+            let _ = stop.send(());
+        }
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Serves `session` at `port` of 127.0.0.1 (0: any free one) on a thread of its own.
+pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
+    let failed = |error: io::Error| match error.kind() {
+        io::ErrorKind::AddrInUse => ServeError::PortInUse { port },
+        _ => ServeError::Io { port, error },
+    };
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
+    listener.set_nonblocking(true).map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let (stop, stopped) = oneshot::channel();
+    let shared = Shared { session, person: Arc::default() };
+    let run = move || {
+        runtime.block_on(async {
+            tokio::select! {
+                () = listen(listener, shared) => {}
+                _ = stopped => {}
+            }
+        });
+        // Ends connections too; nothing in them blocks.
+        runtime.shutdown_background();
+    };
+    let thread = std::thread::Builder::new().name("page".into()).spawn(run).map_err(failed)?;
+    Ok(Server { address, stop: Some(stop), thread: Some(thread) })
+}
+
+async fn listen(listener: TcpListener, shared: Shared) {
+    let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+    // Sixty small messages a second: each is wanted at once.
+    let listener = listener.tap_io(|stream| {
+        let _ = stream.set_nodelay(true);
+    });
+    let mut router = Router::new().route("/live", get(live));
+    for asset in ASSETS {
+        router = router.route(asset.path, get(move || async move { file(asset) }));
+    }
+    // Ends only with its future.
+    let _ = axum::serve(listener, router.with_state(shared)).await;
+}
+
+fn file(asset: &'static Asset) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, asset.content_type),
+        // A newer program at the same address must not meet the older one's page.
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::CONTENT_SECURITY_POLICY, "default-src 'self'"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    ];
+    (headers, asset.body).into_response()
+}
+
+async fn live(State(shared): State<Shared>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
+    if !is_own_page(&headers) {
+        return (StatusCode::FORBIDDEN, "only the page of this program may move the needle").into_response();
+    }
+    upgrade
+        .max_message_size(LONGEST_MESSAGE)
+        .max_frame_size(LONGEST_MESSAGE)
+        .on_upgrade(move |socket| connection::run(socket, shared))
+}
+
+/// Any site that a person visits may open a WebSocket to 127.0.0.1 and would drive the motor: the browser tells where the
+/// script came from, and that has to be here.
+fn is_own_page(headers: &HeaderMap) -> bool {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let Some(host) = text(header::HOST) else { return false };
+    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+    let local = matches!(name, "127.0.0.1" | "localhost" | "[::1]");
+    // Programs that are no browser send no origin.
+    local && text(header::ORIGIN).is_none_or(|origin| origin.strip_prefix("http://") == Some(host))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(host: &str, origin: Option<&str>) -> HeaderMap {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, host.parse().unwrap());
+        if let Some(origin) = origin {
+            headers.insert(header::ORIGIN, origin.parse().unwrap());
+        }
+        headers
+    }
+
+    #[test]
+    fn only_the_own_page_may_connect() {
+        assert!(is_own_page(&headers("127.0.0.1:8710", Some("http://127.0.0.1:8710"))));
+        assert!(is_own_page(&headers("localhost:9000", Some("http://localhost:9000"))));
+        assert!(is_own_page(&headers("127.0.0.1:8710", None)));
+        assert!(!is_own_page(&headers("127.0.0.1:8710", Some("http://example.org"))));
+        assert!(!is_own_page(&headers("127.0.0.1:8710", Some("null"))));
+        assert!(!is_own_page(&headers("example.org:8710", Some("http://example.org:8710"))));
+    }
+
+    #[test]
+    fn a_port_in_use_is_one_clear_line() {
+        let taken = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let port = taken.local_addr().unwrap().port();
+        let (session, _publisher) = crate::session::open(super::super::test_scene());
+        let error = serve(session, port).unwrap_err();
+        assert!(matches!(error, ServeError::PortInUse { port: p } if p == port));
+        assert_eq!(error.to_string().lines().count(), 1);
+        assert!(error.to_string().contains(&port.to_string()));
+    }
+}
