@@ -1,6 +1,7 @@
 //! One module a command.
 
 mod progress;
+mod recordings;
 mod run;
 
 use clap::{Parser, Subcommand};
@@ -19,6 +20,9 @@ pub(crate) struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Run(run::Run),
+    Replay(recordings::Replay),
+    Export(recordings::Export),
+    Score(recordings::Score),
 }
 
 impl Cli {
@@ -26,6 +30,9 @@ impl Cli {
         match self.command {
             None => run::Run::default().run(),
             Some(Command::Run(command)) => command.run(),
+            Some(Command::Replay(command)) => command.run(),
+            Some(Command::Export(command)) => command.run(),
+            Some(Command::Score(command)) => command.run(),
         }
     }
 }

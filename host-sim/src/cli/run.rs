@@ -14,6 +14,7 @@ use host_sim::recording::write::Recorder;
 use host_sim::session::{self, Session, Source};
 use host_sim::station::{Outcome, Outlets, Station};
 use host_sim::tally::Tally;
+use host_sim::visualizer;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -95,7 +96,7 @@ impl Run {
         let shown_procedure = is_virtual.then(|| procedure.name.clone());
         let (session, publisher) = session::open(profile.scene(source, shown_procedure.clone()));
         // The port is taken before the file is made: a page that cannot be served must not cost a recording.
-        let _server = if self.headless { None } else { Some(self.serve(session)?) };
+        let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
             program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
             source: self.device.clone(),
@@ -151,10 +152,6 @@ impl Run {
         }
     }
 
-    fn serve(&self, _session: Session) -> Result<(), Failure> {
-        Err(Failure::failed(format_args!("no page yet on port {}; use --headless", self.port)))
-    }
-
     fn report(&self, outcome: &Outcome) {
         if let (Some(path), Some(bytes)) = (&self.record, outcome.recorded_bytes) {
             println!("recorded {bytes} bytes to {}", path.display());
@@ -175,8 +172,15 @@ impl Run {
     }
 }
 
+/// Serves the page and says where.
+pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
+    let server = visualizer::serve(session, port).map_err(Failure::failed)?;
+    println!("visualizer at {}", server.url());
+    Ok(server)
+}
+
 /// Ctrl-C and a polite kill end the run in good order: torque off, recording closed, last line printed.
-fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
+pub(crate) fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // A second one ends the program at once.
         signal_hook::flag::register_conditional_shutdown(signal, 1, stop.clone())

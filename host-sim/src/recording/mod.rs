@@ -1,6 +1,7 @@
 //! Recordings: an MCAP file whose messages are JSON, so that any MCAP tool reads them. One module writes, one reads, one
 //! exports to the rig and CSV of the diagnosis.
 
+pub mod export;
 pub mod messages;
 pub mod read;
 pub mod write;
