@@ -39,6 +39,8 @@ pub(crate) struct Nominal {
     pub(crate) rig: Rig,
     /// Sign with which the measured load acts; zero where it was not seen to act.
     pub(crate) external: f64,
+    /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard deviation).
+    pub(crate) anchor: Option<(f64, f64)>,
 }
 
 /// How many standard deviations a nominal value may move in a refit.
@@ -52,7 +54,12 @@ impl Nominal {
 
     /// Factor by which gain over inertia may differ from its nominal value.
     pub(crate) fn gain_reach(&self) -> f64 {
-        1.0 + REACH * (self.rig.gain_sd().powi(2) + self.rig.inertia_sd().powi(2)).sqrt()
+        1.0 + REACH * self.gain_sd()
+    }
+
+    /// Relative standard deviation of gain over inertia.
+    pub(crate) fn gain_sd(&self) -> f64 {
+        (self.rig.gain_sd().powi(2) + self.rig.inertia_sd().powi(2)).sqrt()
     }
 
     fn has_offset(&self) -> bool {
@@ -72,8 +79,9 @@ impl Nominal {
 
     fn priors(&self, key: Key, noise: &Noise) -> Prior {
         let rig = &self.rig;
-        let j = rig.model.inertia;
-        let common = rig.inertia_sd();
+        // Forces become accelerations by the inertia that goes with the anchor.
+        let j = self.anchor.map_or(rig.model.inertia, |(value, _)| rig.actuator.gain / value);
+        let common = rig.inertia_sd().min(self.anchor.map_or(f64::INFINITY, |(_, sd)| sd));
         let relative = |value: f64, sd: f64| {
             let mean = value / j;
             let sd = (sd * sd + common * common).sqrt();
@@ -84,9 +92,8 @@ impl Nominal {
         };
         match key {
             Key::Gain => {
-                let mean = self.gain();
-                let sd = (rig.gain_sd().powi(2) + common * common).sqrt();
-                let (a, b) = (mean / self.gain_reach(), mean * self.gain_reach());
+                let (mean, sd) = self.anchor.unwrap_or((self.gain(), self.gain_sd()));
+                let (a, b) = (mean / (1.0 + REACH * sd), mean / (1.0 - REACH * sd).max(0.05));
                 Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
             }
             Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
@@ -110,13 +117,19 @@ impl Nominal {
 
     /// What a coefficient of an effect may be for the effect to be what its name says.
     pub(crate) fn limits(&self, name: EffectName) -> (f64, f64) {
-        let gain = self.gain();
+        let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
         match name {
             EffectName::GainDrift => {
                 // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
                 let least = 0.6 * gain.abs() / self.gain_reach();
                 (-least, least)
             }
+            EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
+                let dry = self.rig.model.coulomb.unwrap_or(0.0) / (self.rig.actuator.gain / gain).abs();
+                (-0.9 * dry, 3.0 * dry)
+            }
+            // A commutation that loses much of the torque at some angle is broken rather than rippled.
+            EffectName::TorqueRipple => (-0.15 * gain.abs(), 0.15 * gain.abs()),
             EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),

@@ -4,6 +4,7 @@ use crate::fit::Fit;
 use crate::kalman::{Noise, smooth};
 use crate::model::{Model, Nominal};
 use crate::noise::{self, Colour};
+use crate::solve::{Prior, Square, bounded};
 use crate::track::{Total, Track};
 
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
@@ -39,8 +40,53 @@ pub(crate) fn resmooth(tracks: &mut [Track], totals: &[Total], noise: &Noise) {
     }
 }
 
+/// Relative standard deviation of gain over inertia above which the rig hardly knows it.
+const LOOSE: f64 = 0.5;
+
+/// Where the rig hardly knows the inertia, slow motion under a speed loop is explained as well by an axis too heavy to
+/// be moved as by forces in balance. Regressing the command on the motion, rather than the motion on the command, has
+/// no such way out; what it finds anchors the fits that follow.
+fn anchor(nominal: &mut Nominal, fit: &Fit) {
+    let size = fit.keys.len();
+    // Unknowns: the data's own column takes the place of the gain's.
+    let mut m = Square::zero(size);
+    let mut b = vec![0.0; size];
+    for (one, places) in fit.prepared.iter().zip(&fit.places) {
+        let p = places.len();
+        // Undo the reference: the data as it stands is the residual plus the reference's columns.
+        let mut raw: Vec<f64> = one.reference.clone();
+        raw.push(1.0);
+        for segment in &one.segments {
+            let with_raw: Vec<f64> =
+                (0..=p).map(|i| (0..=p).map(|j| segment.at(i, j) * raw[j]).sum()).collect();
+            let raw_square: f64 = with_raw.iter().zip(&raw).map(|(a, b)| a * b).sum();
+            // Column 0 is the gain's: command = (1/gain)·data − Σ forces/gain.
+            let inner = |i: usize, j: usize| match (i, j) {
+                (0, 0) => raw_square,
+                (0, j) => with_raw[j],
+                (i, 0) => with_raw[i],
+                (i, j) => segment.at(i, j),
+            };
+            for i in 0..p {
+                b[places[i]] += if i == 0 { with_raw[0] } else { segment.at(i, 0) };
+                for j in 0..p {
+                    m.add(places[i], places[j], inner(i, j));
+                }
+            }
+        }
+    }
+    let solution = bounded(&m, &b, &vec![Prior::FREE; size]);
+    let place = fit.places[0][0];
+    let inverse = solution.x[place];
+    if inverse * nominal.gain() > 0.0 {
+        let reach = 40.0;
+        let gain = (1.0 / inverse).abs().clamp(nominal.gain().abs() / reach, nominal.gain().abs() * reach);
+        nominal.anchor = Some((gain * nominal.gain().signum(), 0.15));
+    }
+}
+
 /// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
-pub(crate) fn settle(nominal: &Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
+pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
     let (mut square, mut rows) = (0.0, 0.0);
     for track in &*tracks {
         square += track.command.iter().map(|u| u * u).sum::<f64>();
@@ -60,7 +106,12 @@ pub(crate) fn settle(nominal: &Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
     resmooth(tracks, &totals, &noise);
     let model = Model::default();
     let mut fit = Fit::new(&model, nominal, tracks, &noise);
-    for _ in 0..2 {
+    for round in 0..2 {
+        if round == 0 && nominal.gain_sd() > LOOSE {
+            let white = noise::estimate(tracks, &totals, &noise, scale, Colour::White);
+            anchor(nominal, &Fit::new(&model, nominal, tracks, &white));
+            fit = Fit::new(&model, nominal, tracks, &noise);
+        }
         let totals = fit.totals(tracks);
         noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
         resmooth(tracks, &totals, &noise);
@@ -96,7 +147,7 @@ mod look {
             for l in &s.lost {
                 println!("lost {l:?}");
             }
-            println!("{:?} {:?}", s.last.fit.theta(0), s.last.noise);
+            println!("{:?} {:?} anchor {:?}", s.last.fit.theta(0), s.last.noise, s.nominal.anchor);
             let t = crate::pipeline::table(&s);
             println!(
                 "{:?} fit {:.2}% {:.2}% held {:.2}% {:.2}%",

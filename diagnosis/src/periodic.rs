@@ -25,7 +25,7 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
         let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
         return Some((turn, (1..=highest).map(|n| n as f64).collect()));
     }
-    let most = (travel / shortest).min(250.0);
+    let most = (travel / shortest).min(160.0);
     // One over the travel is the reference; cycles over the travel play the part of orders.
     let count = (most * 2.0) as usize;
     (count >= 8).then(|| (travel, (4..=count).map(|i| 0.5 * i as f64).collect()))
@@ -95,7 +95,7 @@ pub(crate) fn search(
         if apart && single[index] > 3.0 {
             kept.push(index);
         }
-        if kept.len() >= 2 * MOST {
+        if kept.len() >= if whole { 2 * MOST } else { MOST } {
             break;
         }
     }
@@ -108,7 +108,7 @@ pub(crate) fn search(
         kept.par_iter()
             .map(|k| {
                 let at = |order: f64| gain_of(&project(fit, residuals, &terms_of(order), true));
-                golden(orders[*k] - 0.5, orders[*k] + 0.5, 12, at)
+                golden(orders[*k] - 0.5, orders[*k] + 0.5, 7, at)
             })
             .collect()
     };

@@ -88,9 +88,9 @@ pub(crate) fn search(
 ) -> Result<Search, InputError> {
     let mut tracks: Vec<Track> = fit.iter().map(|r| Track::new(r, rig)).collect();
     let mut held: Vec<Track> = held.iter().map(|r| Track::new(r, rig)).collect();
-    let nominal = Nominal { rig: rig.clone(), external: 0.0 };
+    let mut nominal = Nominal { rig: rig.clone(), external: 0.0, anchor: None };
     progress("refitting the nominal model", 0.1);
-    let (noise, _) = null::settle(&nominal, &mut tracks);
+    let (noise, _) = null::settle(&mut nominal, &mut tracks);
     let scale = command_scale(&nominal, &tracks);
     let span = Span::of(&tracks, &nominal);
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
@@ -101,9 +101,21 @@ pub(crate) fn search(
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
+        let clock = std::time::Instant::now();
         let candidates = bench.screen(&white);
+        if std::env::var("DIAG_DEBUG").is_ok() { println!("screen {:?}", clock.elapsed()); }
         let finalists = bench.finalists(&white, &candidates);
         let mut taken = None;
+        if std::env::var("DIAG_DEBUG").is_ok() { println!("finalists {:?}", clock.elapsed()); }
+        if std::env::var("DIAG_DEBUG").is_ok() {
+            println!("white {:?} theta {:?}", white.noise, white.fit.theta(0));
+            for (e, g) in &candidates {
+                println!("   screen {g:.1} {} {:?}", e.name, e.shape);
+            }
+            for f in &finalists {
+                println!("  {:.1} {} {:?}", f.merit - white.merit, f.model.effects.last().unwrap().name, &f.fit.theta(0));
+            }
+        }
         for finalist in finalists {
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
             if taken.is_some() || finalist.merit - white.merit < WORTH {
@@ -129,7 +141,8 @@ pub(crate) fn search(
     let mut found;
     // Whatever does not carry to the held-out recordings goes, the weakest first, until all that is left does.
     loop {
-        found = judge_all(&bench, &last, &held);
+        let plain = bench.fit(model.clone(), &white.noise, Colour::White);
+        found = judge_all(&bench, &plain, &held);
         let weakest = found
             .iter()
             .enumerate()

@@ -7,6 +7,10 @@ use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
 use rayon::prelude::*;
 
+/// A command effect may change this part of the command's mean size at the most: a drive that ignores its command explains
+/// any balance of forces, and so explains nothing.
+const EXPLAINED_AWAY: f64 = 0.35;
+
 /// What a score test says.
 #[derive(Debug, Clone)]
 pub(crate) struct Score {
@@ -28,6 +32,10 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
         with.push(effect.clone());
         let after = effective_command(track, &with).expect("the effect acts on the command");
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
+        let size = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
+        if size(&change) > EXPLAINED_AWAY * size(command) {
+            return vec![Input::Held(vec![0.0; track.blocks()])];
+        }
         return vec![track.rows_input(&change)];
     }
     let drive = track.rows_input(command);

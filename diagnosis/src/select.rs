@@ -80,6 +80,7 @@ impl Bench<'_> {
     pub(crate) fn screen(&self, now: &Candidate) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
         let mut found: Vec<(Effect, f64)> = Vec::new();
+        let clock = std::time::Instant::now();
         for name in N::ALL {
             let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
             let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
@@ -109,6 +110,7 @@ impl Bench<'_> {
                     .map(|(effect, score)| (effect, score.gain))
                 }
             };
+            if std::env::var("DIAG_DEBUG").is_ok() { println!("    {name} {:?}", clock.elapsed()); }
             if let Some((effect, _)) = best {
                 let (effect, gain) = self.refine(now, &residuals, effect);
                 let worth = gain - cost(&effect, self.tracks.len(), self.span);
