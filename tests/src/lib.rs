@@ -6,4 +6,5 @@
 
 pub mod board;
 pub mod pc;
+pub mod scenario;
 pub mod usb_host;

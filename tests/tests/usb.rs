@@ -18,7 +18,15 @@ fn smoke() {
     let mut pc = Pc::new();
     pc.connect(&mut board);
     println!("{:?} {:?}", board.now(), pc.heard.hello);
-    println!("{:?}", board.at_stop(|s| (s.usb().host.identity().clone(), s.usb().core.misuse(), s.stray_accesses(), s.resets())));
+    println!(
+        "{:?}",
+        board.at_stop(|s| (
+            s.usb().host.identity().clone(),
+            s.usb().core.misuse(),
+            s.stray_accesses(),
+            s.resets()
+        ))
+    );
     pc.run_ms(&mut board, 1000);
     println!("{:?}", pc.counts());
     println!("{:?} {:?}", pc.heard.timing, pc.heard.events);

@@ -233,8 +233,9 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled };
-        if self.steps() { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
+        let stepping = self.steps();
+        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled, stepping };
+        if stepping { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
     }
 
     fn reset(&mut self) {
@@ -332,6 +333,8 @@ struct Rerouted<'a> {
     bus: &'a mut dyn CoreBus,
     flash: &'a Flash,
     stalled: u64,
+    /// Whether the core is looked at after every instruction.
+    stepping: bool,
 }
 
 impl CoreBus for Rerouted<'_> {
@@ -367,6 +370,9 @@ impl CoreBus for Rerouted<'_> {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
+        if self.stepping {
+            return None;
+        }
         self.bus.carry_on(instructions + self.stalled, event)
     }
 

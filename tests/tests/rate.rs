@@ -1,0 +1,96 @@
+//! Ten thousand ticks a second, each in time, none lost, whatever the PC does meanwhile.
+
+use link::Command;
+use tests::board::{Nanos, Wiring};
+use tests::pc::Pc;
+use tests::scenario::{board_wired, venepuncture};
+
+const TICK: Nanos = 100_000;
+const MINUTE_TICKS: u64 = 600_000;
+/// What the cable may hold for the device: the host keeps it full.
+const FLOOD_BYTES: usize = 4_096;
+
+/// Bytes that are no frame, and many that end one.
+fn garbage(seed: &mut u64) -> Vec<u8> {
+    (0..512)
+        .map(|_| {
+            *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let byte = (*seed >> 56) as u8;
+            if byte < 8 { 0 } else { byte }
+        })
+        .collect()
+}
+
+#[test]
+fn a_minute_of_flood_costs_no_tick_no_sample_and_no_time() {
+    let wiring = Wiring { plant_period: TICK, ..Wiring::default() };
+    let mut board = board_wired(wiring, venepuncture(1_000_000_000));
+    let mut pc = Pc::counting();
+    pc.connect(&mut board);
+    pc.must(&mut board, Command::Start);
+    pc.run_ms(&mut board, 10);
+    board.at_stop(|stopped| *stopped.log() = Default::default());
+    let (start, counts_before) = (board.now(), pc.counts());
+    let mut seed = 1;
+    let mut commands = 0_u64;
+    while board.now() < start + MINUTE_TICKS * TICK {
+        // Valid commands and garbage in turn, faster than the cable carries them.
+        while board.at_stop(|stopped| stopped.usb().host.unsent()) < FLOOD_BYTES {
+            let command = match commands % 4 {
+                0 => Command::Zero,
+                1 => Command::Start,
+                _ => Command::Heartbeat,
+            };
+            pc.send(&mut board, command);
+            let noise = garbage(&mut seed);
+            pc.send_bytes(&mut board, &noise);
+            // What follows the noise up to its next zero is part of it.
+            pc.send_bytes(&mut board, &[0]);
+            commands += 1;
+        }
+        pc.run_ms(&mut board, 1);
+    }
+    // What is on its way arrives.
+    let log = board.at_stop(|stopped| std::mem::take(stopped.log()));
+    pc.run_ms(&mut board, 50);
+    let counts = pc.counts();
+
+    assert_eq!(log.encoder.len() as u64, MINUTE_TICKS, "ticks in a minute");
+    assert_eq!(log.written.len() as u64, MINUTE_TICKS, "codes in a minute");
+    let apart = log.encoder.windows(2).map(|pair| pair[1].at - pair[0].at);
+    let (shortest, longest) =
+        apart.fold((u64::MAX, 0), |(low, high), apart| (low.min(apart), high.max(apart)));
+    assert!(
+        shortest.abs_diff(TICK) < 2_000 && longest.abs_diff(TICK) < 2_000,
+        "{shortest}..{longest} ns apart"
+    );
+    assert_eq!(counts.lost_samples - counts_before.lost_samples, 0, "lost samples");
+    assert_eq!(counts.lost_frames - counts_before.lost_frames, 0, "lost frames");
+    assert_eq!(counts.garbage, 0, "frames that arrived broken");
+    let samples = counts.samples - counts_before.samples;
+    assert!(samples >= MINUTE_TICKS, "{samples} samples of {MINUTE_TICKS}");
+    let timing = pc.heard.timing.expect("timing is reported every second");
+    assert_eq!((timing.missed_ticks, timing.dropped_samples), (0, 0));
+    assert!(timing.garbage_frames > 1_000, "the flood arrived: {timing:?}");
+
+    let spread = |outputs: &[tests::board::Output]| {
+        let times = outputs.iter().filter_map(|output| output.since_tick);
+        times.fold((u64::MAX, 0), |(low, high), time| (low.min(time), high.max(time)))
+    };
+    let written = spread(&log.written);
+    let put_out = spread(&log.put_out);
+    println!(
+        "tick to the DAC's register {}..{} ns (spread {}), to its pin {}..{} ns (spread {}); {} commands, {} of them heard; {counts:?}",
+        written.0,
+        written.1,
+        written.1 - written.0,
+        put_out.0,
+        put_out.1,
+        put_out.1 - put_out.0,
+        commands,
+        pc.heard.acks.len(),
+    );
+    assert!(put_out.1 - put_out.0 <= 1_000, "tick to DAC spreads over {put_out:?} ns");
+    let (overruns, excess) = board.at_stop(|stopped| stopped.usb().core.misuse());
+    assert_eq!((overruns, excess), (0, 0), "packet memory");
+}
