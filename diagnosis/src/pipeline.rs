@@ -2,7 +2,7 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
-use crate::estimate::{Estimator, rms};
+use crate::estimate::Estimator;
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::Noise;
 use crate::library::Span;
@@ -103,17 +103,26 @@ pub(crate) fn search(
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
         let clock = std::time::Instant::now();
         let candidates = bench.screen(&white);
-        if std::env::var("DIAG_DEBUG").is_ok() { println!("screen {:?}", clock.elapsed()); }
+        if std::env::var("DIAG_DEBUG").is_ok() {
+            println!("screen {:?}", clock.elapsed());
+        }
         let finalists = bench.finalists(&white, &candidates);
         let mut taken = None;
-        if std::env::var("DIAG_DEBUG").is_ok() { println!("finalists {:?}", clock.elapsed()); }
+        if std::env::var("DIAG_DEBUG").is_ok() {
+            println!("finalists {:?}", clock.elapsed());
+        }
         if std::env::var("DIAG_DEBUG").is_ok() {
             println!("white {:?} theta {:?}", white.noise, white.fit.theta(0));
             for (e, g) in &candidates {
                 println!("   screen {g:.1} {} {:?}", e.name, e.shape);
             }
             for f in &finalists {
-                println!("  {:.1} {} {:?}", f.merit - white.merit, f.model.effects.last().unwrap().name, &f.fit.theta(0));
+                println!(
+                    "  {:.1} {} {:?}",
+                    f.merit - white.merit,
+                    f.model.effects.last().unwrap().name,
+                    &f.fit.theta(0)
+                );
             }
         }
         for finalist in finalists {
@@ -219,46 +228,4 @@ pub(crate) fn residuals(
         .zip(totals)
         .map(|(track, total)| estimator.residual(track, total).into_iter().map(|a| a * inertia).collect())
         .collect()
-}
-
-/// Root mean square of residual force under the nominal, refitted and patched model, for a look.
-pub(crate) fn table(s: &Search) -> [(f64, f64); 4] {
-    let scale = command_scale(&s.nominal, &s.fit_tracks);
-    let est = Estimator::new(&s.fit_tracks, &s.last.noise, scale);
-    let j0 = s.nominal.rig.model.inertia;
-    let mut out = [(0.0, 0.0); 4];
-    for (k, tracks) in [&s.fit_tracks, &s.held_tracks].into_iter().enumerate() {
-        let drive: Vec<Total> = tracks
-            .iter()
-            .map(|t| {
-                let mut total = Total::zero(t.blocks());
-                t.rows_input(&t.command).add_to(&mut total, t, s.nominal.gain());
-                total
-            })
-            .collect();
-        let none: Vec<Total> = tracks.iter().map(|t| Total::zero(t.blocks())).collect();
-        let a = residuals(&est, tracks, &none, j0);
-        let b = residuals(&est, tracks, &drive, j0);
-        let force: Vec<Vec<f64>> =
-            a.iter().zip(&b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
-        let lay = |c: &Candidate| -> Vec<Total> {
-            if k == 0 {
-                c.fit.totals(tracks)
-            } else {
-                lay_all(c, &s.nominal, tracks, &c.noise).into_iter().map(|l| l.total).collect()
-            }
-        };
-        let j =
-            |c: &Candidate| s.nominal.rig.actuator.gain / c.fit.value(crate::model::Key::Gain).unwrap_or(1.0);
-        let values = [
-            rms(&force, tracks),
-            0.0,
-            rms(&residuals(&est, tracks, &lay(&s.null), j(&s.null)), tracks),
-            rms(&residuals(&est, tracks, &lay(&s.last), j(&s.last)), tracks),
-        ];
-        for (out, value) in out.iter_mut().zip(values) {
-            if k == 0 { out.0 = value } else { out.1 = value }
-        }
-    }
-    out
 }

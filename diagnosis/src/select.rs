@@ -110,7 +110,9 @@ impl Bench<'_> {
                     .map(|(effect, score)| (effect, score.gain))
                 }
             };
-            if std::env::var("DIAG_DEBUG").is_ok() { println!("    {name} {:?}", clock.elapsed()); }
+            if std::env::var("DIAG_DEBUG").is_ok() {
+                println!("    {name} {:?}", clock.elapsed());
+            }
             if let Some((effect, _)) = best {
                 let (effect, gain) = self.refine(now, &residuals, effect);
                 let worth = gain - cost(&effect, self.tracks.len(), self.span);

@@ -1,0 +1,465 @@
+//! From what the search found to the report: rivals and classes, confidence, values, places, the verdict.
+
+use crate::effects::{Effect, EffectName};
+use crate::error::InputError;
+use crate::estimate::{Estimator, rms, sensor_noise};
+use crate::fit::Fit;
+use crate::judge;
+use crate::kalman::tolerant;
+use crate::locate::{self, Map};
+use crate::model::{Key, Nominal, total};
+use crate::noise::Colour;
+use crate::outcome::{Evidence, Outcome, Series};
+use crate::pipeline::{Found, Rival, Search, command_scale, lay_all};
+use crate::prescribe;
+use crate::report::{Both, FitTable, Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
+use crate::rig::Rig;
+use crate::select::{Bench, Candidate};
+use crate::track::{Total, Track};
+use crate::values;
+use std::collections::BTreeMap;
+
+/// How many rivals of each effect are fitted in full.
+const RIVALS: usize = 4;
+/// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
+const BEHIND_Z: f64 = 2.0;
+const BEHIND: f64 = 3.0;
+
+/// Costs per segment on fitted and held-out recordings under one noise.
+fn costs(candidate: &Candidate, nominal: &Nominal, held: &[Track]) -> Vec<f64> {
+    let mut out = Vec::new();
+    for (one, places) in candidate.fit.prepared.iter().zip(&candidate.fit.places) {
+        for (square, (weight, count)) in
+            one.squares(places, &candidate.fit.solution.x).iter().zip(one.weights())
+        {
+            out.push(0.5 * count * tolerant(square / weight / count).0);
+        }
+    }
+    for laid in lay_all(candidate, nominal, held, &candidate.noise) {
+        out.extend(laid.costs);
+    }
+    out
+}
+
+/// Fits the rivals of each effect in its place and says how far behind they are.
+pub(crate) fn rivals(bench: &Bench, last: &Candidate, held: &[Track], found: &mut [Found]) {
+    let best = bench.fit(last.model.clone(), &last.noise, Colour::White);
+    let own = costs(&best, bench.nominal, held);
+    for i in 0..found.len() {
+        let mut less = best.model.clone();
+        less.effects.remove(i);
+        let name = best.model.effects[i].name;
+        let base_fit = Fit::new(&less, bench.nominal, bench.tracks, &best.noise);
+        let base = Candidate { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
+        let mut out: Vec<Rival> = Vec::new();
+        let others: Vec<(Effect, f64)> =
+            bench.screen(&base).into_iter().filter(|(e, _)| e.name != name).take(RIVALS).collect();
+        for (effect, _) in others {
+            let mut model = base.model.clone();
+            model.effects.push(effect.clone());
+            let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
+            let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
+            let theirs = costs(&rival, bench.nominal, held);
+            let lead: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
+            let gain = judge::bootstrap(&lead);
+            out.push(Rival { name: effect.name, z: gain.z, lead: gain.sum });
+        }
+        found[i].rivals = out;
+    }
+}
+
+fn confidence(found: &Found, class: &[EffectName]) -> f64 {
+    let nearest = found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(12.0, f64::min);
+    let by_rival = 1.0 - 0.5 * (-(nearest - 1.0).max(0.0) / 1.5).exp();
+    let by_holdout = 1.0 - 0.5 * (-(found.holdout.z - 1.0).max(0.0) / 1.2).exp();
+    (by_rival * by_holdout).clamp(0.05, 0.99)
+}
+
+/// Residual force of one model over recordings.
+fn forces(estimator: &Estimator, tracks: &[Track], totals: &[Total], inertia: f64) -> Vec<Vec<f64>> {
+    crate::pipeline::residuals(estimator, tracks, totals, inertia)
+}
+
+struct Residuals {
+    force: Vec<Vec<f64>>,
+    nominal: Vec<Vec<f64>>,
+    refit: Vec<Vec<f64>>,
+    patched: Vec<Vec<f64>>,
+}
+
+fn residuals(
+    s: &Search,
+    estimator: &Estimator,
+    tracks: &[Track],
+    held: bool,
+    refit: &Candidate,
+    patched: &Candidate,
+) -> Residuals {
+    let nominal = &s.nominal;
+    let model = crate::model::Model::default();
+    let plain = Nominal { anchor: None, ..nominal.clone() };
+    let at_nominal: Vec<Total> = tracks
+        .iter()
+        .map(|track| {
+            let columns = model.columns(&plain, track, &patched.noise);
+            let theta: Vec<f64> = columns.iter().map(|c| c.prior.mean).collect();
+            total(track, &columns, &theta)
+        })
+        .collect();
+    let drive: Vec<Total> = tracks
+        .iter()
+        .map(|track| {
+            let mut total = Total::zero(track.blocks());
+            track.rows_input(&track.command).add_to(&mut total, track, nominal.gain());
+            total
+        })
+        .collect();
+    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
+    let lay = |c: &Candidate| -> Vec<Total> {
+        if held {
+            lay_all(c, nominal, tracks, &c.noise).into_iter().map(|laid| laid.total).collect()
+        } else {
+            c.fit.totals(tracks)
+        }
+    };
+    let j0 = nominal.rig.model.inertia;
+    let all = forces(estimator, tracks, &none, j0);
+    let less = forces(estimator, tracks, &drive, j0);
+    let force = all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+    Residuals {
+        force,
+        nominal: forces(estimator, tracks, &at_nominal, j0),
+        refit: forces(estimator, tracks, &lay(refit), values::scale(nominal, refit).0),
+        patched: forces(estimator, tracks, &lay(patched), values::scale(nominal, patched).0),
+    }
+}
+
+/// The rig with refitted values and the effects found.
+fn patch(s: &Search, last: &Candidate) -> Rig {
+    let mut rig = s.nominal.rig.clone();
+    let (inertia, gain, _) = values::scale(&s.nominal, last);
+    rig.model.inertia = inertia;
+    rig.actuator.gain = gain;
+    let value = |key: Key| last.fit.value(key).map(|x| x * inertia);
+    if let Some(x) = value(Key::Viscous) {
+        rig.model.viscous = Some(x.max(0.0));
+    }
+    if let Some(x) = value(Key::Coulomb) {
+        rig.model.coulomb = Some(x.max(0.0));
+    }
+    if rig.model.offset.is_some() {
+        rig.model.offset = value(Key::Offset);
+    }
+    if let Some(x) = value(Key::Weight) {
+        rig.model.weight = Some(x);
+    }
+    let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
+    let theta = last.fit.theta(0);
+    for (index, effect) in last.model.effects.iter().enumerate() {
+        let mut effect = effect.clone();
+        if let Some(law) = crate::effects::Law::new(&effect) {
+            for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
+                let Key::Term { effect: e, term } = column.key else { continue };
+                if e != index {
+                    continue;
+                }
+                let name = law.names()[term].clone();
+                let drive = matches!(
+                    effect.name,
+                    EffectName::TorqueRipple | EffectName::GainDrift | EffectName::DriveCompliance
+                ) || (effect.name == EffectName::Backlash && term == 1);
+                let unit = if law.in_sensor() {
+                    1.0
+                } else if drive {
+                    1.0 / ratio
+                } else {
+                    inertia
+                };
+                effect.coefficients.insert(name, theta * unit);
+            }
+        }
+        rig.effects.push(effect);
+    }
+    rig.name = format!("{} (patched)", rig.name);
+    rig
+}
+
+fn place(s: &Search, last: &Candidate, index: usize) -> Place {
+    let mut place = Place::default();
+    let name = last.model.effects[index].name;
+    let mut pooled: Vec<(f64, f64)> = Vec::new();
+    let variable = match name {
+        EffectName::CommandDeadband
+        | EffectName::CommandSaturation
+        | EffectName::RollerSlip
+        | EffectName::TorqueRipple => "command",
+        EffectName::PositionDependentFriction
+        | EffectName::PositionDependentDamping
+        | EffectName::PositionSpring => "travel",
+        EffectName::FrictionDrift | EffectName::GainDrift | EffectName::MissedCounts => "time",
+        EffectName::TiltGravity => "tilt",
+        EffectName::Cogging | EffectName::MassImbalance | EffectName::EncoderEccentricity => "angle",
+        _ => "speed",
+    };
+    let mut less = last.model.clone();
+    less.effects.remove(index);
+    for (r, track) in s.fit_tracks.iter().enumerate() {
+        // What the effect adds, as acceleration per block.
+        let columns = last.model.columns(&s.nominal, track, &last.noise);
+        let theta = last.fit.theta(r);
+        let with = total(track, &columns, &theta);
+        let columns = less.columns(&s.nominal, track, &last.noise);
+        let without: Vec<f64> = columns
+            .iter()
+            .map(|c| {
+                let key = match c.key {
+                    Key::Term { effect, term } if effect >= index => Key::Term { effect: effect + 1, term },
+                    key => key,
+                };
+                last.fit.prepared[r].columns.iter().position(|c| c.key == key).map_or(0.0, |i| theta[i])
+            })
+            .collect();
+        let without = total(track, &columns, &without);
+        let weight: Vec<f64> = (0..track.blocks())
+            .map(|j| {
+                let force = (with.dv[j] - without.dv[j]) / track.span[j];
+                let travel = with.dz[j] - without.dz[j];
+                if track.rest[j] {
+                    0.0
+                } else if last.model.effects[index].name.subsystem() == crate::effects::Subsystem::Sensor {
+                    travel * travel
+                } else {
+                    force * force
+                }
+            })
+            .collect();
+        let intervals = locate::intervals(track, &weight);
+        if !intervals.is_empty() {
+            place.recordings.push(Stretch { file: track.file.clone(), intervals_s: intervals });
+        }
+        let states: Vec<f64> = match variable {
+            "command" => track.block_mean(&track.command).iter().map(|u| u.abs()).collect(),
+            "travel" => track.x.clone(),
+            "angle" => {
+                track.x.iter().map(|x| s.nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn))).collect()
+            }
+            "time" => track.start.clone(),
+            "tilt" => track.tilt.clone().unwrap_or_default(),
+            _ => track.v.iter().map(|v| v.abs()).collect(),
+        };
+        pooled.extend(states.into_iter().zip(weight));
+    }
+    let (a, b): (Vec<f64>, Vec<f64>) = pooled.into_iter().unzip();
+    if let Some((low, high)) = locate::range(&a, &b) {
+        place.states.push(Region { variable: variable.into(), low, high });
+    }
+    place
+}
+
+/// Part of the force that a disturbance must make up before it is called one, beside the noise.
+const DISTURBED: f64 = 0.05;
+/// Part by which a refit must lower the held-out residual before values are called wrong.
+const REFIT_MATTERS: f64 = 0.05;
+
+pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
+    let scale = command_scale(&s.nominal, &s.fit_tracks);
+    let nominal = s.nominal.clone();
+    let fit_tracks = std::mem::take(&mut s.fit_tracks);
+    let held_tracks = std::mem::take(&mut s.held_tracks);
+    let span = s.span.clone();
+    let bench = Bench { nominal: &nominal, tracks: &fit_tracks, span: &span, scale };
+    let mut found = std::mem::take(&mut s.found);
+    let refit = bench.fit(crate::model::Model::default(), &s.null.noise, Colour::White);
+    let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
+    rivals(&bench, &patched, &held_tracks, &mut found);
+    let estimator = Estimator::new(&fit_tracks, &patched.noise, scale);
+    let on_fit = residuals(&s, &estimator, &fit_tracks, false, &refit, &patched);
+    let on_held = residuals(&s, &estimator, &held_tracks, true, &refit, &patched);
+    let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
+        fit: rms(a, &fit_tracks),
+        holdout: rms(b, &held_tracks),
+    };
+    let (inertia, _, _) = values::scale(&nominal, &patched);
+    let floor = sensor_noise(&fit_tracks, &patched.noise, estimator.bandwidth_hz) * inertia;
+    let mut table = FitTable {
+        metric: "force_rmse".into(),
+        unit: nominal.rig.kind.force().into(),
+        nominal: both(&on_fit.nominal, &on_held.nominal),
+        refit: both(&on_fit.refit, &on_held.refit),
+        patched: both(&on_fit.patched, &on_held.patched),
+        force_rms: both(&on_fit.force, &on_held.force),
+        holdout_gain_ci95: [0.0, 0.0],
+    };
+    table.holdout_gain_ci95 = relative_gain(&held_tracks, &on_held.refit, &on_held.patched);
+    let maps =
+        locate::maps((&fit_tracks, &on_fit.patched), (&held_tracks, &on_held.patched), nominal.rig.turn());
+    s.fit_tracks = fit_tracks.clone();
+    let mut effects: Vec<(f64, Named)> = Vec::new();
+    for (i, one) in found.iter().enumerate() {
+        let name = one.effect.name;
+        let mut class = vec![name];
+        let mut near: Vec<&Rival> = one.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < BEHIND).collect();
+        near.sort_by(|a, b| a.z.total_cmp(&b.z));
+        class.extend(near.iter().take(2).map(|r| r.name));
+        let named = Named {
+            name,
+            subsystem: name.subsystem(),
+            confidence: confidence(one, &class),
+            parameters: values::parameters(&bench, &patched, i),
+            place: place(&s, &patched, i),
+            separating_experiment: prescribe::separating(&class),
+            class,
+        };
+        effects.push((one.holdout.sum, named));
+    }
+    effects.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
+    let above = |x: f64| (x * x - floor * floor).max(0.0);
+    let unexplained = {
+        let before = above(table.nominal.holdout).max(above(table.refit.holdout));
+        if before > 0.0 { (above(table.patched.holdout) / before).min(1.0) } else { 0.0 }
+    };
+    let carries = maps.iter().any(|m| m.significant && m.carries > 0.1);
+    let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
+    let refit_matters = table.refit.holdout < (1.0 - REFIT_MATTERS) * table.nominal.holdout;
+    let verdict = if !effects.is_empty() {
+        Verdict::MissingPhysics
+    } else if disturbed && carries {
+        Verdict::Unexplained
+    } else if disturbed {
+        Verdict::RandomDisturbance
+    } else if refit_matters {
+        Verdict::ParametersOnly
+    } else {
+        Verdict::NoMismatch
+    };
+    let mut hypotheses: Vec<Hypothesis> = found
+        .iter()
+        .map(|f| Hypothesis { name: f.effect.name, holdout_gain: f.holdout.sum, rejected_because: None })
+        .collect();
+    for one in &found {
+        for rival in &one.rivals {
+            if found.iter().all(|f| f.effect.name != rival.name)
+                && hypotheses.iter().all(|h| h.name != rival.name)
+            {
+                hypotheses.push(Hypothesis {
+                    name: rival.name,
+                    holdout_gain: one.holdout.sum - rival.lead,
+                    rejected_because: Some(format!(
+                        "{} explains more by {:.1} standard errors",
+                        one.effect.name, rival.z
+                    )),
+                });
+            }
+        }
+    }
+    for (name, gain, reason) in &s.lost {
+        if hypotheses.iter().all(|h| h.name != *name) {
+            hypotheses.push(Hypothesis {
+                name: *name,
+                holdout_gain: *gain,
+                rejected_because: Some(reason.clone()),
+            });
+        }
+    }
+    let patched_rig = patch(&s, &patched);
+    let mut refitted = BTreeMap::new();
+    refitted.insert("inertia".to_owned(), patched_rig.model.inertia);
+    refitted.insert("gain".to_owned(), patched_rig.actuator.gain);
+    for (key, value) in [
+        ("viscous", patched_rig.model.viscous),
+        ("coulomb", patched_rig.model.coulomb),
+        ("offset", patched_rig.model.offset),
+        ("weight", patched_rig.model.weight),
+    ] {
+        if let Some(value) = value {
+            refitted.insert(key.to_owned(), value);
+        }
+    }
+    let top_place = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance).then(|| Place {
+        recordings: held_tracks
+            .iter()
+            .zip(&on_held.patched)
+            .map(|(track, r)| {
+                let weight: Vec<f64> =
+                    r.iter().zip(&track.rest).map(|(x, rest)| if *rest { 0.0 } else { x * x }).collect();
+                Stretch { file: track.file.clone(), intervals_s: locate::intervals(track, &weight) }
+            })
+            .collect(),
+        states: strongest(&maps),
+    });
+    let mut report = Report {
+        format: 1,
+        verdict,
+        sentence: String::new(),
+        effects,
+        fit: table,
+        refitted,
+        residual_bandwidth_hz: estimator.bandwidth_hz,
+        noise_floor: floor,
+        unexplained_fraction: unexplained,
+        hypotheses,
+        place: top_place,
+        separating_experiment: None,
+        reason: None,
+    };
+    report.sentence = crate::outcome::sentence(&report, nominal.rig.kind);
+    let mut series = Vec::new();
+    for (tracks, residuals, held) in [(&fit_tracks, on_fit, false), (&held_tracks, on_held, true)] {
+        for (r, track) in tracks.iter().enumerate() {
+            series.push(Series::new(
+                track,
+                held,
+                &residuals.nominal[r],
+                &residuals.refit[r],
+                &residuals.patched[r],
+                &residuals.force[r],
+            ));
+        }
+    }
+    let refit_maps: Vec<Map> = maps;
+    Ok(Outcome {
+        report,
+        evidence: Evidence {
+            series,
+            maps: refit_maps,
+            kind: nominal.rig.kind,
+            rig: nominal.rig.name.clone(),
+        },
+        patched_rig,
+    })
+}
+
+fn strongest(maps: &[Map]) -> Vec<Region> {
+    let Some(map) = maps.iter().filter(|m| m.significant).max_by(|a, b| a.carries.total_cmp(&b.carries))
+    else {
+        return Vec::new();
+    };
+    let weight = |i: usize| map.forward[i].unwrap_or(0.0).abs().max(map.backward[i].unwrap_or(0.0).abs());
+    let centres: Vec<f64> = map.edges.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let weights: Vec<f64> = (0..centres.len()).map(weight).collect();
+    locate::range(&centres, &weights)
+        .map(|(low, high)| Region { variable: map.variable.into(), low, high })
+        .into_iter()
+        .collect()
+}
+
+/// Interval of the relative reduction of the held-out mean square.
+fn relative_gain(tracks: &[Track], before: &[Vec<f64>], after: &[Vec<f64>]) -> [f64; 2] {
+    let mut gains = Vec::new();
+    let mut whole = 0.0;
+    for ((track, a), b) in tracks.iter().zip(before).zip(after) {
+        for w in track.segments.windows(2) {
+            let mut gain = 0.0;
+            for j in w[0]..w[1] {
+                if !track.rest[j] {
+                    gain += a[j] * a[j] - b[j] * b[j];
+                    whole += a[j] * a[j];
+                }
+            }
+            gains.push(gain);
+        }
+    }
+    let gain = judge::bootstrap(&gains);
+    if whole > 0.0 { [gain.low / whole, gain.high / whole] } else { [0.0, 0.0] }
+}
