@@ -244,6 +244,12 @@ impl Board {
         &self.symbols
     }
 
+    /// The function or object at `address`.
+    #[must_use]
+    pub fn symbol_at(&self, address: u32) -> Option<&elf::Symbol> {
+        self.symbols.iter().find(|symbol| (symbol.address..symbol.address + symbol.size).contains(&address))
+    }
+
     /// An address in the image where a jump never ends.
     #[must_use]
     pub fn endless_loop(&self) -> Option<u32> {

@@ -1,6 +1,6 @@
 //! The emulator's core with three things added: addresses of peripherals it has no model for lead
-//! to windows where the board has one, every instruction can be put down to the interrupt that ran
-//! it, and a fault can be injected by moving the program counter.
+//! to windows where the board has one, the instructions of one interrupt handler can be counted, and
+//! a fault can be injected by moving the program counter.
 //!
 //! Nothing here changes what the firmware sees: the windows answer at the addresses of the manual.
 
@@ -31,7 +31,6 @@ fn window(address: u64) -> u64 {
 
 /// The number the architecture gives external interrupt 0.
 pub const FIRST_EXTERNAL: u32 = 16;
-const REGISTER_SP: usize = 13;
 const REGISTER_PC: usize = 15;
 const REGISTER_XPSR: usize = 16;
 
@@ -67,14 +66,13 @@ pub enum Effect {
 /// What a probe counts and does.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Count instructions by exception: exact, and about a hundred times slower.
-    pub profile: bool,
-    /// Every completed run of every exception handler, by exception number.
-    pub runs: BTreeMap<u32, Vec<HandlerRun>>,
-    /// Instructions in thread mode.
-    pub thread: u64,
-    /// The lowest main stack pointer seen while profiling.
-    pub lowest_sp: Option<u32>,
+    /// The address of the interrupt handler whose instructions are counted, if any. Nothing may
+    /// preempt it.
+    pub handler: Option<u32>,
+    /// Every completed run of that handler.
+    pub runs: Vec<HandlerRun>,
+    /// How often each of its instructions ran, by address.
+    pub places: BTreeMap<u32, u64>,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -92,15 +90,6 @@ impl Probe {
     }
 }
 
-/// A handler under way.
-#[derive(Debug)]
-struct Active {
-    exception: u32,
-    /// The stack pointer when it was first seen.
-    sp: u32,
-    run: HandlerRun,
-}
-
 /// The emulator's core, wrapped.
 #[derive(Debug)]
 pub(super) struct Probed {
@@ -109,13 +98,15 @@ pub(super) struct Probed {
     flash: Flash,
     /// Instructions' time in which nothing ran.
     stalled: u64,
-    /// The handlers under way, innermost last.
-    active: Vec<Active>,
+    /// Where a breakpoint stops the core for the count.
+    breakpoint: Option<u32>,
+    /// The run of the counted handler that is under way, with the exception it runs in.
+    counting: Option<(u32, HandlerRun)>,
 }
 
 impl Probed {
     pub(super) fn new(core: Box<dyn Processor>, probe: Probe, flash: Flash) -> Self {
-        Self { core, probe, flash, stalled: 0, active: Vec::new() }
+        Self { core, probe, flash, stalled: 0, breakpoint: None, counting: None }
     }
 
     /// Has every access to the sectors the firmware writes to go over the bus.
@@ -123,12 +114,6 @@ impl Probed {
         for page in WRITABLE.step_by(self.core.page_size() as usize) {
             self.core.ask(Queued::Route(page));
         }
-    }
-
-    /// Whether the core has to be looked at after every instruction.
-    fn steps(&self) -> bool {
-        let tally = self.probe.tally();
-        tally.profile || tally.upset.is_some()
     }
 
     fn register(&self, number: usize) -> u32 {
@@ -140,91 +125,87 @@ impl Probed {
         self.register(REGISTER_XPSR) & 0x1FF
     }
 
-    /// Runs one instruction at a time and looks at the core after each.
-    fn run_stepping(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
-        let stalled_before = self.stalled;
+    /// Sets the breakpoint that the test asks for.
+    fn settle_breakpoint(&mut self) {
+        let wanted = self.probe.tally().handler;
+        if wanted == self.breakpoint {
+            return;
+        }
+        if let Some(old) = self.breakpoint.take() {
+            self.core.remove_breakpoint(old.into());
+            self.counting = None;
+        }
+        self.breakpoint = wanted.filter(|&new| self.core.add_breakpoint(new.into()));
+    }
+
+    /// Runs like the core, and an instruction at a time where somebody looks.
+    fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
-            let (exit, did) = self.core.run(1, bus);
+            let upset = self.probe.tally().upset.is_some();
+            bus.stepping = upset || self.counting.is_some();
+            let place = self.core.pc() as u32;
+            let left = if bus.stepping { 1 } else { budget - retired as u32 };
+            let (exit, did) = self.core.run(left, bus);
             retired += did;
-            if did > 0 {
-                self.account(did as u32);
+            if exit == Exit::Breakpoint && self.breakpoint == Some(self.core.pc() as u32) {
+                self.core.pass_breakpoint(self.core.pc());
+                let run = HandlerRun { from: self.retired(), instructions: 0 };
+                self.counting = Some((self.exception(), run));
+                continue;
             }
-            let stalled = self.stalled - stalled_before;
-            if stalled > 0 {
-                // Time has passed: the run looks at what is due.
-                return (Exit::Returned, retired + stalled);
+            if did > 0 && bus.stepping {
+                self.count(place);
+                let stalled = self.upset();
+                if stalled > 0 {
+                    // Time has passed: the run looks at what is due.
+                    return (Exit::Returned, retired + stalled);
+                }
             }
-            if exit != Exit::Budget || !self.steps() {
+            if exit != Exit::Budget {
                 return (exit, retired);
             }
         }
         (Exit::Budget, retired)
     }
 
-    /// Puts `did` instructions down to the exception they ran in. The core looks for interrupts
-    /// before an instruction, so one that is new belongs to the new handler; a return changes the
-    /// exception after its last instruction, so that one belongs to the old.
-    fn account(&mut self, did: u32) {
+    /// Counts the instruction at `place`, if it is the counted handler's. The exception changes
+    /// right after the handler's last instruction.
+    fn count(&mut self, place: u32) {
         let exception = self.exception();
-        let sp = self.register(REGISTER_SP);
-        let count = self.retired();
-        let probe = self.probe.clone();
-        let mut tally = probe.tally();
-        if tally.profile {
-            tally.lowest_sp = Some(tally.lowest_sp.map_or(sp, |lowest| lowest.min(sp)));
-        }
-        let current = self.active.last().map_or(0, |handler| handler.exception);
-        if exception == current {
-            self.count(did, &mut tally);
-        } else if let Some(outer) = self.active.iter().rposition(|handler| handler.exception == exception) {
-            self.count(did, &mut tally);
-            self.end_from(outer + 1, &mut tally);
-        } else if exception == 0 {
-            self.count(did, &mut tally);
-            self.end_from(0, &mut tally);
-        } else {
-            // A tail chain takes over the frame of the handler that ended, and none of its own
-            // instructions has run; a preemption pushes a frame below it and has run one.
-            let chained = self.active.last().is_some_and(|handler| sp >= handler.sp);
-            if chained {
-                self.count(did, &mut tally);
-                self.end_from(self.active.len() - 1, &mut tally);
-            }
-            let instructions = if chained { 0 } else { did };
-            let from = count - u64::from(instructions);
-            self.active.push(Active { exception, sp, run: HandlerRun { from, instructions } });
-        }
-        if let Some(upset) = tally.upset
-            && upset.exception == exception
-        {
-            tally.upset_progress += did;
-            if tally.upset_progress > upset.after {
-                tally.upset = None;
-                tally.upset_progress = 0;
-                match upset.effect {
-                    Effect::Jump(to) => {
-                        self.core.set_gdb_register(REGISTER_PC, &(to & !1).to_le_bytes());
-                    }
-                    Effect::Stall(instructions) => self.stalled += instructions,
-                }
-            }
+        let Some((of, run)) = &mut self.counting else { return };
+        run.instructions += 1;
+        let (ended, run) = (*of != exception, *run);
+        let mut tally = self.probe.tally();
+        *tally.places.entry(place).or_default() += 1;
+        if ended {
+            tally.runs.push(run);
+            drop(tally);
+            self.counting = None;
         }
     }
 
-    /// Counts `did` instructions for the innermost handler, or for thread mode.
-    fn count(&mut self, did: u32, tally: &mut Tally) {
-        match self.active.last_mut() {
-            Some(handler) => handler.run.instructions += did,
-            None => tally.thread += u64::from(did),
-        }
-    }
-
-    /// Ends every handler from the `first`th inwards.
-    fn end_from(&mut self, first: usize, tally: &mut Tally) {
-        for handler in self.active.drain(first..) {
-            if tally.profile {
-                tally.runs.entry(handler.exception).or_default().push(handler.run);
+    /// Does what goes wrong now; the instructions' time that it took.
+    fn upset(&mut self) -> u64 {
+        let exception = self.exception();
+        let effect = {
+            let mut tally = self.probe.tally();
+            let Some(upset) = tally.upset.filter(|upset| upset.exception == exception) else { return 0 };
+            tally.upset_progress += 1;
+            if tally.upset_progress <= upset.after {
+                return 0;
+            }
+            (tally.upset, tally.upset_progress) = (None, 0);
+            upset.effect
+        };
+        match effect {
+            Effect::Jump(to) => {
+                self.core.set_gdb_register(REGISTER_PC, &(to & !1).to_le_bytes());
+                0
+            }
+            Effect::Stall(instructions) => {
+                self.stalled += instructions;
+                instructions
             }
         }
     }
@@ -233,13 +214,14 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let stepping = self.steps();
-        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled, stepping };
-        if stepping { self.run_stepping(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
+        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled, stepping: false };
+        self.settle_breakpoint();
+        let watched = self.breakpoint.is_some() || self.probe.tally().upset.is_some();
+        if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
     }
 
     fn reset(&mut self) {
-        self.active.clear();
+        self.counting = None;
         self.flash.array().restarted();
         self.core.reset();
     }
