@@ -92,7 +92,7 @@ impl Amounts {
 pub(crate) fn list(amounts: Amounts, seed: u64) -> Vec<Spec> {
     let mut specs = Vec::new();
     let mut put = |category, hidden: Vec<&'static str>, strength, repeat, poor| {
-        specs.push(Spec { id: 0, category, hidden, strength, repeat, poor });
+        specs.push(Spec { id: 0, category, hidden, strength, repeat, poor, recorder: None });
     };
     for repeat in 0..amounts.singles {
         for name in EFFECTS {

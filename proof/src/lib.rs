@@ -3,12 +3,18 @@
 //! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
 //! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
 
+mod bench;
 mod cases;
 mod generator;
+mod judge;
 mod options;
 mod pool;
+mod report;
+mod rivals;
 mod rng;
 mod signal;
+mod stats;
+mod tool;
 
 use std::path::Path;
 
@@ -27,7 +33,35 @@ pub fn run(options: &Options) -> Result<(), String> {
     if let Some(dir) = &options.write {
         return write_all(options, &specs, dir);
     }
-    Ok(())
+    prove(options, &specs, &tool::Diagnosis)
+}
+
+fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(), String> {
+    let start = std::time::Instant::now();
+    let records = bench::run_cases(options, specs, tool)?;
+    let speed = if options.quick || options.only.is_some() {
+        None
+    } else {
+        bench::measure_speed(options.seed, tool).ok()
+    };
+    let run = report::Run {
+        options: options.clone(),
+        tool: "host-sim diagnose".into(),
+        seconds: start.elapsed().as_secs_f64(),
+        speed,
+    };
+    let sums = judge::sum(&records);
+    print!("{}", report::terminal(&records, &sums, &run));
+    std::fs::create_dir_all(&options.out)
+        .map_err(|e| format!("cannot create {}: {e}", options.out.display()))?;
+    let write = |name: &str, text: String| {
+        let path = options.out.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))
+    };
+    let value = report::json(&records, &sums, &run);
+    write("proof.json", serde_json::to_string_pretty(&value).map_err(|e| e.to_string())? + "\n")?;
+    write("proof.md", report::markdown(&records, &sums, &run))?;
+    write("proof-aggregate.md", report::aggregate(&records, &sums, &run))
 }
 
 fn wanted(options: &Options) -> Vec<Spec> {

@@ -75,6 +75,11 @@ impl Normal {
         self.rows += 1;
     }
 
+    /// Rms of column `i` over the rows.
+    pub(crate) fn column_rms(&self, i: usize) -> f64 {
+        (self.gram[i * self.n + i] / self.rows.max(1) as f64).sqrt()
+    }
+
     /// Least squares over the columns in `active` with a penalty per column (empty: none); zeros elsewhere.
     /// Columns that are numerically dependent get zero.
     pub(crate) fn solve(&self, active: &[usize], penalty: &[f64]) -> Vec<f64> {

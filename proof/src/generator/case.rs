@@ -57,6 +57,8 @@ pub(crate) struct Spec {
     pub(crate) repeat: usize,
     /// Plays these instead of what shows the effect.
     pub(crate) poor: Option<&'static [Kind]>,
+    /// Rate in Hz and duration in s, where they are not drawn.
+    pub(crate) recorder: Option<(f64, f64)>,
 }
 
 /// Values as the rig file has them; `None`: the key is missing.
@@ -245,7 +247,10 @@ pub(crate) fn build(spec: &Spec, seed: u64, quick: bool) -> Case {
         let rng = Rng::new(seed).fork(&label).fork(&attempt.to_string());
         let Some(case) = attempt_case(spec, &rng, quick) else { continue };
         let miss = if spec.strength > 0.0 && spec.category != Category::CannotTell {
-            case.alone.iter().map(|a| (a / spec.strength).max(1e-9).ln().abs()).fold(0.0, f64::max)
+            let off = case.alone.iter().map(|a| (a / spec.strength).max(1e-9).ln().abs()).fold(0.0, f64::max);
+            // What does not show in the held-out recording cannot be judged there.
+            let held = case.held_out(case.machine.residual_bandwidth());
+            off + if held.effect > 0.45 * spec.strength * held.noise { 0.0 } else { 1.0 }
         } else {
             0.0
         };
@@ -283,6 +288,9 @@ fn merged_needs(spec: &Spec) -> Needs {
 fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     let needs = merged_needs(spec);
     let mut machine = Machine::draw(&mut rng.fork("machine"), needs, quick);
+    if let Some((rate, duration)) = spec.recorder {
+        (machine.rate, machine.duration) = (rate, duration);
+    }
     let mut pick = rng.fork("kinds");
     if spec.category == Category::CannotTell {
         machine.offset_key = true;

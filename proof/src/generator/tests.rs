@@ -227,7 +227,7 @@ fn a_lag_charges_exponentially() {
 }
 
 fn spec(category: Category, hidden: Vec<&'static str>, strength: f64) -> Spec {
-    Spec { id: 1, category, hidden, strength, repeat: 0, poor: None }
+    Spec { id: 1, category, hidden, strength, repeat: 0, poor: None, recorder: None }
 }
 
 #[test]

@@ -1,0 +1,132 @@
+//! One run of the benchmark: build a case, show its files to the tool, ask the rivals, keep the record, forget the rest.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::generator::case::{Category, Spec, build};
+use crate::generator::files;
+use crate::judge::Record;
+use crate::options::Options;
+use crate::pool;
+use crate::rivals;
+use crate::tool::{Tool, ask};
+
+/// A folder for the case files that goes when the run ends, whatever way.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, String> {
+        let path = std::env::temp_dir().join(format!("proof-{}", std::process::id()));
+        std::fs::create_dir_all(&path).map_err(|e| format!("cannot create {}: {e}", path.display()))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Nothing to be done about a folder that does not go; the system clears its own.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Runs every case; records in the order of `specs`.
+pub(crate) fn run_cases(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<Vec<Record>, String> {
+    let scratch = Scratch::new()?;
+    let records = pool::map(options.jobs, "proving", specs, |spec| run_case(spec, options, tool, &scratch.0));
+    records.into_iter().collect()
+}
+
+fn run_case(spec: &Spec, options: &Options, tool: &dyn Tool, scratch: &Path) -> Result<Record, String> {
+    let case = build(spec, options.seed, options.quick);
+    let dir = scratch.join(format!("case-{:04}", spec.id));
+    let paths = files::write_case(&case, &dir).map_err(|e| format!("cannot write {}: {e}", dir.display()))?;
+    let start = Instant::now();
+    let answer = ask(tool, &paths, &dir.join("out"));
+    let seconds = start.elapsed().as_secs_f64();
+    let opinions = rivals::judge(&case).to_vec();
+    let record = Record::new(&case, answer, opinions, seconds);
+    std::fs::remove_dir_all(&dir).map_err(|e| format!("cannot remove {}: {e}", dir.display()))?;
+    Ok(record)
+}
+
+/// Seconds that the tool takes for 60 s at 10 kHz (three recordings of 20 s), with the machine to itself.
+pub(crate) fn measure_speed(seed: u64, tool: &dyn Tool) -> Result<f64, String> {
+    let scratch = Scratch::new()?;
+    let spec = Spec {
+        id: 0,
+        category: Category::Single,
+        hidden: vec!["cogging"],
+        strength: 10.0,
+        repeat: 0,
+        poor: None,
+        recorder: Some((10_000.0, 20.0)),
+    };
+    let case = build(&spec, seed, false);
+    let dir = scratch.0.join("speed");
+    let paths = files::write_case(&case, &dir).map_err(|e| format!("cannot write {}: {e}", dir.display()))?;
+    let start = Instant::now();
+    ask(tool, &paths, &dir.join("out"))?;
+    Ok(start.elapsed().as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::{Amounts, list};
+    use crate::generator::files::Paths;
+    use crate::judge::sum;
+    use crate::report;
+
+    /// Names cogging whatever it is shown, and checks that it is shown nothing else.
+    struct AlwaysCogging;
+
+    impl Tool for AlwaysCogging {
+        fn diagnose(&self, paths: &Paths, out: &Path) -> Result<(), String> {
+            let dir = paths.rig.parent().unwrap();
+            let mut names: Vec<String> = std::fs::read_dir(dir)
+                .unwrap()
+                .map(|e| e.unwrap().file_name().into_string().unwrap())
+                .collect();
+            names.sort();
+            assert_eq!(names, ["fit-a.csv", "fit-b.csv", "holdout.csv", "out", "rig.toml"]);
+            let report = r#"{"verdict":"missing_physics","effects":[{"name":"cogging","class":["cogging"],
+                "confidence":0.9,"parameters":{}}],"fit":{"refit":{"holdout":1},"patched":{"holdout":1}},
+                "residual_bandwidth_hz":50}"#;
+            std::fs::write(out.join("diagnosis.json"), report).map_err(|e| e.to_string())
+        }
+    }
+
+    #[test]
+    fn a_tool_that_always_says_cogging_is_seen_through() {
+        let options = Options { quick: true, seed: 3, ..Options::default() };
+        let mut specs = list(Amounts::quick(), 3);
+        specs.retain(|s| {
+            s.category == Category::Null || s.hidden == ["cogging"] || s.hidden == ["tilt_gravity"]
+        });
+        specs.truncate(5);
+        let records = run_cases(&options, &specs, &AlwaysCogging).unwrap();
+        let sums = sum(&records);
+        assert_eq!(sums.null_alarms.hits, sums.null_alarms.trials);
+        assert!(sums.false_names.hits >= 3, "{:?}", sums.false_names);
+        // It improves nothing, so its share of the oracle's improvement is nothing.
+        assert!(sums.shares.iter().all(|s| *s == 0.0));
+        let run = report::Run { options, tool: "a joke".into(), seconds: 1.0, speed: None };
+        let text = report::markdown(&records, &sums, &run);
+        assert!(text.contains("| false alarms on nulls | ≤ 1 %, upper bound ≤ 2.5 % | 100.0 %"), "{text}");
+        // What goes to the tool's author holds no single case.
+        assert!(!report::aggregate(&records, &sums, &run).contains("Every miss"));
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_report() {
+        let options = Options { quick: true, seed: 11, ..Options::default() };
+        let mut specs = list(Amounts::quick(), 11);
+        specs.truncate(2);
+        let text = || {
+            let records = run_cases(&options, &specs, &AlwaysCogging).unwrap();
+            let run = report::Run { options: options.clone(), tool: "t".into(), seconds: 0.0, speed: None };
+            report::markdown(&records, &sum(&records), &run)
+        };
+        assert_eq!(text(), text());
+    }
+}

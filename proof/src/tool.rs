@@ -1,0 +1,140 @@
+//! The tool under test as the judge sees it: files in, the contract's report out.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::generator::files::Paths;
+
+/// Whatever turns a rig and recordings into the files of the contract.
+pub(crate) trait Tool: Sync {
+    /// Diagnoses and writes `diagnosis.json` and `patched-rig.toml` into `out`; the error is the tool's own sentence.
+    fn diagnose(&self, paths: &Paths, out: &Path) -> Result<(), String>;
+}
+
+/// The project's own diagnosis.
+pub(crate) struct Diagnosis;
+
+impl Tool for Diagnosis {
+    fn diagnose(&self, paths: &Paths, out: &Path) -> Result<(), String> {
+        let request = diagnosis::Request {
+            rig: paths.rig.clone(),
+            fit: paths.fit.clone(),
+            holdout: paths.holdout.clone(),
+        };
+        let outcome = diagnosis::diagnose(&request, &|_, _| {}).map_err(|e| e.to_string())?;
+        outcome.write(out).map_err(|e| e.to_string())
+    }
+}
+
+/// An effect that the report names.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Named {
+    pub(crate) name: String,
+    pub(crate) class: Vec<String>,
+    pub(crate) confidence: f64,
+    /// (name, value, 95 % interval).
+    pub(crate) parameters: Vec<(String, f64, Option<[f64; 2]>)>,
+}
+
+/// What the judge reads of `diagnosis.json` and `patched-rig.toml`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Answer {
+    pub(crate) verdict: String,
+    pub(crate) effects: Vec<Named>,
+    /// Held-out force rmse under the refit and under the patched model.
+    pub(crate) refit_holdout: f64,
+    pub(crate) patched_holdout: f64,
+    pub(crate) bandwidth_hz: f64,
+    /// Gain of the patched rig, where it says one.
+    pub(crate) gain: Option<f64>,
+}
+
+/// Runs the tool and reads what it wrote.
+pub(crate) fn ask(tool: &dyn Tool, paths: &Paths, out: &Path) -> Result<Answer, String> {
+    std::fs::create_dir_all(out).map_err(|e| format!("cannot create {}: {e}", out.display()))?;
+    tool.diagnose(paths, out)?;
+    let file = out.join("diagnosis.json");
+    let text = std::fs::read_to_string(&file).map_err(|e| format!("no report at {}: {e}", file.display()))?;
+    let value: Value = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", file.display()))?;
+    let mut answer = read(&value)?;
+    if let Ok(rig) = std::fs::read_to_string(out.join("patched-rig.toml")) {
+        answer.gain = actuator_gain(&rig);
+    }
+    Ok(answer)
+}
+
+/// Reads the report to the letter of the contract; what it must have and has not is an error.
+pub(crate) fn read(report: &Value) -> Result<Answer, String> {
+    let missing = |what: &str| format!("diagnosis.json has no usable `{what}`");
+    let verdict = report["verdict"].as_str().ok_or_else(|| missing("verdict"))?.to_string();
+    let list = report["effects"].as_array().ok_or_else(|| missing("effects"))?;
+    let mut effects = Vec::new();
+    for effect in list {
+        let name = effect["name"].as_str().ok_or_else(|| missing("effects[].name"))?.to_string();
+        let class = effect["class"].as_array().ok_or_else(|| missing("effects[].class"))?;
+        let class = class.iter().filter_map(|v| v.as_str().map(String::from)).collect();
+        let confidence = effect["confidence"].as_f64().ok_or_else(|| missing("effects[].confidence"))?;
+        let mut parameters = Vec::new();
+        for (key, p) in effect["parameters"].as_object().into_iter().flatten() {
+            let Some(value) = p["value"].as_f64() else { continue };
+            let interval = match (p["ci95"][0].as_f64(), p["ci95"][1].as_f64()) {
+                (Some(low), Some(high)) => Some([low, high]),
+                _ => None,
+            };
+            parameters.push((key.clone(), value, interval));
+        }
+        effects.push(Named { name, class, confidence, parameters });
+    }
+    let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
+    Ok(Answer {
+        verdict,
+        effects,
+        refit_holdout: number(&report["fit"]["refit"]["holdout"]),
+        patched_holdout: number(&report["fit"]["patched"]["holdout"]),
+        bandwidth_hz: number(&report["residual_bandwidth_hz"]),
+        gain: None,
+    })
+}
+
+/// `gain` of `[actuator]`, read line by line: all that the judge needs of a rig file.
+fn actuator_gain(rig: &str) -> Option<f64> {
+    let mut inside = false;
+    for line in rig.lines().map(str::trim) {
+        if line.starts_with('[') {
+            inside = line == "[actuator]";
+        } else if inside
+            && let Some((key, value)) = line.split_once('=')
+            && key.trim() == "gain"
+        {
+            return value.split('#').next()?.trim().parse().ok();
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_contracts_example_is_read() {
+        let text = r#"{"format":1,"verdict":"missing_physics","effects":[{"name":"stribeck_friction",
+            "class":["stribeck_friction","quadratic_drag"],"confidence":0.98,
+            "parameters":{"peak":{"value":3.1e-4,"ci95":[2.8e-4,3.4e-4],"unit":"N·m"}}}],
+            "fit":{"refit":{"fit":1.0,"holdout":2.0},"patched":{"fit":1.0,"holdout":0.5}},
+            "residual_bandwidth_hz":100.0}"#;
+        let answer = read(&serde_json::from_str(text).unwrap()).unwrap();
+        assert_eq!(answer.effects[0].class.len(), 2);
+        assert_eq!(answer.effects[0].parameters[0].2, Some([2.8e-4, 3.4e-4]));
+        assert_eq!((answer.refit_holdout, answer.patched_holdout, answer.bandwidth_hz), (2.0, 0.5, 100.0));
+        assert!(read(&serde_json::json!({"verdict": "x"})).unwrap_err().contains("effects"));
+    }
+
+    #[test]
+    fn the_gain_is_the_actuators() {
+        let rig = "[model]\ngain = 7\n[actuator]\nlimit = 2\ngain = 2.5e-2 # N·m/A\n[encoder]\ngain = 1\n";
+        assert_eq!(actuator_gain(rig), Some(0.025));
+        assert_eq!(actuator_gain("[actuator]\n"), None);
+    }
+}
