@@ -1,2 +1,87 @@
-//! xtask
-fn main() {}
+//! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask test` and nothing else, and
+//! each of its steps is runnable by hand under its own name.
+//!
+//! Built before everything else, hence no dependencies; it may not know how a crate works inside, only what to run.
+
+mod bench;
+mod elf;
+mod firmware;
+mod flash;
+mod rows;
+mod setup;
+mod shell;
+mod stack;
+mod test;
+
+use shell::Failure;
+use std::process::ExitCode;
+
+const HELP: &str = "\
+The project's chores.
+
+  cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
+                                fmt clippy doc unit firmware board browser fuzz prove
+  cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
+  cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
+  cargo xtask bench             measures, prints the table and writes target/bench.json
+  cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
+  cargo xtask help              this text
+
+Example: cargo xtask test fmt unit";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (command, rest) = match arguments.split_first() {
+        Some((command, rest)) => (command.as_str(), rest),
+        None => ("help", &[][..]),
+    };
+    let asks_for_help = rest.iter().any(|argument| argument == "--help" || argument == "-h");
+    let done = match command {
+        "help" | "--help" | "-h" => help(),
+        "prove" => prove(rest),
+        _ if asks_for_help => help(),
+        "test" => test::run(rest),
+        "firmware" => no_more(rest).and_then(|()| firmware::report(&firmware::build()?)),
+        "flash" => flash::run(rest),
+        "bench" => no_more(rest).and_then(|()| bench::run()),
+        other => Err(Failure::usage(format!(
+            "`{other}` is no chore of this project; `cargo xtask help` lists them"
+        ))),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(failure.status)
+        }
+    }
+}
+
+fn help() -> Result<(), Failure> {
+    println!("{HELP}");
+    Ok(())
+}
+
+/// Refuses arguments that a chore does not take.
+fn no_more(rest: &[String]) -> Result<(), Failure> {
+    match rest.first() {
+        None => Ok(()),
+        Some(extra) => {
+            Err(Failure::usage(format!("`{extra}` is not understood here; see `cargo xtask help`")))
+        }
+    }
+}
+
+fn prove(rest: &[String]) -> Result<(), Failure> {
+    let status = shell::cargo()
+        .args(["run", "--release", "--ignore-rust-version", "--quiet", "-p", "proof", "--bin", "prove", "--"])
+        .args(rest)
+        .status()
+        .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
+    match status.code() {
+        Some(0) => Ok(()),
+        // The proof has said why; 2 is unusable input.
+        Some(2) => Err(Failure::usage("the proof did not understand its flags")),
+        _ => Err(Failure::new("the proof did not pass")),
+    }
+}

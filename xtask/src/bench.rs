@@ -1,0 +1,260 @@
+//! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one table. A program gives a
+//! row by printing `name=value`, with a name of [`crate::rows`]; a peer beside it by `name.peer=who name.peer_value=…`. A
+//! row that nothing measures is left out: no number here was written by hand.
+
+use crate::elf::Elf;
+use crate::rows::{Better, ROWS, Row};
+use crate::shell::{self, Failure, cargo};
+use crate::{firmware, test};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::fs;
+use std::process::Stdio;
+use std::time::Instant;
+
+/// Examples that measure: their package and name.
+const EXAMPLES: [(&str, &str); 6] = [
+    ("firmware", "tick_host"),
+    ("host-sim", "plant_speed"),
+    ("host-sim", "xpbd_speed"),
+    ("host-sim", "ultrasound_speed"),
+    ("host-sim", "stream_speed"),
+    ("diagnosis", "diagnose_speed"),
+];
+/// The crate whose build and dependencies are what a user waits for.
+const MAIN: &str = "host-sim";
+const ANY_RUST: &str = "--ignore-rust-version";
+/// A minute of the device, as fast as it goes.
+const STREAM_SECONDS: &str = "60";
+
+/// What was measured, by name.
+type Values = BTreeMap<String, String>;
+
+/// Measures, prints the table, writes `target/bench.json`.
+pub(crate) fn run() -> Result<(), Failure> {
+    let mut values = Values::new();
+    let mut troubles = vec![];
+    let mut measure = |what: &str, measured: Result<Values, Failure>| match measured {
+        Ok(new) => values.extend(new),
+        Err(failure) => troubles.push(format!("{what}: {failure}")),
+    };
+    measure("build", build_time());
+    measure("packages", packages());
+    measure("firmware", image());
+    for (package, name) in EXAMPLES {
+        if shell::top().join(package).join("examples").join(name).with_extension("rs").is_file() {
+            measure(name, example(package, name));
+        }
+    }
+    measure("stream", stream());
+    for name in test::test_programs()? {
+        if measures(&name) {
+            measure(&name, test_program(&name));
+        }
+    }
+    let rows: Vec<(Row, f64, Option<Peer>)> = ROWS
+        .into_iter()
+        .filter_map(|row| Some((row, values.get(row.name)?.parse().ok()?, peer(&values, row.name))))
+        .collect();
+    print(&rows);
+    let path = shell::target().join("bench.json");
+    fs::write(&path, json(&commit(), &rows))
+        .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
+    println!("written to {}", path.display());
+    if troubles.is_empty() { Ok(()) } else { Err(Failure::new(troubles.join("; "))) }
+}
+
+/// Tests that print rows: their text names one.
+fn measures(name: &str) -> bool {
+    let path = shell::top().join("tests/tests").join(name).with_extension("rs");
+    fs::read_to_string(path).is_ok_and(|text| ROWS.iter().any(|row| text.contains(&format!("{}=", row.name))))
+}
+
+/// `name=value` among the words of `text`, where the table knows the name.
+fn values_in(text: &str) -> Values {
+    let known = |name: &str| ROWS.iter().any(|row| Some(row.name) == name.split('.').next());
+    text.split_whitespace()
+        .filter_map(|word| word.split_once('='))
+        .filter(|(name, _)| known(name))
+        .map(|(name, value)| (name.to_string(), value.to_string()))
+        .collect()
+}
+
+fn example(package: &str, name: &str) -> Result<Values, Failure> {
+    let mut run = cargo();
+    run.args(["run", "--release", "--quiet", ANY_RUST, "-p", package, "--example", name]);
+    shell::output(&mut run).map(|text| values_in(&text))
+}
+
+fn test_program(name: &str) -> Result<Values, Failure> {
+    let mut run = cargo();
+    run.env("FIRMWARE_ELF", firmware::path());
+    run.args(["test", "--release", "--quiet", ANY_RUST, "-p", "tests", "--test", name, "--", "--nocapture"]);
+    // A test that fails its bound has printed what it measured.
+    let output = run
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
+    Ok(values_in(&String::from_utf8_lossy(&output.stdout)))
+}
+
+/// Time of the main crate's build from nothing, in a folder of its own.
+fn build_time() -> Result<Values, Failure> {
+    let folder = shell::target().join("bench-build");
+    let forget = || {
+        // Not there is as good.
+        let _ = fs::remove_dir_all(&folder);
+    };
+    // What can be fetched is fetched before: the network is nobody's build time.
+    shell::run(cargo().args(["fetch", "--quiet"]))?;
+    forget();
+    let begin = Instant::now();
+    let built = shell::run(cargo().env("CARGO_TARGET_DIR", &folder).args([
+        "build",
+        "--release",
+        "--quiet",
+        "-p",
+        MAIN,
+    ]));
+    let seconds = begin.elapsed().as_secs_f64();
+    forget();
+    built.map(|()| Values::from([("build_s".into(), format!("{seconds:.1}"))]))
+}
+
+/// Packages that the main crate's build needs, itself included.
+fn packages() -> Result<Values, Failure> {
+    let mut tree = cargo();
+    tree.args(["tree", "--quiet", "-p", MAIN, "-e", "normal,build", "--prefix", "none", "--format", "{p}"]);
+    let text = shell::output(&mut tree)?;
+    let packages: BTreeSet<&str> = text.lines().map(|line| line.trim_end_matches(" (*)")).collect();
+    Ok(Values::from([("packages".into(), packages.len().to_string())]))
+}
+
+fn image() -> Result<Values, Failure> {
+    let (_, bytes) = Elf::read(&firmware::build()?)?.flash_image()?;
+    Ok(Values::from([("firmware_flash_bytes".into(), bytes.len().to_string())]))
+}
+
+/// The whole way of a sample: plant, control law, frame, bytes, frame again, tallies.
+fn stream() -> Result<Values, Failure> {
+    let run = |seconds| {
+        let mut run = cargo();
+        run.args([
+            "run",
+            "--release",
+            "--quiet",
+            "-p",
+            MAIN,
+            "--",
+            "run",
+            "--headless",
+            "--fast",
+            "--seconds",
+            seconds,
+        ]);
+        run
+    };
+    // Built and warm.
+    shell::output(&mut run("1"))?;
+    let begin = Instant::now();
+    let text = shell::output(&mut run(STREAM_SECONDS))?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let samples =
+        text.split_whitespace().rev().find_map(|word| word.strip_prefix("samples=")?.parse::<f64>().ok());
+    let samples =
+        samples.ok_or_else(|| Failure::new("`run --headless` did not say how many samples there were"))?;
+    Ok(Values::from([("stream_samples_per_s".into(), format!("{:.0}", samples / seconds))]))
+}
+
+/// Somebody else's number for the same thing.
+struct Peer {
+    who: String,
+    value: f64,
+}
+
+fn peer(values: &Values, row: &str) -> Option<Peer> {
+    let who = values.get(&format!("{row}.peer"))?.clone();
+    let value = values.get(&format!("{row}.peer_value"))?.parse().ok()?;
+    Some(Peer { who, value })
+}
+
+fn commit() -> String {
+    let mut git = std::process::Command::new("git");
+    git.current_dir(shell::top()).args(["rev-parse", "HEAD"]).stderr(Stdio::null());
+    shell::output(&mut git).map_or_else(|_| "unknown".into(), |text| text.trim().to_string())
+}
+
+fn print(rows: &[(Row, f64, Option<Peer>)]) {
+    println!("{:<28}{:>14}  {:<20}{:>12}  peer", "row", "value", "unit", "wanted");
+    for (row, value, peer) in rows {
+        let wanted = match (row.wanted, row.better) {
+            (Some(wanted), Better::Lower) => format!("<= {wanted}"),
+            (Some(wanted), Better::Higher) => format!(">= {wanted}"),
+            (None, _) => String::new(),
+        };
+        let peer = peer.as_ref().map_or(String::new(), |peer| format!("{} {}", peer.who, peer.value));
+        println!("{:<28}{value:>14}  {:<20}{wanted:>12}  {peer}", row.name, row.unit);
+    }
+}
+
+fn json(commit: &str, rows: &[(Row, f64, Option<Peer>)]) -> String {
+    let number =
+        |value: Option<f64>| value.filter(|v| v.is_finite()).map_or("null".into(), |v| v.to_string());
+    let mut text = format!("{{ \"commit\": {}, \"rows\": [", quoted(commit));
+    for (index, (row, value, peer)) in rows.iter().enumerate() {
+        let better = if row.better == Better::Lower { "lower" } else { "higher" };
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "{}\n  {{ \"row\": {}, \"value\": {}, \"unit\": {}, \"wanted\": {}, \"better\": \"{better}\", \"peer\": {}, \
+             \"peer_value\": {} }}",
+            if index == 0 { "" } else { "," },
+            quoted(row.name),
+            number(Some(*value)),
+            quoted(row.unit),
+            number(row.wanted),
+            peer.as_ref().map_or("null".into(), |peer| quoted(&peer.who)),
+            number(peer.as_ref().map(|peer| peer.value)),
+        );
+    }
+    text.push_str("\n] }\n");
+    text
+}
+
+fn quoted(text: &str) -> String {
+    let escaped: String = text
+        .chars()
+        .flat_map(|c| match c {
+            '"' | '\\' => vec!['\\', c],
+            c if c.is_control() => vec![' '],
+            c => vec![c],
+        })
+        .collect();
+    format!("\"{escaped}\"")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_found_among_words_and_others_are_not() {
+        let values =
+            values_in("ran: tick_host_ns=81.5 other=3\ntick_host_ns.peer=idsp tick_host_ns.peer_value=90 x");
+        assert_eq!(values.len(), 3);
+        assert_eq!(values["tick_host_ns"], "81.5");
+        let peer = peer(&values, "tick_host_ns").unwrap();
+        assert_eq!((peer.who.as_str(), peer.value), ("idsp", 90.0));
+    }
+
+    #[test]
+    fn the_file_is_what_the_contract_says() {
+        let peer = Some(Peer { who: "a \"b\"".into(), value: 2.0 });
+        let text = json("c", &[(ROWS[0], 612.0, None), (ROWS[2], 1.5, peer)]);
+        let expected = "{ \"commit\": \"c\", \"rows\": [\n  { \"row\": \"tick_instructions_longest\", \"value\": 612, \
+                        \"unit\": \"instructions\", \"wanted\": 840, \"better\": \"lower\", \"peer\": null, \"peer_value\": \
+                        null },\n  { \"row\": \"tick_host_ns\", \"value\": 1.5, \"unit\": \"ns\", \"wanted\": null, \
+                        \"better\": \"lower\", \"peer\": \"a \\\"b\\\"\", \"peer_value\": 2 }\n] }\n";
+        assert_eq!(text, expected);
+    }
+}

@@ -1,0 +1,47 @@
+//! The rows of the performance table: their names, units and what is wanted of them.
+
+/// Which way is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Better {
+    /// Less is.
+    Lower,
+    /// More is.
+    Higher,
+}
+
+/// A row, without its value.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    /// Its name in `target/bench.json`.
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    /// What is wanted, where a number is.
+    pub(crate) wanted: Option<f64>,
+    pub(crate) better: Better,
+}
+
+const fn row(name: &'static str, unit: &'static str, wanted: Option<f64>, better: Better) -> Row {
+    Row { name, unit, wanted, better }
+}
+
+/// Every row that there is, in the table's order. A measuring program gives a value by printing `name=value`.
+pub(crate) const ROWS: [Row; 18] = [
+    row("tick_instructions_longest", "instructions", Some(840.0), Better::Lower),
+    row("tick_to_dac_spread_us", "us", Some(1.0), Better::Lower),
+    row("tick_host_ns", "ns", None, Better::Lower),
+    row("plant_core_ticks_per_s", "ticks/s", None, Better::Higher),
+    row("plant_core_scaling", "times on two cores", None, Better::Higher),
+    row("diagnose_60s_s", "s", None, Better::Lower),
+    row("diagnose_peak_mib", "MiB", None, Better::Lower),
+    row("stream_samples_per_s", "samples/s", Some(10_000.0), Better::Higher),
+    row("hand_to_page_p50_ms", "ms", None, Better::Lower),
+    row("hand_to_page_p99_ms", "ms", None, Better::Lower),
+    row("xpbd_step_ms", "ms", None, Better::Lower),
+    row("ultrasound_frame_ms", "ms", None, Better::Lower),
+    row("build_s", "s", None, Better::Lower),
+    row("packages", "packages", None, Better::Lower),
+    row("page_first_frame_s", "s", None, Better::Lower),
+    row("page_mb", "MB", None, Better::Lower),
+    row("firmware_flash_bytes", "bytes", Some(131_072.0), Better::Lower),
+    row("stack_high_water_bytes", "bytes", None, Better::Lower),
+];

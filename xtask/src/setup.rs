@@ -1,0 +1,122 @@
+//! What a machine needs beyond Rust: named, then installed where that is allowed, else the one command that does it.
+
+use crate::shell::{self, Failure};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// Whether we may install packages of the system.
+fn is_root() -> bool {
+    // The effective user is the second number; no number, no root.
+    fs::read_to_string("/proc/self/status")
+        .ok()
+        .and_then(|status| {
+            let line = status.lines().find(|line| line.starts_with("Uid:"))?.to_string();
+            line.split_whitespace().nth(2).map(|uid| uid == "0")
+        })
+        .unwrap_or(false)
+}
+
+/// Installs Debian packages, or says the command that does.
+pub(crate) fn install(packages: &[&str], what_for: &str) -> Result<(), Failure> {
+    let list = packages.join(" ");
+    if !is_root() || !shell::is_on_path("apt-get") {
+        return Err(Failure::new(format!(
+            "{what_for} needs {list}; install it with `sudo apt-get update && sudo apt-get install -y {list}`"
+        )));
+    }
+    eprintln!("{what_for} needs {list}: installing");
+    let apt = || {
+        let mut command = Command::new("apt-get");
+        command.env("DEBIAN_FRONTEND", "noninteractive");
+        command
+    };
+    // A stale index is no reason to stop; what it lacks shows at once.
+    let _ = shell::run(apt().args(["update", "-q"]));
+    shell::run(apt().args(["install", "-y", "-q", "--no-install-recommends"]).args(packages))
+}
+
+/// The browser that the page is tested in.
+pub(crate) fn browser() -> Result<(), Failure> {
+    if ["chromium", "chromium-browser", "google-chrome"].into_iter().any(shell::is_on_path) {
+        return Ok(());
+    }
+    install(&["chromium"], "the browser test")
+}
+
+/// How the image for the board is built on this machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Toolchain {
+    /// The toolchain at hand has the target.
+    Installed,
+    /// Debian's own compiler builds the core library along, from its sources.
+    Debian,
+}
+
+/// The board's target.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
+/// Debian's compiler, cargo and sources of the core library, newer than its release.
+const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+
+/// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's compiler.
+pub(crate) fn toolchain() -> Result<Toolchain, Failure> {
+    if has_target() {
+        return Ok(Toolchain::Installed);
+    }
+    if shell::is_on_path("rustup") {
+        eprintln!("the image for the board needs the Rust target {TARGET}: installing");
+        let added =
+            shell::run(Command::new("rustup").current_dir(shell::top()).args(["target", "add", TARGET]));
+        if added.is_ok() && has_target() {
+            return Ok(Toolchain::Installed);
+        }
+        eprintln!("rustup could not add it; trying Debian's compiler, which builds the core library itself");
+    }
+    if !has_debian_compiler() {
+        install(&DEBIAN_PACKAGES, "the image for the board")?;
+    }
+    if has_debian_compiler() {
+        Ok(Toolchain::Debian)
+    } else {
+        Err(Failure::new(format!(
+            "there is no way to build for the board on this machine; install the target with `rustup target add {TARGET}`"
+        )))
+    }
+}
+
+/// Cargo as `toolchain` wants it, for a command such as `build`.
+pub(crate) fn cargo_for_board(toolchain: Toolchain, subcommand: &str) -> Command {
+    match toolchain {
+        Toolchain::Installed => {
+            let mut cargo = shell::cargo();
+            cargo.arg(subcommand);
+            cargo
+        }
+        Toolchain::Debian => {
+            let mut cargo = Command::new("/usr/bin/cargo");
+            cargo.current_dir(shell::top());
+            // `-Z` on a stable compiler: only the core library is built with it, from the compiler's own sources.
+            cargo.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
+            cargo.args([subcommand, "-Zbuild-std=core"]);
+            cargo
+        }
+    }
+}
+
+fn has_target() -> bool {
+    let mut rustc = Command::new("rustc");
+    rustc.current_dir(shell::top()).args(["--print", "target-libdir", "--target", TARGET]);
+    shell::output(&mut rustc).is_ok_and(|folder| {
+        fs::read_dir(folder.trim()).is_ok_and(|entries| {
+            entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
+        })
+    })
+}
+
+fn has_debian_compiler() -> bool {
+    let has_sources = Path::new("/usr/lib/rustlib/src/rust/library/core").is_dir()
+        || fs::read_dir("/usr/src").is_ok_and(|entries| {
+            entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("rustc-"))
+        });
+    Path::new("/usr/bin/rustc").is_file() && Path::new("/usr/bin/cargo").is_file() && has_sources
+}

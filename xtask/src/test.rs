@@ -1,0 +1,255 @@
+//! `cargo xtask test`: everything that passes or fails, set-up included, each step also by its own name.
+
+use crate::setup::{self, TARGET};
+use crate::shell::{self, Failure, cargo};
+use crate::{firmware, setup::Toolchain};
+use std::fs;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// A run that takes longer has failed: nobody waits for more.
+const LIMIT: Duration = Duration::from_secs(30 * 60);
+const FUZZ_SECONDS: &str = "60";
+/// The emulator asks for a newer Rust than it needs.
+const ANY_RUST: &str = "--ignore-rust-version";
+
+/// A step: its name, what it shows, and what it does.
+struct Step {
+    name: &'static str,
+    shows: &'static str,
+    run: fn(&Clock) -> Result<Ended, Failure>,
+}
+
+/// How a step ended that did not fail.
+enum Ended {
+    Passed,
+    /// It cannot run here, and why.
+    Skipped(String),
+}
+
+/// In the order that finds the most for the least time.
+const STEPS: [Step; 9] = [
+    Step { name: "fmt", shows: "the sources are formatted", run: fmt },
+    Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
+    Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
+    Step { name: "doc", shows: "the documentation builds without warnings, its examples run", run: doc },
+    Step { name: "unit", shows: "the crates' tests", run: unit },
+    Step { name: "board", shows: "the flash image on the emulated board", run: board },
+    Step { name: "browser", shows: "the page in a real browser", run: browser },
+    Step { name: "fuzz", shows: "the frame parser, a minute of damaged frames", run: fuzz },
+    Step { name: "prove", shows: "the small proof of the diagnosis", run: prove },
+];
+
+/// What no machine without the hardware can run.
+const NEVER_HERE: &str =
+    "flashing and running on a real STM32F4DISCOVERY: needs the board and a person beside it";
+
+/// When the whole run has to be over.
+struct Clock(Instant);
+
+impl Clock {
+    /// Runs a command, ended at the limit.
+    fn run(&self, command: &mut Command) -> Result<(), Failure> {
+        let said = shell::said(command);
+        eprintln!("$ {said}");
+        let mut child = command
+            .spawn()
+            .map_err(|error| Failure::new(format!("`{said}` could not be started: {error}")))?;
+        loop {
+            match child.try_wait() {
+                Ok(Some(status)) if status.success() => return Ok(()),
+                Ok(Some(status)) => return Err(Failure::new(format!("`{said}` failed ({status})"))),
+                Ok(None) if Instant::now() > self.0 => {
+                    // Gone already is as good.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                    let minutes = LIMIT.as_secs() / 60;
+                    return Err(Failure::new(format!(
+                        "`{said}` was ended: the whole run may take {minutes} minutes"
+                    )));
+                }
+                Ok(None) => std::thread::sleep(Duration::from_millis(50)),
+                Err(error) => return Err(Failure::new(format!("`{said}` was lost: {error}"))),
+            }
+        }
+    }
+}
+
+/// Runs the steps named, or all of them, and says how each ended.
+pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
+    if let Some(unknown) = names.iter().find(|name| STEPS.iter().all(|step| step.name != **name)) {
+        let all: Vec<&str> = STEPS.iter().map(|step| step.name).collect();
+        return Err(Failure::usage(format!(
+            "`{unknown}` is no step of the tests; they are: {}",
+            all.join(" ")
+        )));
+    }
+    let clock = Clock(Instant::now() + LIMIT);
+    let mut summary = vec![];
+    let (mut passed, mut failed) = (0, 0);
+    for step in STEPS.iter().filter(|step| names.is_empty() || names.iter().any(|name| name == step.name)) {
+        eprintln!("\n== {}: {}", step.name, step.shows);
+        let begin = Instant::now();
+        let ended = (step.run)(&clock);
+        let seconds = begin.elapsed().as_secs_f64();
+        let verdict = match ended {
+            Ok(Ended::Passed) => {
+                passed += 1;
+                "pass".to_string()
+            }
+            Ok(Ended::Skipped(why)) => format!("not run: {why}"),
+            Err(failure) => {
+                failed += 1;
+                eprintln!("error: {failure}");
+                format!("FAIL: {failure}")
+            }
+        };
+        summary.push(format!("{:<9}{seconds:>7.1} s  {verdict}", step.name));
+    }
+    println!("\nSummary");
+    summary.iter().for_each(|line| println!("  {line}"));
+    println!("  hardware        -  not run: {NEVER_HERE}");
+    println!("steps: {passed} passed, {failed} failed");
+    if failed == 0 {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("{failed} steps of the tests failed; see the summary")))
+    }
+}
+
+fn passed(done: Result<(), Failure>) -> Result<Ended, Failure> {
+    done.map(|()| Ended::Passed)
+}
+
+fn fmt(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(cargo().args(["fmt", "--all", "--check"])))
+}
+
+fn clippy(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(cargo().args([
+        "clippy",
+        "--release",
+        "--workspace",
+        "--all-targets",
+        ANY_RUST,
+        "--",
+        "-D",
+        "warnings",
+    ])))
+}
+
+fn doc(clock: &Clock) -> Result<Ended, Failure> {
+    let mut build = cargo();
+    build.env("RUSTDOCFLAGS", "-D warnings");
+    clock.run(build.args(["doc", "--release", "--workspace", "--no-deps", ANY_RUST]))?;
+    passed(clock.run(cargo().args(["test", "--release", "--workspace", "--doc", "--quiet", ANY_RUST])))
+}
+
+fn unit(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(tests().args(["--workspace", "--exclude", "tests"])))
+}
+
+/// The image, and the same warnings for it as for everything else.
+fn image(clock: &Clock) -> Result<Ended, Failure> {
+    firmware::report(&firmware::build()?)?;
+    let toolchain = setup::toolchain()?;
+    if toolchain == Toolchain::Debian {
+        // Debian's compiler comes without clippy; the host's clippy has seen all but the tasks.
+        return Ok(Ended::Passed);
+    }
+    passed(clock.run(setup::cargo_for_board(toolchain, "clippy").args([
+        "-p",
+        "firmware",
+        "--bin",
+        "firmware",
+        "--profile",
+        "firmware",
+        "--target",
+        TARGET,
+        "--",
+        "-D",
+        "warnings",
+    ])))
+}
+
+fn board(clock: &Clock) -> Result<Ended, Failure> {
+    let image = firmware::build()?;
+    let names = test_programs()?.into_iter().filter(|name| !is_for_browser(name));
+    passed(clock.run(tests().env("FIRMWARE_ELF", image).args(["-p", "tests", "--lib"]).args(each(names))))
+}
+
+fn browser(clock: &Clock) -> Result<Ended, Failure> {
+    let names: Vec<String> = test_programs()?.into_iter().filter(|name| is_for_browser(name)).collect();
+    if names.is_empty() {
+        return Ok(Ended::Skipped("there is no test program for the browser in tests/tests".into()));
+    }
+    setup::browser()?;
+    passed(clock.run(tests().args(["-p", "tests"]).args(each(names.into_iter()))))
+}
+
+fn fuzz(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(cargo().args([
+        "run",
+        "--release",
+        "--quiet",
+        ANY_RUST,
+        "-p",
+        "link",
+        "--example",
+        "fuzz_frames",
+        "--",
+        "--seconds",
+        FUZZ_SECONDS,
+    ])))
+}
+
+fn prove(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(cargo().args([
+        "run",
+        "--release",
+        "--quiet",
+        ANY_RUST,
+        "-p",
+        "proof",
+        "--bin",
+        "prove",
+        "--",
+        "--quick",
+    ])))
+}
+
+/// Nextest where it is installed, else cargo's own.
+fn tests() -> Command {
+    let mut command = cargo();
+    if shell::is_on_path("cargo-nextest") {
+        command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
+    } else {
+        command.args(["test", "--no-fail-fast", "--quiet"]);
+    }
+    command.args(["--release", ANY_RUST]);
+    command
+}
+
+/// The integration tests in `tests/tests`, by name.
+pub(crate) fn test_programs() -> Result<Vec<String>, Failure> {
+    let folder = shell::top().join("tests/tests");
+    let entries = fs::read_dir(&folder)
+        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", folder.display())))?;
+    let mut names: Vec<String> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .filter_map(|path| Some(path.file_stem()?.to_str()?.to_string()))
+        .collect();
+    names.sort_unstable();
+    Ok(names)
+}
+
+/// Whether a test program needs a browser.
+pub(crate) fn is_for_browser(name: &str) -> bool {
+    name.starts_with("browser") || name.starts_with("page")
+}
+
+fn each(names: impl Iterator<Item = String>) -> Vec<String> {
+    names.flat_map(|name| ["--test".to_string(), name]).collect()
+}
