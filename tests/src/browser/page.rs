@@ -13,7 +13,13 @@ pub struct Page {
 
 impl Page {
     /// Opens `url` in a view of `width` by `height` CSS pixels; a phone has fingers.
-    pub fn open(browser: &Chromium, url: &str, width: u32, height: u32, phone: bool) -> Result<Self, Failure> {
+    pub fn open(
+        browser: &Chromium,
+        url: &str,
+        width: u32,
+        height: u32,
+        phone: bool,
+    ) -> Result<Self, Failure> {
         let mut devtools = browser.devtools()?;
         devtools.open_tab()?;
         for domain in ["Page", "Runtime", "Log", "Network"] {
@@ -79,14 +85,17 @@ impl Page {
     /// A mouse event as the system would send it: `mousePressed`, `mouseMoved` or `mouseReleased`, left button.
     pub fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Failure> {
         let buttons = if kind == "mouseReleased" { 0 } else { 1 };
-        let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
+        let event =
+            json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
         self.devtools.call("Input.dispatchMouseEvent", event).map(drop)
     }
 
     /// A finger: `touchStart`, `touchMove` or `touchEnd`.
     pub fn touch(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Failure> {
         let points = if kind == "touchEnd" { json!([]) } else { json!([{ "x": x, "y": y }]) };
-        self.devtools.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points })).map(drop)
+        self.devtools
+            .call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }))
+            .map(drop)
     }
 
     /// Clicks the middle of the element with `id`.
