@@ -2,7 +2,7 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
-use crate::estimate::{Estimator, rms, sensor_noise};
+use crate::estimate::{Estimator, sensor_noise};
 use crate::fit::Fit;
 use crate::judge;
 use crate::kalman::tolerant;
@@ -41,6 +41,11 @@ fn costs(candidate: &Candidate, nominal: &Nominal, held: &[Track]) -> Vec<f64> {
     out
 }
 
+/// The search for waves is dear, and only waves are like waves.
+fn is_periodic(name: EffectName) -> bool {
+    matches!(name, EffectName::Cogging | EffectName::TorqueRipple)
+}
+
 /// Fits the rivals of each effect in its place and says how far behind they are.
 pub(crate) fn rivals(bench: &Bench, last: &Candidate, held: &[Track], found: &mut [Found]) {
     let best = bench.fit(last.model.clone(), &last.noise, Colour::White);
@@ -52,8 +57,13 @@ pub(crate) fn rivals(bench: &Bench, last: &Candidate, held: &[Track], found: &mu
         let base_fit = Fit::new(&less, bench.nominal, bench.tracks, &best.noise);
         let base = Candidate { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
         let mut out: Vec<Rival> = Vec::new();
-        let others: Vec<(Effect, f64)> =
-            bench.screen(&base).into_iter().filter(|(e, _)| e.name != name).take(RIVALS).collect();
+        let periodic =
+            is_periodic(name) || matches!(name, EffectName::MassImbalance | EffectName::EncoderEccentricity);
+        let others: Vec<(Effect, f64)> = bench
+            .screen(&base, &|other| other != name && (periodic || !is_periodic(other)))
+            .into_iter()
+            .take(RIVALS)
+            .collect();
         for (effect, _) in others {
             let mut model = base.model.clone();
             model.effects.push(effect.clone());
@@ -276,8 +286,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let on_fit = residuals(&s, &estimator, &fit_tracks, false, &refit, &patched);
     let on_held = residuals(&s, &estimator, &held_tracks, true, &refit, &patched);
     let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
-        fit: rms(a, &fit_tracks),
-        holdout: rms(b, &held_tracks),
+        fit: estimator.rms(a, &fit_tracks),
+        holdout: estimator.rms(b, &held_tracks),
     };
     let (inertia, _, _) = values::scale(&nominal, &patched);
     let floor = sensor_noise(&fit_tracks, &patched.noise, estimator.bandwidth_hz) * inertia;
@@ -290,7 +300,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         force_rms: both(&on_fit.force, &on_held.force),
         holdout_gain_ci95: [0.0, 0.0],
     };
-    table.holdout_gain_ci95 = relative_gain(&held_tracks, &on_held.refit, &on_held.patched);
+    table.holdout_gain_ci95 = relative_gain(&estimator, &held_tracks, &on_held.refit, &on_held.patched);
     let maps =
         locate::maps((&fit_tracks, &on_fit.patched), (&held_tracks, &on_held.patched), nominal.rig.turn());
     s.fit_tracks = fit_tracks.clone();
@@ -410,6 +420,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
             series.push(Series::new(
                 track,
                 held,
+                &estimator.moving(track),
                 &residuals.nominal[r],
                 &residuals.refit[r],
                 &residuals.patched[r],
@@ -445,14 +456,20 @@ fn strongest(maps: &[Map]) -> Vec<Region> {
 }
 
 /// Interval of the relative reduction of the held-out mean square.
-fn relative_gain(tracks: &[Track], before: &[Vec<f64>], after: &[Vec<f64>]) -> [f64; 2] {
+fn relative_gain(
+    estimator: &Estimator,
+    tracks: &[Track],
+    before: &[Vec<f64>],
+    after: &[Vec<f64>],
+) -> [f64; 2] {
     let mut gains = Vec::new();
     let mut whole = 0.0;
     for ((track, a), b) in tracks.iter().zip(before).zip(after) {
+        let moving = estimator.moving(track);
         for w in track.segments.windows(2) {
             let mut gain = 0.0;
             for j in w[0]..w[1] {
-                if !track.rest[j] {
+                if moving[j] {
                     gain += a[j] * a[j] - b[j] * b[j];
                     whole += a[j] * a[j];
                 }

@@ -8,7 +8,7 @@ use crate::track::{Total, Track};
 use std::f64::consts::TAU;
 
 /// Largest bandwidth, Hz.
-const WIDEST_HZ: f64 = 100.0;
+const WIDEST_HZ: f64 = 50.0;
 const NARROWEST_HZ: f64 = 5.0;
 
 /// The estimator for some recordings.
@@ -59,16 +59,39 @@ pub(crate) fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
     (sum / count * integral).sqrt()
 }
 
-/// Root mean square of residuals over the rows that move.
-pub(crate) fn rms(residuals: &[Vec<f64>], tracks: &[Track]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (residual, track) in residuals.iter().zip(tracks) {
-        for (x, rest) in residual.iter().zip(&track.rest) {
-            if !rest {
-                sum += x * x;
-                count += 1.0;
+impl Estimator {
+    /// Blocks that move and are further from rest than the estimator reaches: at rest friction is a reaction, and a
+    /// low-pass would carry it over.
+    pub(crate) fn moving(&self, track: &Track) -> Vec<bool> {
+        let reach = (0.4 / self.bandwidth_hz * track.block_rate()).ceil() as usize;
+        let n = track.blocks();
+        let mut out = vec![true; n];
+        for j in 0..n {
+            if track.rest[j] {
+                out[j.saturating_sub(reach)..(j + reach + 1).min(n)].fill(false);
             }
         }
+        // The ends of a recording are extrapolated.
+        let end = reach.min(n / 4);
+        out[..end].fill(false);
+        out[n - end..].fill(false);
+        if out.iter().filter(|x| **x).count() * 20 < n {
+            return track.rest.iter().map(|rest| !rest).collect();
+        }
+        out
     }
-    if count > 0.0 { (sum / count as f64).sqrt() } else { 0.0 }
+
+    /// Root mean square of residuals over the rows that move.
+    pub(crate) fn rms(&self, residuals: &[Vec<f64>], tracks: &[Track]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (residual, track) in residuals.iter().zip(tracks) {
+            for (x, moving) in residual.iter().zip(self.moving(track)) {
+                if moving {
+                    sum += x * x;
+                    count += 1.0;
+                }
+            }
+        }
+        if count > 0.0 { (sum / count as f64).sqrt() } else { 0.0 }
+    }
 }

@@ -36,13 +36,14 @@ impl Series {
     pub(crate) fn new(
         track: &Track,
         held_out: bool,
+        moves: &[bool],
         nominal: &[f64],
         refit: &[f64],
         patched: &[f64],
         force: &[f64],
     ) -> Self {
         let moving =
-            |column: &[f64]| column.iter().zip(&track.rest).map(|(x, rest)| (!rest).then_some(*x)).collect();
+            |column: &[f64]| column.iter().zip(moves).map(|(x, moves)| moves.then_some(*x)).collect();
         Self {
             file: track.file.clone(),
             held_out,

@@ -2,11 +2,11 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
-use crate::estimate::Estimator;
+use crate::estimate::{Estimator, sensor_noise};
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::Noise;
 use crate::library::Span;
-use crate::model::{Model, Nominal};
+use crate::model::{Key, Model, Nominal};
 use crate::noise::Colour;
 use crate::null;
 use crate::recording::Recording;
@@ -27,6 +27,32 @@ pub(crate) struct Found {
     pub(crate) holdout: Gain,
     /// The same on the fitted recordings.
     pub(crate) fit: Gain,
+    /// Part of the held-out residual above the sensor's noise that it explains.
+    pub(crate) share: f64,
+    /// Whether one of its values stands at the end of what is possible.
+    pub(crate) at_bound: bool,
+}
+
+/// Part of the residual above the noise that an effect must explain on held-out recordings to be named.
+const SHARE: f64 = 0.05;
+
+impl Found {
+    /// Why an effect may not be named, if it may not.
+    fn weakness(&self) -> Option<String> {
+        if self.holdout.low <= 0.0 || self.holdout.z < 2.0 {
+            return Some("its gain does not carry to the held-out recordings".into());
+        }
+        if self.fit.z < 2.0 {
+            return Some("its gain rests on few moments of the fitted recordings".into());
+        }
+        if self.share < SHARE {
+            return Some(format!(
+                "it explains {:.1} % of what the noise leaves, less than 5 %",
+                100.0 * self.share
+            ));
+        }
+        self.at_bound.then(|| "its values stand at the end of what is possible".into())
+    }
 }
 
 /// How far a rival is behind.
@@ -101,28 +127,15 @@ pub(crate) fn search(
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
-        let clock = std::time::Instant::now();
-        let candidates = bench.screen(&white);
-        if std::env::var("DIAG_DEBUG").is_ok() {
-            println!("screen {:?}", clock.elapsed());
-        }
+        let candidates = bench.screen(&white, &|_| true);
         let finalists = bench.finalists(&white, &candidates);
         let mut taken = None;
         if std::env::var("DIAG_DEBUG").is_ok() {
-            println!("finalists {:?}", clock.elapsed());
-        }
-        if std::env::var("DIAG_DEBUG").is_ok() {
-            println!("white {:?} theta {:?}", white.noise, white.fit.theta(0));
             for (e, g) in &candidates {
                 println!("   screen {g:.1} {} {:?}", e.name, e.shape);
             }
             for f in &finalists {
-                println!(
-                    "  {:.1} {} {:?}",
-                    f.merit - white.merit,
-                    f.model.effects.last().unwrap().name,
-                    &f.fit.theta(0)
-                );
+                println!("  {:.1} {}", f.merit - white.merit, f.model.effects.last().unwrap().name);
             }
         }
         for finalist in finalists {
@@ -155,21 +168,12 @@ pub(crate) fn search(
         let weakest = found
             .iter()
             .enumerate()
-            .map(|(i, f)| (i, if f.holdout.low > 0.0 { f.holdout.z } else { f.holdout.z.min(0.0) }))
+            .filter_map(|(i, f)| f.weakness().map(|reason| (i, f.holdout.z, reason)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        match weakest {
-            Some((i, z)) if z <= 0.0 || found[i].holdout.low <= 0.0 || found[i].fit.z < 2.0 => {
-                let name = model.effects[i].name;
-                lost.push((
-                    name,
-                    found[i].holdout.sum,
-                    "it does not carry to the held-out recordings".into(),
-                ));
-                model.effects.remove(i);
-                last = bench.fit(model.clone(), &null_slow.noise, Colour::Slow);
-            }
-            _ => break,
-        }
+        let Some((i, _, reason)) = weakest else { break };
+        lost.push((model.effects[i].name, found[i].holdout.sum, reason));
+        model.effects.remove(i);
+        last = bench.fit(model.clone(), &null_slow.noise, Colour::Slow);
     }
     if !model.effects.is_empty() {
         smooth_held(&last, &nominal, &mut held);
@@ -201,6 +205,7 @@ fn fit_costs(bench: &Bench, c: &Candidate) -> Vec<f64> {
 fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     let with = lay_all(last, bench.nominal, held, &last.noise);
     let with_fit = fit_costs(bench, last);
+    let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
     (0..last.model.effects.len())
         .map(|i| {
             let mut less = last.model.clone();
@@ -211,7 +216,20 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
             let laid = lay_all(&without, bench.nominal, held, &last.noise);
             let holdout = judge::compare(&with, &laid);
-            Found { effect, rivals: Vec::new(), holdout, fit: judge::bootstrap(&gains) }
+            let square = |c: &Candidate, laid: &[Laid]| {
+                let totals: Vec<Total> = laid.iter().map(|l| l.total.clone()).collect();
+                let inertia = crate::values::scale(bench.nominal, c).0;
+                estimator.rms(&residuals(&estimator, held, &totals, inertia), held).powi(2)
+            };
+            let (before, after) = (square(&without, &laid), square(last, &with));
+            let inertia = crate::values::scale(bench.nominal, last).0;
+            let floor = (sensor_noise(held, &last.noise, estimator.bandwidth_hz) * inertia).powi(2);
+            let share = (before - after) / (before - floor).max(0.02 * before).max(1e-300);
+            let at_bound =
+                last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
+                    *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
+                });
+            Found { effect, rivals: Vec::new(), holdout, fit: judge::bootstrap(&gains), share, at_bound }
         })
         .collect()
 }

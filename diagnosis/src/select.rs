@@ -77,14 +77,13 @@ impl Bench<'_> {
     }
 
     /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
-    pub(crate) fn screen(&self, now: &Candidate) -> Vec<(Effect, f64)> {
+    pub(crate) fn screen(&self, now: &Candidate, wanted: &dyn Fn(N) -> bool) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
         let mut found: Vec<(Effect, f64)> = Vec::new();
-        let clock = std::time::Instant::now();
         for name in N::ALL {
             let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
             let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
-            if there(*name) || (needs_dry(*name) && !dry) {
+            if there(*name) || (needs_dry(*name) && !dry) || !wanted(*name) {
                 continue;
             }
             let best = match name {
@@ -110,9 +109,6 @@ impl Bench<'_> {
                     .map(|(effect, score)| (effect, score.gain))
                 }
             };
-            if std::env::var("DIAG_DEBUG").is_ok() {
-                println!("    {name} {:?}", clock.elapsed());
-            }
             if let Some((effect, _)) = best {
                 let (effect, gain) = self.refine(now, &residuals, effect);
                 let worth = gain - cost(&effect, self.tracks.len(), self.span);
