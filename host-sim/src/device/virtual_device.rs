@@ -111,6 +111,17 @@ impl VirtualDevice {
         self.tick
     }
 
+    /// Starts it without a PC: for measuring and for tests of the control law against the plant.
+    pub fn start_alone(&mut self) {
+        self.controller.order(Order::Start);
+    }
+
+    /// A tick with a heartbeat from nobody and no link behind it.
+    pub fn tick_alone(&mut self) {
+        self.controller.order(Order::Heartbeat);
+        self.tick();
+    }
+
     /// One tick of the control law, then 100 µs of physics.
     pub fn tick(&mut self) {
         while let Some(order) = self.endpoint.next_order() {

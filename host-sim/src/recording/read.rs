@@ -32,8 +32,13 @@ impl Recording {
 
     /// Reads the bytes of a recording; `file` is what errors call it.
     pub fn parse(file: String, bytes: &[u8]) -> Result<Self, Failure> {
+        if !bytes.starts_with(mcap::MAGIC) {
+            return Err(Failure::input(format_args!(
+                "{file}: not an MCAP recording; give one that `run --record` made"
+            )));
+        }
         let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
-            .map_err(|cause| Failure::input(format_args!("{file}: not an MCAP recording ({cause})")))?;
+            .map_err(|cause| Failure::input(format_args!("{file}: not a usable MCAP recording ({cause})")))?;
         let (mut setup, mut messages, mut cut) = (None, Vec::new(), None);
         for message in stream {
             let message = match message {
@@ -55,6 +60,10 @@ impl Recording {
                     )));
                 }
             }
+        }
+        // The totals of the link are the last thing that a run writes.
+        if cut.is_none() && !matches!(messages.last(), Some(Message::Link(_))) {
+            cut = Some("its end was never written".to_owned());
         }
         let setup = setup.ok_or_else(|| {
             Failure::input(format_args!("{file}: has no /setup message; was it recorded by host-sim?"))

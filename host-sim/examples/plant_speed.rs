@@ -1,0 +1,43 @@
+//! Ticks of plant and control core together, a second: on one thread, and how it scales over two.
+//!
+//! `cargo run --release -p host-sim --example plant_speed`
+
+use host_sim::device::virtual_device::VirtualDevice;
+use host_sim::procedure::Procedure;
+use host_sim::profile::Profile;
+use std::time::Instant;
+
+/// A minute of the device.
+const TICKS: u32 = 600_000;
+const REPEATS: u32 = 5;
+
+fn minute() -> f64 {
+    let profile = Profile::find("adult").expect("it is built in");
+    let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
+    let mut device = VirtualDevice::new(&profile, procedure);
+    device.start_alone();
+    let begin = Instant::now();
+    for _ in 0..TICKS {
+        device.tick_alone();
+    }
+    let taken = begin.elapsed().as_secs_f64();
+    assert!(device.is_enabled(), "it ran with torque on");
+    f64::from(TICKS) / taken
+}
+
+/// Ticks a second of `threads` devices side by side, all together; the best of a few runs.
+fn rate(threads: usize) -> f64 {
+    (0..REPEATS)
+        .map(|_| {
+            std::thread::scope(|scope| {
+                let all: Vec<_> = (0..threads).map(|_| scope.spawn(minute)).collect();
+                all.into_iter().map(|one| one.join().expect("a run ends")).sum::<f64>()
+            })
+        })
+        .fold(0.0, f64::max)
+}
+
+fn main() {
+    let (one, two) = (rate(1), rate(2));
+    println!("plant_core_ticks_per_s={one:.0} plant_core_scaling={:.2}", two / one);
+}
