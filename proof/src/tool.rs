@@ -53,7 +53,9 @@ pub(crate) struct Answer {
 /// Runs the tool and reads what it wrote.
 pub(crate) fn ask(tool: &dyn Tool, paths: &Paths, out: &Path) -> Result<Answer, String> {
     std::fs::create_dir_all(out).map_err(|e| format!("cannot create {}: {e}", out.display()))?;
-    tool.diagnose(paths, out)?;
+    // A panic of the tool is a failure of this case, not of the benchmark.
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| tool.diagnose(paths, out)))
+        .unwrap_or_else(|_| Err("the tool panicked".into()))?;
     let file = out.join("diagnosis.json");
     let text = std::fs::read_to_string(&file).map_err(|e| format!("no report at {}: {e}", file.display()))?;
     let value: Value = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", file.display()))?;
@@ -129,6 +131,18 @@ mod tests {
         assert_eq!(answer.effects[0].parameters[0].2, Some([2.8e-4, 3.4e-4]));
         assert_eq!((answer.refit_holdout, answer.patched_holdout, answer.bandwidth_hz), (2.0, 0.5, 100.0));
         assert!(read(&serde_json::json!({"verdict": "x"})).unwrap_err().contains("effects"));
+    }
+
+    #[test]
+    fn a_panic_of_the_tool_is_its_failure() {
+        struct Broken;
+        impl Tool for Broken {
+            fn diagnose(&self, _: &Paths, _: &Path) -> Result<(), String> {
+                panic!("on purpose")
+            }
+        }
+        let paths = Paths { rig: "r".into(), fit: vec![], holdout: vec![] };
+        assert_eq!(ask(&Broken, &paths, &std::env::temp_dir()), Err("the tool panicked".into()));
     }
 
     #[test]
