@@ -304,6 +304,12 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let maps =
         locate::maps((&fit_tracks, &on_fit.patched), (&held_tracks, &on_held.patched), nominal.rig.turn());
     s.fit_tracks = fit_tracks.clone();
+    // What is left and hangs together over time, against what the effects explain: if most of it is left, the names
+    // stand for something else.
+    let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
+    let left = s.last.noise.slow * inertia * inertia;
+    let leftover = if explained > 0.0 { left / explained } else { 0.0 };
+    let doubt = 1.0 / (1.0 + (leftover / 0.6).powi(2));
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
@@ -314,7 +320,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         let named = Named {
             name,
             subsystem: name.subsystem(),
-            confidence: confidence(one, &class),
+            confidence: confidence(one, &class) * doubt,
             parameters: values::parameters(&bench, &patched, i),
             place: place(&s, &patched, i),
             separating_experiment: prescribe::separating(&class),
@@ -322,6 +328,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         };
         effects.push((one.holdout.sum, named));
     }
+    effects.retain(|(_, e)| e.confidence >= 0.5);
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
     let above = |x: f64| (x * x - floor * floor).max(0.0);
@@ -334,7 +341,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let refit_matters = table.refit.holdout < (1.0 - REFIT_MATTERS) * table.nominal.holdout;
     let verdict = if !effects.is_empty() {
         Verdict::MissingPhysics
-    } else if disturbed && carries {
+    } else if (disturbed && carries) || !found.is_empty() {
         Verdict::Unexplained
     } else if disturbed {
         Verdict::RandomDisturbance

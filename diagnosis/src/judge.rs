@@ -1,12 +1,11 @@
 //! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may move (its offset, and
 //! the place along the travel at which it started).
 
-use crate::effects::EffectName as N;
 use crate::fit::{Fit, Prepared};
 use crate::kalman::{Noise, tolerant};
 use crate::model::{Key, Model, Nominal, own_phase, total};
 use crate::select::Candidate;
-use crate::solve::{Factor, Square};
+use crate::solve::Square;
 use crate::track::{Total, Track};
 
 /// A model laid on one held-out recording.
@@ -141,10 +140,6 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
             if !own_phase(name) || places.is_empty() {
                 continue;
             }
-            if name == N::MissedCounts {
-                own_steps(&m, &b, &one.reference, &mut theta, &places);
-                continue;
-            }
             let shape = pattern(fit, model, effect);
             let waves = waves_of(model, effect);
             for group in groups(waves.len(), model.effects[effect].shape.contains_key("turn")) {
@@ -195,27 +190,6 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
         .map(|(square, (_, count))| 0.5 * count * tolerant(square / count).0)
         .collect();
     Laid { total: total(track, &one.columns, &theta), theta, costs }
-}
-
-/// Steps of lost counts happen where they happen: each recording has its own.
-fn own_steps(m: &Square, b: &[f64], reference: &[f64], theta: &mut [f64], places: &[usize]) {
-    let k = places.len();
-    let mut part = Square::zero(k);
-    let mut pull = vec![0.0; k];
-    for (a, i) in places.iter().enumerate() {
-        pull[a] = b[*i];
-        for j in 0..theta.len() {
-            if !places.contains(&j) {
-                pull[a] -= m.at(*i, j) * (theta[j] - reference[j]);
-            }
-        }
-        for (c, j) in places.iter().enumerate() {
-            part.a[a * k + c] = m.at(*i, *j);
-        }
-    }
-    for (i, x) in places.iter().zip(Factor::new(&part).solve(&pull)) {
-        theta[*i] = x;
-    }
 }
 
 /// Deterministic pseudo-random numbers (xorshift64*), seeded by a constant.

@@ -33,6 +33,7 @@ pub mod rig;
 mod screen;
 mod select;
 mod solve;
+mod steps;
 mod track;
 mod values;
 

@@ -87,7 +87,9 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
     let turn = nominal.rig.turn();
     let turns = turn.map_or(0.0, |turn| span.travel() / turn);
     match name {
-        N::ViscousFriction | N::CoulombFriction | N::QuadraticDrag => vec![Effect::shaped(name, &[])],
+        N::ViscousFriction | N::CoulombFriction | N::QuadraticDrag | N::MissedCounts => {
+            vec![Effect::shaped(name, &[])]
+        }
         N::AsymmetricFriction => {
             let known = nominal.rig.model.offset.is_some();
             vec![Effect::shaped(name, if known { &[("viscous_only", 1.0)] } else { &[] })]

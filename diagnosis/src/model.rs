@@ -129,8 +129,9 @@ impl Nominal {
                 (-0.9 * dry, 3.0 * dry)
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
-            EffectName::TorqueRipple => (-0.15 * gain.abs(), 0.15 * gain.abs()),
+            EffectName::TorqueRipple => (-0.3 * gain.abs(), 0.3 * gain.abs()),
             EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
+            EffectName::MissedCounts => (0.5, 1.5),
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
@@ -173,7 +174,6 @@ pub(crate) fn own_phase(name: EffectName) -> bool {
             | EffectName::TorqueRipple
             | EffectName::MassImbalance
             | EffectName::EncoderEccentricity
-            | EffectName::MissedCounts
     )
 }
 
@@ -189,6 +189,9 @@ pub(crate) fn effect_inputs(
     command: &[f64],
     drive_input: &Input,
 ) -> Vec<Input> {
+    if effect.name == EffectName::MissedCounts {
+        return vec![Input::Sensor(track.lost.clone())];
+    }
     let Some(mut law) = Law::new(effect) else { return Vec::new() };
     let count = law.names().len();
     let n = track.blocks();

@@ -118,7 +118,8 @@ pub(crate) fn search(
         .collect();
     let sums = project(fit, residuals, &joined, true);
     let (chosen, gain) = forward(&sums, refined.len(), tracks.len(), (orders.len() as f64).ln());
-    if chosen.is_empty() {
+    if chosen.is_empty() || (whole && name == N::Cogging && chosen.iter().all(|i| refined[*i] == 1.0)) {
+        // Once per turn and nothing else is an off-centre mass.
         return None;
     }
     let mut shape: Vec<(String, f64)> = Vec::new();

@@ -106,6 +106,16 @@ fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track]) {
     }
 }
 
+/// Looks for lost counts in every recording under the null.
+fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise) {
+    for track in tracks.iter_mut() {
+        let alone = std::slice::from_ref(&*track);
+        let fit = crate::fit::Fit::new(&Model::default(), nominal, alone, noise);
+        let residual = fit.residual(0);
+        track.lost = crate::steps::find(track, &fit, 0, &residual, span.count);
+    }
+}
+
 pub(crate) fn search(
     rig: &Rig,
     fit: &[Recording],
@@ -119,6 +129,11 @@ pub(crate) fn search(
     let (noise, _) = null::settle(&mut nominal, &mut tracks);
     let scale = command_scale(&nominal, &tracks);
     let span = Span::of(&tracks, &nominal);
+    find_steps(&nominal, &span, &mut tracks, &noise);
+    let first = crate::fit::Fit::new(&Model::default(), &nominal, &tracks, &noise);
+    let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
+    smooth_held(&first, &nominal, &mut held);
+    find_steps(&nominal, &span, &mut held, &noise);
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
     let null_slow = bench.fit(Model::default(), &noise, Colour::Slow);
     let mut white = bench.fit(Model::default(), &noise, Colour::White);
@@ -128,7 +143,8 @@ pub(crate) fn search(
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
         let candidates = bench.screen(&white, &|_| true);
-        let finalists = bench.finalists(&white, &candidates);
+        let mut finalists = bench.finalists(&white, &candidates);
+        bench.polish(&mut finalists);
         let mut taken = None;
         if std::env::var("DIAG_DEBUG").is_ok() {
             for (e, g) in &candidates {
@@ -157,7 +173,6 @@ pub(crate) fn search(
         white = finalist;
     }
     progress("judging on held-out recordings", 0.8);
-    smooth_held(&null_slow, &nominal, &mut held);
     let mut model = white.model.clone();
     let mut last = bench.fit(model.clone(), &slow_noise, Colour::Slow);
     let mut found;

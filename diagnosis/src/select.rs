@@ -35,6 +35,8 @@ const PER_COEFFICIENT: f64 = 2.5;
 const PER_SHAPE: f64 = 4.0;
 /// How many effects are fitted in full at each step.
 const FINALISTS: usize = 8;
+/// How many of them have their shapes moved in full fits.
+const POLISHED: usize = 3;
 /// Most effects that are named together.
 pub(crate) const MOST: usize = 3;
 
@@ -109,6 +111,9 @@ impl Bench<'_> {
                     .map(|(effect, score)| (effect, score.gain))
                 }
             };
+            if *name == N::MissedCounts && self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0)) {
+                continue;
+            }
             if let Some((effect, _)) = best {
                 let (effect, gain) = self.refine(now, &residuals, effect);
                 let worth = gain - cost(&effect, self.tracks.len(), self.span);
@@ -172,5 +177,48 @@ impl Bench<'_> {
             .collect();
         full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
         full
+    }
+
+    /// Moves the shape of the last effect of the best few candidates to the largest likelihood of the whole fit.
+    pub(crate) fn polish(&self, candidates: &mut [Candidate]) {
+        let polished: Vec<Candidate> =
+            candidates.par_iter().take(POLISHED).map(|c| self.polish_one(c)).collect();
+        for (old, new) in candidates.iter_mut().zip(polished) {
+            if new.merit > old.merit {
+                *old = new;
+            }
+        }
+        candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    }
+
+    fn polish_one(&self, candidate: &Candidate) -> Candidate {
+        let last = candidate.model.effects.len() - 1;
+        let mut model = candidate.model.clone();
+        let merit =
+            |model: &Model| Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood;
+        let mut best = candidate.fit.log_likelihood;
+        for round in 0..2 {
+            for (key, low, high) in library::movable(&candidate.model.effects[last], self.span) {
+                let at = model.effects[last].shape[key];
+                let reach = if round == 0 { 1.6_f64 } else { 1.15 };
+                let (a, b) = ((at / reach).max(low).ln(), (at * reach).min(high).ln());
+                if b <= a {
+                    continue;
+                }
+                let with = |x: f64| {
+                    let mut trial = model.clone();
+                    trial.effects[last].shape.insert(key.to_owned(), x.exp());
+                    trial
+                };
+                let x = golden(a, b, if round == 0 { 8 } else { 6 }, |x| merit(&with(x)));
+                let trial = with(x);
+                let value = merit(&trial);
+                if value > best {
+                    best = value;
+                    model = trial;
+                }
+            }
+        }
+        self.fit(model, &candidate.noise, Colour::White)
     }
 }

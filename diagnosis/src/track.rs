@@ -50,6 +50,8 @@ pub(crate) struct Track {
     pub(crate) rest: Vec<bool>,
     /// Bounds of the segments that gains are counted in, as block indices; one more than segments.
     pub(crate) segments: Vec<usize>,
+    /// Travel that the encoder seems to have lost so far, where steps were found.
+    pub(crate) lost: Vec<f64>,
     /// Speed below which its sign is not known.
     pub(crate) speed_floor: f64,
 }
@@ -92,6 +94,7 @@ impl Track {
             v: vec![0.0; n],
             rest: vec![false; n],
             segments: Vec::new(),
+            lost: vec![0.0; n],
             speed_floor: 0.0,
             row_time,
             row_hold,

@@ -291,13 +291,12 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             put("antiresonance_hz", f / part, sd, "Hz".into());
         }
         N::MissedCounts => {
-            let count = found.shape.keys().filter(|key| key.starts_with("time_")).count();
+            // All the counts that were lost in the first recording, whichever way.
             let counts = nominal.rig.encoder.counts_per_unit;
-            let (mut sum, mut square) = (0.0, 0.0);
-            for k in 0..count {
-                sum += term(k).0.abs() * counts;
-                square += (term(k).1 * counts).powi(2);
-            }
+            let sum: f64 = bench.tracks[0].lost.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>()
+                * counts
+                * term(0).0;
+            let square = (0.05 * sum).powi(2) + 1.0;
             put("lost", sum, square.sqrt(), "counts".into());
         }
     }

@@ -207,7 +207,7 @@ impl Law {
     fn along(&self, position: f64) -> f64 {
         let (low, high) = (self.a, self.b);
         let half = 0.5 * (high - low);
-        if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.2, 1.2) } else { 0.0 }
+        if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
     fn harmonics(&self, position: f64, times: f64, out: &mut [f64]) {
