@@ -5,6 +5,7 @@
 //! that the PC lives.
 
 use control_core::Config;
+use control_core::excitation::Excitation;
 use link::codec::MAX_FRAME;
 use link::frames::{Ack, Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
 use link::host::{Commands, Counts, Reception};
@@ -19,7 +20,7 @@ pub const REPEAT: Duration = Duration::from_millis(100);
 pub const SILENCE: Duration = Duration::from_secs(1);
 
 /// What a person may ask of any device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Power up.
     Start,
@@ -27,6 +28,8 @@ pub enum Request {
     Stop,
     /// The needle is at depth 0 now.
     Zero,
+    /// Play an excitation, with nobody's hand on the needle.
+    Excite(Excitation),
 }
 
 /// The PC's side of a conversation.
@@ -94,13 +97,17 @@ impl Driver {
                 self.waiting
                     .retain(|c| matches!(c, Command::Hello { .. } | Command::Configure(_) | Command::Stop));
                 self.waiting.push_front(Command::Stop);
-                if self.pending.as_ref().is_some_and(|p| matches!(p.command, Command::Start | Command::Zero))
+                if self
+                    .pending
+                    .as_ref()
+                    .is_some_and(|p| matches!(p.command, Command::Start | Command::Zero | Command::Excite(_)))
                 {
                     self.pending = None;
                 }
             }
             Request::Start => self.waiting.push_back(Command::Start),
             Request::Zero => self.waiting.push_back(Command::Zero),
+            Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
         }
     }
 

@@ -3,6 +3,7 @@
 //!
 //! It speaks to any device, virtual or not, through the same `link` bytes, and leaves force laws to `control-core`.
 
+pub mod characterise;
 pub mod device;
 pub mod driver;
 pub mod failure;

@@ -187,7 +187,8 @@ impl Endpoint {
         core::mem::take(&mut self.timing_due).then_some(DeviceFrame::Timing(self.timing))
     }
 
-    fn hello(&self) -> Hello {
+    /// Who it is and in which scale it speaks under the configuration in force.
+    pub fn hello(&self) -> Hello {
         let plan = &self.plan;
         let device = plan.config().device;
         Hello {

@@ -1,5 +1,7 @@
 //! One module a command.
 
+mod characterise;
+mod diagnose;
 mod progress;
 mod recordings;
 mod run;
@@ -23,6 +25,8 @@ enum Command {
     Replay(recordings::Replay),
     Export(recordings::Export),
     Score(recordings::Score),
+    Characterise(characterise::Characterise),
+    Diagnose(diagnose::Diagnose),
 }
 
 impl Cli {
@@ -33,6 +37,8 @@ impl Cli {
             Some(Command::Replay(command)) => command.run(),
             Some(Command::Export(command)) => command.run(),
             Some(Command::Score(command)) => command.run(),
+            Some(Command::Characterise(command)) => command.run(),
+            Some(Command::Diagnose(command)) => command.run(),
         }
     }
 }

@@ -65,14 +65,23 @@ fn same_scale(a: &Hello, b: &Hello) -> bool {
         == (b.mm_per_count, b.roller_radius_mm, b.full_scale_torque_mnm, b.dac_bits)
 }
 
+fn counts_per_turn(hello: &Hello) -> f64 {
+    std::f64::consts::TAU * hello.roller_radius_mm / hello.mm_per_count
+}
+
+/// What the mechanism behind `hello` is made of, as its data sheets have it.
+pub(crate) fn mechanism(hello: &Hello) -> PlantConfig {
+    // The plant takes the encoder's resolution as a whole number.
+    let counts = counts_per_turn(hello).round() as u16;
+    PlantConfig::new(hello.roller_radius_mm * 1e-3, counts, hello.full_scale_torque_mnm * 1e-3)
+}
+
 /// The nominal simulation of the mechanism behind `hello`, as its data sheets have it.
 pub fn rig(name: &str, hello: &Hello) -> Rig {
     let radius = hello.roller_radius_mm * 1e-3;
-    let turn_mm = std::f64::consts::TAU * hello.roller_radius_mm;
-    let counts_per_turn = turn_mm / hello.mm_per_count;
+    let counts_per_turn = counts_per_turn(hello);
     let full_scale = hello.full_scale_torque_mnm * 1e-3;
-    // The plant takes the encoder's resolution as a whole number; only its other values are used here.
-    let plant = PlantConfig::new(radius, counts_per_turn.round() as u16, full_scale);
+    let plant = mechanism(hello);
     let span = f64::from(hello.dac().span());
     Rig {
         format: 1,
@@ -129,7 +138,7 @@ pub fn export(recording: &Recording, dir: &Path) -> Result<Exported, Failure> {
     Ok(Exported { rig: rig_path, recordings })
 }
 
-fn write(
+pub(crate) fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), Failure> {

@@ -1,0 +1,138 @@
+//! `characterise`: makes a device run excitations that separate one physical effect from another, with nobody's hand on the
+//! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
+
+pub mod conductor;
+pub mod mechanism;
+pub mod programme;
+pub mod written;
+
+use crate::device::{Port, Wire};
+use crate::failure::Failure;
+use crate::recording::messages::Hello;
+use conductor::Conductor;
+use control_core::{Config, Plan};
+use link::codec::MAX_FRAME;
+use link::device::{Endpoint, Identity};
+use mechanism::BareDevice;
+use programme::{Programme, Step};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use written::Track;
+
+/// Ticks between two exchanges with a virtual device.
+const LOCKSTEP_TICKS: u64 = 10;
+/// How long to wait for a real device in one go.
+const PATIENCE: Duration = Duration::from_millis(2);
+
+/// The control configuration for characterising: no tissue matters, encoder and torque limits as they are.
+pub fn configuration() -> Config {
+    Config::default()
+}
+
+/// The scale of a device that is configured with `config`.
+pub fn scale(config: &Config) -> Result<Hello, Failure> {
+    let plan = Plan::new(config).map_err(Failure::failed)?;
+    let device = Endpoint::new(Identity { serial: [0; 12], firmware: [0, 1, 0] }, &plan, None);
+    Ok(Hello::from(&device.hello()))
+}
+
+/// What a caller is told meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub enum News<'a> {
+    /// A recording begins.
+    Recording(&'a Programme),
+    /// A person has something to do during the step that begins now.
+    Prompt(&'a str),
+    /// Seconds played of this recording.
+    Played(f64),
+}
+
+/// Records every programme on the virtual device. The clock is the device's: it takes as long as the computing does.
+pub fn on_virtual(
+    device: &mut BareDevice,
+    programmes: &[Programme],
+    mut news: impl FnMut(News),
+) -> Result<Vec<Track>, Failure> {
+    let mut bytes = [0; MAX_FRAME];
+    let mut tracks = Vec::new();
+    for programme in programmes {
+        news(News::Recording(programme));
+        let mut conductor = Conductor::new(configuration(), programme);
+        conductor.connected(time(device));
+        while !conductor.is_over() {
+            let now = time(device);
+            device.receive(conductor.transmit(now, |step: &Step| {
+                device_tilt(step, &mut news);
+            }));
+            for _ in 0..LOCKSTEP_TICKS {
+                let tilt = conductor.playing().map_or(0.0, |(step, since)| step.tilt_at(now - since));
+                device.tick(tilt);
+            }
+            loop {
+                match device.transmit(&mut bytes) {
+                    0 => break,
+                    count => conductor.receive(now, &bytes[..count]),
+                }
+            }
+            news(News::Played(conductor.played_s()));
+        }
+        tracks.push(conductor.finish()?);
+    }
+    Ok(tracks)
+}
+
+fn time(device: &BareDevice) -> Duration {
+    Duration::from_micros(device.ticks() * 100)
+}
+
+fn device_tilt(step: &Step, news: &mut impl FnMut(News)) {
+    if let Some(prompt) = step.prompt {
+        news(News::Prompt(prompt));
+    }
+}
+
+/// Records every programme on the device behind `port`, in real time. A cable that is pulled ends it.
+pub fn on_port(
+    port: &mut dyn Port,
+    programmes: &[Programme],
+    stop: &AtomicBool,
+    mut news: impl FnMut(News),
+) -> Result<Vec<Track>, Failure> {
+    let gone = |cause: std::io::Error| {
+        Failure::failed(format_args!("the device went away ({cause}); plug it in and characterise again"))
+    };
+    let mut wire: Box<dyn Wire> = port.open().map_err(gone)?;
+    let mut bytes = vec![0; 1 << 14];
+    let begin = Instant::now();
+    let mut tracks = Vec::new();
+    for programme in programmes {
+        news(News::Recording(programme));
+        let mut conductor = Conductor::new(configuration(), programme);
+        conductor.connected(begin.elapsed());
+        while !conductor.is_over() {
+            if stop.load(Ordering::Relaxed) {
+                let out = conductor.stop(begin.elapsed()).to_vec();
+                let _ = wire.write(&out);
+                return Err(Failure::failed("stopped before the end; nothing was written"));
+            }
+            let now = begin.elapsed();
+            let out = conductor.transmit(now, |step| device_tilt(step, &mut news)).to_vec();
+            if !out.is_empty() {
+                wire.write(&out).map_err(gone)?;
+            }
+            let count = wire.read(&mut bytes, PATIENCE).map_err(gone)?;
+            conductor.receive(begin.elapsed(), &bytes[..count]);
+            news(News::Played(conductor.played_s()));
+        }
+        tracks.push(conductor.finish()?);
+    }
+    Ok(tracks)
+}
+
+/// Whether every step may be played under `config`: the device checks it again.
+pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
+    let refuse =
+        |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));
+    let plan = Plan::new(config).map_err(refuse)?;
+    programmes.iter().flat_map(|p| &p.steps).try_for_each(|step| step.excitation.check(&plan).map_err(refuse))
+}

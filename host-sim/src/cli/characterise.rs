@@ -1,0 +1,76 @@
+//! `host-sim characterise`: recordings that tell one physical effect from another.
+
+use super::progress::Progress;
+use super::run::stop_on_signals;
+use clap::Args;
+use diagnosis::rig::Rig;
+use host_sim::characterise::mechanism::BareDevice;
+use host_sim::characterise::{self, News, programme, written};
+use host_sim::device::serial::SerialPort;
+use host_sim::failure::Failure;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Make the device run its excitations, with nobody's hand on the needle, and record them at 10 kHz.
+///
+/// Writes rig.toml (the nominal simulation), fit.csv, fit2.csv and holdout.csv, which `diagnose` reads.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  host-sim characterise --out /tmp/bench3
+  host-sim characterise --device /dev/ttyACM0 --out /tmp/bench3
+  host-sim diagnose --rig /tmp/bench3/rig.toml --fit /tmp/bench3/fit.csv --fit /tmp/bench3/fit2.csv \\
+    --holdout /tmp/bench3/holdout.csv --out /tmp/report")]
+pub(crate) struct Characterise {
+    /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
+    #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
+    device: String,
+    /// What the virtual device's mechanism really is: a rig file, with effects that the written rig.toml does not know
+    #[arg(long, value_name = "RIG.toml")]
+    plant: Option<PathBuf>,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Characterise {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let config = characterise::configuration();
+        let hello = characterise::scale(&config)?;
+        let nominal = written::nominal_rig(&hello);
+        let programmes = programme::programmes(&nominal, hello.roller_radius_mm);
+        characterise::check(&config, &programmes)?;
+        let mut bar = Progress::new("playing");
+        let mut whole = None;
+        let news = |news: News| match news {
+            News::Recording(programme) => whole = Some(programme.seconds()),
+            News::Prompt(prompt) => eprintln!("{prompt}"),
+            News::Played(seconds) => bar.show(seconds, whole, "s"),
+        };
+        let tracks = if self.device == "virtual" {
+            let (truth, file) = match &self.plant {
+                Some(path) => (Rig::read(path).map_err(Failure::input)?, path.display().to_string()),
+                None => (nominal, "the nominal rig".to_owned()),
+            };
+            characterise::on_virtual(&mut BareDevice::new(&truth, &file)?, &programmes, news)?
+        } else {
+            if self.plant.is_some() {
+                return Err(Failure::input(
+                    "--plant is for the virtual device: a real one has its own mechanism",
+                ));
+            }
+            let stop = Arc::new(AtomicBool::new(false));
+            stop_on_signals(&stop)?;
+            let mut port = SerialPort::find(&self.device)?;
+            characterise::on_port(&mut port, &programmes, &stop, news)?
+        };
+        drop(bar);
+        for path in written::write_all(&self.out, &tracks)? {
+            println!("{}", path.display());
+        }
+        for track in &tracks {
+            println!("{} rows={}", track.file, track.samples.len());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,52 @@
+//! `host-sim diagnose`: which physics the simulation leaves out.
+
+use super::progress::Progress;
+use clap::Args;
+use diagnosis::Request;
+use host_sim::failure::Failure;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+/// Say where a simulation and its recordings differ and which physics was left out, and prove it on held-out recordings.
+///
+/// Writes diagnosis.json, report.html, patched-rig.toml and residuals.csv, and prints the same in ten lines.
+#[derive(Args)]
+#[command(after_help = "Example:
+  host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report")]
+pub(crate) struct Diagnose {
+    /// The simulation as its author believes it
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// A recording that may be used to choose and to fit; again for more
+    #[arg(long, required = true, value_name = "FILE.csv")]
+    fit: Vec<PathBuf>,
+    /// A recording that only judges; again for more
+    #[arg(long, required = true, value_name = "FILE.csv")]
+    holdout: Vec<PathBuf>,
+    /// Folder for the report
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Diagnose {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout };
+        let bar = Mutex::new(Progress::new("diagnosing"));
+        let show = |stage: &str, done: f64| {
+            if let Ok(mut bar) = bar.lock() {
+                bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
+            }
+        };
+        let outcome = diagnosis::diagnose(&request, &show).map_err(Failure::input)?;
+        drop(bar);
+        outcome.write(&self.out).map_err(|cause| {
+            Failure::failed(format_args!(
+                "{}: the report cannot be written ({cause}); free some space or choose another --out",
+                self.out.display()
+            ))
+        })?;
+        print!("{}", outcome.summary());
+        println!("report: {}", self.out.join("report.html").display());
+        Ok(())
+    }
+}
