@@ -1,5 +1,7 @@
 // What has happened, in words, newest first.
 
+import { number } from "./panel.js";
+
 const LONGEST_LIST = 80;
 
 const article = (name) => `the ${name}`;
@@ -8,8 +10,8 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 /** " at 3.0 mm, 1.0 N", as much of it as is known. */
 function where(event, withForce) {
   const parts = [];
-  if (event.depth_mm !== null) parts.push(`${event.depth_mm.toFixed(1)} mm`);
-  if (withForce && event.force_n !== null) parts.push(`${event.force_n.toFixed(2)} N`);
+  if (event.depth_mm !== null) parts.push(`${number(event.depth_mm, 1)}\u00a0mm`);
+  if (withForce && event.force_n !== null) parts.push(`${number(event.force_n, 2)}\u00a0N`);
   return parts.length ? ` at ${parts.join(", ")}` : "";
 }
 
@@ -19,7 +21,7 @@ export function words(event, layers) {
   switch (event.kind) {
     case "contact": return `Tip touches ${article(name)}${where(event, false)}`;
     case "puncture": return `${capital(name)} punctured${where(event, true)}`;
-    case "vessel": return `${capital(name)} punctured${where(event, true)}`;
+    case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
     case "exit": return `Needle out of ${article(name)}`;
     case "fault": return `Fault, torque off: ${event.cause}`;
     case "started": return "Started, torque fades in";

@@ -54,7 +54,7 @@ export class Hand {
   say() {
     this.demo.disabled = !this.person;
     let text = "Moved by hand, on the device";
-    if (this.movable) text = this.person ? "You hold the needle" : "Demo hand. Drag the needle to take it";
+    if (this.movable) text = this.person ? "You hold the needle: drag, or arrow keys" : "Demo hand: drag the needle to take it";
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 

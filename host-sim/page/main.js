@@ -72,7 +72,7 @@ function happen(event) {
   tissue.happen(event);
   events.add(event, scene.layers);
   if (event.limits) panel.limits(event.limits, performance.now());
-  if (event.kind === "puncture" || event.kind === "vessel") {
+  if (event.kind === "puncture") {
     timePlot.mark(event.t_s, scene.layers[event.layer]?.name ?? "layer");
   }
 }

@@ -87,7 +87,7 @@ export class TimePlot {
     this.axes(g, "Depth, mm", this.depth, left, GUTTER.top, wide, each, this.colours.depth);
     this.axes(g, "Force, N", this.force, left, second, wide, each, this.colours.force);
     this.seconds(g, left, wide, height);
-    this.drawMarks(g, now, left, wide, GUTTER.top, height - GUTTER.bottom);
+    this.drawMarks(g, now, left, wide, second - 7, height - GUTTER.bottom);
     g.save();
     g.beginPath();
     g.rect(left, 0, wide, height);
@@ -138,10 +138,11 @@ export class TimePlot {
     }
   }
 
-  drawMarks(g, now, left, wide, top, bottom) {
+  /** Punctures: a line through both strips, its name between them. */
+  drawMarks(g, now, left, wide, between, bottom) {
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "left";
-    g.textBaseline = "top";
+    g.textBaseline = "middle";
     g.lineWidth = 1;
     for (const mark of this.marks) {
       const x = Math.round(left + wide * (1 - (now - mark.t) / WINDOW_S)) + 0.5;
@@ -149,12 +150,13 @@ export class TimePlot {
       g.strokeStyle = this.colours.muted;
       g.setLineDash([3, 3]);
       g.beginPath();
-      g.moveTo(x, top);
+      g.moveTo(x, GUTTER.top);
       g.lineTo(x, bottom);
       g.stroke();
       g.setLineDash([]);
       g.fillStyle = this.colours.muted;
-      g.fillText(mark.text, x + 3, top);
+      // A name waits until there is room for it.
+      if (x + 4 + g.measureText(mark.text).width < left + wide) g.fillText(mark.text, x + 4, between);
     }
   }
 }

@@ -5,12 +5,15 @@ import { VESSEL_MM, displace } from "./tissue.js";
 
 const NEEDLE = { length: 32, radius: 0.41, bevel: 2.1 }; // 21 gauge
 /** The grip that a person drags, mm behind the tip. */
-const GRIP_MM = 9;
+const GRIP_MM = 10;
 /** The tilt is drawn at least this steep: flatter, the layers would fall into one line. */
 const FLATTEST = 0.17;
-const WIDE_MM = 27;
+const WIDE_MM = 33;
+/** On a phone less is shown, larger. */
+const NARROW = { width: 560, mm: 23 };
 const COLUMNS = 120;
 const FIBRES = 7;
+const FIBRE_DASH = [38, 13, 64, 21, 17, 11];
 const MM_PER_N = 4;
 
 export class Section {
@@ -59,10 +62,10 @@ export class Section {
     this.ellipse.x = this.ellipse.along * this.axis.x;
     this.ellipse.y = this.ellipse.along * this.axis.y;
     const lowest = Math.max(this.ellipse.y + VESSEL_MM.high / 2 + 1.5, view.depth * this.axis.y + 1.5);
-    const wanted = Math.min(width / WIDE_MM, (0.56 * height) / lowest, 46);
+    const wanted = Math.min(width / (width < NARROW.width ? NARROW.mm : WIDE_MM), (0.5 * height) / lowest, 46);
     this.scale = ease === 1 ? wanted : this.scale + ease * (wanted - this.scale);
     this.origin.x = 0.53 * width - 0.5 * this.ellipse.x * this.scale;
-    this.origin.y = 0.44 * height;
+    this.origin.y = 0.5 * height;
   }
 
   x(mm) { return this.origin.x + mm * this.scale; }
@@ -103,8 +106,10 @@ export class Section {
       const lines = end === bottom ? FIBRES * 2 : Math.max(1, Math.floor((end - top) / 0.45));
       for (let k = 1; k < lines; k++) this.level(g, tissue, top + ((end - top) * k) / lines, width);
       g.strokeStyle = this.colours.fibre;
-      g.lineWidth = 1;
+      g.lineWidth = 1.5;
+      g.setLineDash(FIBRE_DASH);
       g.stroke();
+      g.setLineDash([]);
     }
   }
 
@@ -121,10 +126,13 @@ export class Section {
       else g.lineTo(this.x(this.point.x), this.y(this.point.y));
     }
     g.closePath();
+    g.strokeStyle = this.colours["vessel-edge"];
+    g.lineWidth = Math.max(5, 0.5 * this.scale);
+    g.stroke();
     g.fillStyle = this.colours.lumen;
     g.fill();
     g.strokeStyle = this.colours["vessel-wall"];
-    g.lineWidth = Math.max(3, 0.28 * this.scale);
+    g.lineWidth = Math.max(2.5, 0.22 * this.scale);
     g.stroke();
   }
 
@@ -133,9 +141,9 @@ export class Section {
     const reach = Math.ceil(this.ellipse.along + 5);
     g.save();
     this.alongNeedle(g, 0);
-    g.strokeStyle = this.colours["on-tissue"];
-    g.fillStyle = this.colours["on-tissue"];
-    g.globalAlpha = 0.65;
+    g.strokeStyle = this.colours.ruler;
+    g.fillStyle = this.colours.ruler;
+    g.globalAlpha = 0.9;
     g.lineWidth = 1;
     g.setLineDash([5, 4]);
     g.beginPath();
@@ -241,6 +249,7 @@ export class Section {
 
   /** What the hand feels, beside the grip: against insertion up the needle, against withdrawal down it. */
   forceArrow(g, view) {
+    if (Math.abs(view.motor) < 0.005) return;
     const s = this.scale;
     g.save();
     this.alongNeedle(g, view.depth - GRIP_MM + 4);
@@ -272,7 +281,7 @@ export class Section {
     g.restore();
   }
 
-  /** Names of the layers at the right, each in its own layer. */
+  /** Names of the layers: each in its own layer at the right, the vessel's below it. */
   names(g, tissue, width, height) {
     g.font = `13px ${this.colours.font}`;
     g.textAlign = "right";
@@ -280,17 +289,17 @@ export class Section {
     g.fillStyle = this.colours["on-tissue"];
     let free = 0;
     for (const [i, layer] of tissue.layers.entries()) {
+      const name = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
+      const label = width < NARROW.width ? name : `${name}, from ${layer.top_mm.toFixed(1)} mm`;
+      if (layer.is_vessel) {
+        g.fillText(label, this.x(this.ellipse.x), this.y(this.ellipse.y + VESSEL_MM.high / 2) + 22);
+        continue;
+      }
       const next = tissue.layers.slice(i + 1).find((other) => !other.is_vessel);
       const top = this.y(layer.top_mm * this.axis.y);
       const bottom = next ? this.y(next.top_mm * this.axis.y) : height;
-      const label = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
-      const depth = `${label}, from ${layer.top_mm.toFixed(1)} mm`;
       const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 9);
-      if (layer.is_vessel) {
-        g.fillText(depth, width - 12, Math.max(this.y(this.ellipse.y), free + 9));
-        continue;
-      }
-      g.fillText(depth, width - 12, y);
+      g.fillText(label, width - 12, y);
       free = y + 9;
     }
   }

@@ -7,5 +7,6 @@
 pub mod board;
 pub mod browser;
 pub mod pc;
+pub mod rig;
 pub mod scenario;
 pub mod usb_host;

@@ -171,9 +171,9 @@ fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Failure> {
     let beyond = target + (0.3 / mm_per_count) as i32;
     let mut core = Controller::new(Plan::new(&config).map_err(|e| e.to_string())?);
     core.order(Order::Start);
-    let mut count = -100;
-    let mut force = |target: i32| {
-        let mut force = 0.0;
+    let mut count: i32 = -100;
+    let mut force = |target: i32| -> f64 {
+        let mut force: f64 = 0.0;
         // Then half a second at rest.
         for tick in 0..5_000 + 20 * count.abs_diff(target) {
             if tick % 20 == 0 {
