@@ -29,11 +29,13 @@ impl Drop for Scratch {
     }
 }
 
-/// Runs every case; records in the order of `specs`.
+/// Runs every case that the time allows; records in the order of `specs`.
 pub(crate) fn run_cases(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<Vec<Record>, String> {
     let scratch = Scratch::new()?;
-    let records = pool::map(options.jobs, "proving", specs, |spec| run_case(spec, options, tool, &scratch.0));
-    records.into_iter().collect()
+    let records = pool::map(options.jobs, options.budget(), "proving", specs, |spec| {
+        run_case(spec, options, tool, &scratch.0)
+    });
+    records.into_iter().flatten().collect()
 }
 
 fn run_case(spec: &Spec, options: &Options, tool: &dyn Tool, scratch: &Path) -> Result<Record, String> {
@@ -110,7 +112,7 @@ mod tests {
         assert!(sums.false_names.hits >= 3, "{:?}", sums.false_names);
         // It improves nothing, so its share of the oracle's improvement is nothing.
         assert!(sums.shares.iter().all(|s| *s == 0.0));
-        let run = report::Run { options, tool: "a joke".into(), seconds: 1.0, speed: None };
+        let run = report::Run { options, tool: "a joke".into(), seconds: 1.0, speed: None, planned: 5 };
         let text = report::markdown(&records, &sums, &run);
         assert!(text.contains("| false alarms on nulls | ≤ 1 %, upper bound ≤ 2.5 % | 100.0 %"), "{text}");
         // What goes to the tool's author holds no single case.
@@ -124,7 +126,13 @@ mod tests {
         specs.truncate(2);
         let text = || {
             let records = run_cases(&options, &specs, &AlwaysCogging).unwrap();
-            let run = report::Run { options: options.clone(), tool: "t".into(), seconds: 0.0, speed: None };
+            let run = report::Run {
+                options: options.clone(),
+                tool: "t".into(),
+                seconds: 0.0,
+                speed: None,
+                planned: 2,
+            };
             report::markdown(&records, &sum(&records), &run)
         };
         assert_eq!(text(), text());

@@ -49,6 +49,7 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(),
         tool: "host-sim diagnose".into(),
         seconds: start.elapsed().as_secs_f64(),
         speed,
+        planned: specs.len(),
     };
     let sums = judge::sum(&records);
     print!("{}", report::terminal(&records, &sums, &run));
@@ -61,7 +62,32 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(),
     let value = report::json(&records, &sums, &run);
     write("proof.json", serde_json::to_string_pretty(&value).map_err(|e| e.to_string())? + "\n")?;
     write("proof.md", report::markdown(&records, &sums, &run))?;
-    write("proof-aggregate.md", report::aggregate(&records, &sums, &run))
+    write("proof-aggregate.md", report::aggregate(&records, &sums, &run))?;
+    if options.quick && options.only.is_none() { gate(&sums) } else { Ok(()) }
+}
+
+/// What the small run holds the tool to, so that it can fail in CI: far below what is wanted, above what luck gives.
+fn gate(sums: &judge::Sums) -> Result<(), String> {
+    let right = sums.right[0];
+    if sums.failures > 0 {
+        return Err(format!(
+            "the tool gave no report in {} cases; the table above lists them",
+            sums.failures
+        ));
+    }
+    if sums.null_alarms.hits > 0 {
+        return Err(format!(
+            "the tool named physics in {} nulls; the misses above list them",
+            sums.null_alarms.hits
+        ));
+    }
+    if right.hits * 10 < right.trials * 7 {
+        return Err(format!(
+            "the tool found {} of {} strong effects, fewer than seven in ten; the misses above list them",
+            right.hits, right.trials
+        ));
+    }
+    Ok(())
 }
 
 fn wanted(options: &Options) -> Vec<Spec> {
@@ -81,7 +107,7 @@ fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String
         format!("cannot write {}: {e}; choose another --write folder", what.display())
     };
     std::fs::create_dir_all(&keys).map_err(|e| failed(&keys, e))?;
-    let written = pool::map(options.jobs, "writing cases", specs, |spec| {
+    let written = pool::map(options.jobs, None, "writing cases", specs, |spec| {
         let case = build(spec, options.seed, options.quick);
         let name = format!("case-{:04}", spec.id);
         let folder = dir.join("cases").join(&name);
@@ -90,7 +116,26 @@ fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String
         let text = serde_json::to_string_pretty(&files::key(&case)).map_err(|e| e.to_string())?;
         std::fs::write(&key, text + "\n").map_err(|e| failed(&key, e))
     });
-    let written: Result<Vec<()>, String> = written.into_iter().collect();
+    let written: Result<Vec<()>, String> = written.into_iter().flatten().collect();
     println!("{} cases in {}, their keys in {}", written?.len(), dir.join("cases").display(), keys.display());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use judge::Sums;
+    use stats::Rate;
+
+    #[test]
+    fn the_small_run_can_fail() {
+        let good = Sums { right: [Rate { hits: 20, trials: 25 }; 3], ..Sums::default() };
+        assert_eq!(gate(&good), Ok(()));
+        let poor = Sums { right: [Rate { hits: 17, trials: 25 }; 3], ..Sums::default() };
+        assert!(gate(&poor).unwrap_err().contains("17 of 25"));
+        let alarm = Sums { null_alarms: Rate { hits: 1, trials: 4 }, ..good.clone() };
+        assert!(gate(&alarm).unwrap_err().contains("1 nulls"));
+        let silent = Sums { failures: 2, ..good };
+        assert!(gate(&silent).unwrap_err().contains("no report in 2"));
+    }
 }

@@ -13,6 +13,8 @@ pub struct Options {
     pub quick: bool,
     /// Cases that run at the same time.
     pub jobs: usize,
+    /// No case begins after this many minutes; the report says how many were left.
+    pub minutes: Option<u64>,
     /// Write the files and the keys into this folder and run nothing.
     pub write: Option<PathBuf>,
     /// Only cases whose category or hidden physics contains this text.
@@ -28,6 +30,7 @@ impl Default for Options {
             cases: 2,
             quick: false,
             jobs: 2,
+            minutes: None,
             write: None,
             only: None,
             out: PathBuf::from("target"),
@@ -42,12 +45,18 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --cases K     draws of every effect at every strength (2); pairs, nulls and the rest in proportion
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
   --jobs N      cases that run at the same time (2)
+  --minutes N   no case begins after N minutes; the report says how many were left
   --only TEXT   only cases whose category or hidden physics contains TEXT
   --write DIR   write the recordings to DIR/cases and the keys to DIR/keys, and run nothing
   --out DIR     folder for proof.json and proof.md (target)
 ";
 
 impl Options {
+    /// The time in which cases may begin.
+    pub(crate) fn budget(&self) -> Option<std::time::Duration> {
+        self.minutes.map(|m| std::time::Duration::from_secs(60 * m))
+    }
+
     /// Reads the flags after the program's name. `Ok(None)` where help was asked for.
     ///
     /// # Errors
@@ -63,7 +72,7 @@ impl Options {
                 options.quick = true;
                 continue;
             }
-            let known = ["--seed", "--cases", "--jobs", "--only", "--write", "--out"];
+            let known = ["--seed", "--cases", "--jobs", "--minutes", "--only", "--write", "--out"];
             if !known.contains(&flag.as_str()) {
                 return Err(format!("`{flag}` is not a flag of prove; `prove --help` lists them"));
             }
@@ -74,6 +83,7 @@ impl Options {
                 "--seed" => options.seed = whole("a whole number from 0")?,
                 "--cases" => options.cases = whole("a whole number from 1")?.clamp(1, 1000) as usize,
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
+                "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
                 "--only" => options.only = Some(value),
                 "--write" => options.write = Some(PathBuf::from(value)),
                 _ => options.out = PathBuf::from(value),

@@ -3,16 +3,17 @@
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Applies `work` to every item on `jobs` threads; results in the items' order. Progress goes to standard error if it is a
-/// terminal and nowhere otherwise.
+/// Applies `work` to every item on `jobs` threads; results in the items' order, `None` for what was not begun within
+/// `budget`. Progress goes to standard error if it is a terminal and nowhere otherwise.
 pub(crate) fn map<T: Sync, R: Send>(
     jobs: usize,
+    budget: Option<Duration>,
     label: &str,
     items: &[T],
     work: impl Fn(&T) -> R + Sync,
-) -> Vec<R> {
+) -> Vec<Option<R>> {
     let next = AtomicUsize::new(0);
     let done = AtomicUsize::new(0);
     let results: Mutex<Vec<Option<R>>> = Mutex::new(items.iter().map(|_| None).collect());
@@ -21,7 +22,7 @@ pub(crate) fn map<T: Sync, R: Send>(
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, items.len().max(1)) {
             scope.spawn(|| {
-                loop {
+                while budget.is_none_or(|b| start.elapsed() < b) {
                     let i = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(i) else { break };
                     let result = work(item);
@@ -42,8 +43,7 @@ pub(crate) fn map<T: Sync, R: Send>(
     if watched {
         eprintln!();
     }
-    let results = results.into_inner().expect("no holder of the lock panics");
-    results.into_iter().map(|r| r.expect("every item was worked on")).collect()
+    results.into_inner().expect("no holder of the lock panics")
 }
 
 #[cfg(test)]
@@ -51,6 +51,14 @@ mod tests {
     #[test]
     fn results_keep_the_order() {
         let items: Vec<usize> = (0..100).collect();
-        assert_eq!(super::map(3, "", &items, |i| i * i), items.iter().map(|i| i * i).collect::<Vec<_>>());
+        let squares: Vec<Option<usize>> = items.iter().map(|i| Some(i * i)).collect();
+        assert_eq!(super::map(3, None, "", &items, |i| i * i), squares);
+    }
+
+    #[test]
+    fn nothing_begins_after_the_budget() {
+        let items = [1, 2, 3];
+        let done = super::map(1, Some(std::time::Duration::ZERO), "", &items, |i| i * 2);
+        assert_eq!(done, [None, None, None]);
     }
 }

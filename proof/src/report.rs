@@ -19,6 +19,8 @@ pub(crate) struct Run {
     pub(crate) seconds: f64,
     /// Time for 60 s at 10 kHz, where it was measured.
     pub(crate) speed: Option<f64>,
+    /// Cases that the run would have had with time for all.
+    pub(crate) planned: usize,
 }
 
 /// (measure, wanted, measured).
@@ -67,10 +69,15 @@ fn table(out: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<Str
 pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
     let mut out = String::new();
     let o = &run.options;
+    let cut = if records.len() < run.planned {
+        format!(" of {} planned, in an order that says nothing, stopped by --minutes", run.planned)
+    } else {
+        String::new()
+    };
     let size = if o.quick { "quick run".into() } else { format!("{} draws a cell", o.cases) };
     let _ = writeln!(
         out,
-        "Blinded benchmark of {}: {} cases, seed {}, {size}; {:.0} s. Rates with Wilson's 95 % interval.\n",
+        "Blinded benchmark of {}: {} cases{cut}, seed {}, {size}; {:.0} s. Rates with Wilson's 95 % interval.\n",
         run.tool,
         records.len(),
         o.seed,
@@ -276,6 +283,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
         "quick": run.options.quick,
         "draws": run.options.cases,
         "only": run.options.only,
+        "planned": run.planned,
         "right": s.right.iter().map(rate_json).collect::<Vec<_>>(),
         "exactly_right": s.exact.iter().map(rate_json).collect::<Vec<_>>(),
         "by_effect": by_effect,
