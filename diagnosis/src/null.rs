@@ -81,7 +81,7 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
     if inverse * nominal.gain() > 0.0 {
         let reach = 40.0;
         let gain = (1.0 / inverse).abs().clamp(nominal.gain().abs() / reach, nominal.gain().abs() * reach);
-        nominal.anchor = Some((gain * nominal.gain().signum(), 0.15));
+        nominal.anchor = Some((gain * nominal.gain().signum(), 0.3));
     }
 }
 

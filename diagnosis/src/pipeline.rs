@@ -33,6 +33,9 @@ pub(crate) struct Found {
     pub(crate) at_bound: bool,
 }
 
+/// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
+const TRIED: usize = 3;
+
 /// Part of the residual above the noise that an effect must explain on held-out recordings to be named.
 const SHARE: f64 = 0.05;
 
@@ -140,32 +143,33 @@ pub(crate) fn search(
     let mut slow_merit = null_slow.merit;
     let mut slow_noise = null_slow.noise;
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
+    let mut tried = 0;
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
         let candidates = bench.screen(&white, &|_| true);
         let mut finalists = bench.finalists(&white, &candidates);
         bench.polish(&mut finalists);
         let mut taken = None;
-        if std::env::var("DIAG_DEBUG").is_ok() {
-            for (e, g) in &candidates {
-                println!("   screen {g:.1} {} {:?}", e.name, e.shape);
-            }
-            for f in &finalists {
-                println!("  {:.1} {}", f.merit - white.merit, f.model.effects.last().unwrap().name);
-            }
-        }
         for finalist in finalists {
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
-            if taken.is_some() || finalist.merit - white.merit < WORTH {
-                continue;
+            if finalist.merit - white.merit < WORTH || tried >= TRIED * (step + 1) {
+                break;
             }
+            tried += 1;
             let slow = bench.fit(finalist.model.clone(), &slow_noise, Colour::Slow);
             let gain = slow.merit - slow_merit;
             if gain < WORTH {
                 lost.push((name, gain, "what it explains is no more than a slow disturbance would".into()));
                 continue;
             }
+            let mut judged = judge_all(&bench, &finalist, &held);
+            let own = judged.pop().expect("the last effect is judged");
+            if let Some(reason) = own.weakness() {
+                lost.push((name, own.holdout.sum, reason));
+                continue;
+            }
             taken = Some((finalist, slow));
+            break;
         }
         let Some((finalist, slow)) = taken else { break };
         slow_merit = slow.merit;
