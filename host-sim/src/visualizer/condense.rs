@@ -1,11 +1,10 @@
-//! From batches of 10 kHz samples and 1 kHz poses to what a picture needs sixty times a second. Pure: no clock, no socket.
+//! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure: no clock, no socket.
 
 use super::messages::{self, Bucket, Device, Range, Timing};
+use crate::session::Batch;
 use control_core::config::DacWidth;
 use control_core::event::{Fault, State};
 use link::frames::{self, EventKind, Hello, Pose, Stage};
-
-use crate::session::Batch;
 use std::collections::BTreeMap;
 
 /// Length of a [`Bucket`] in ticks: 5 ms, so that 10 s are 2,000 of them, more than a plot has columns.

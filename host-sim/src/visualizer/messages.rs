@@ -1,7 +1,7 @@
 //! Everything that server and page say to each other: JSON texts over the WebSocket at `/live`, one message a text.
 //!
-//! After connecting the page gets one `scene`, a `device` as soon as the device has said who it is, and then up to
-//! sixty `frame`s a second; four a second while nothing arrives from the device. The page sends a [`FromPage`] when a
+//! After connecting the page gets one `scene`, a `device` as soon as the device has said who it is, and then a `frame`
+//! every 8 ms, every 250 ms while nothing arrives from the device, less often where the page is slow. The page sends a [`FromPage`] when a
 //! person does something. Times are seconds of the device's own clock, lengths are along the needle.
 
 use crate::session::{LinkStatus, Scene};

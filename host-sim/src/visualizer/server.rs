@@ -128,7 +128,7 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
 
 async fn listen(listener: TcpListener, shared: Shared) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-    // Sixty small messages a second: each is wanted at once.
+    // Many small messages: each is wanted at once.
     let listener = listener.tap_io(|stream| {
         let _ = stream.set_nodelay(true);
     });
@@ -175,6 +175,9 @@ fn is_own_page(headers: &HeaderMap) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::{Read, Write};
+    use std::net::TcpStream;
+    use std::time::{Duration, Instant};
 
     fn headers(host: &str, origin: Option<&str>) -> HeaderMap {
         let mut headers = HeaderMap::new();
@@ -204,5 +207,71 @@ mod tests {
         assert!(matches!(error, ServeError::PortInUse { port: p } if p == port));
         assert_eq!(error.to_string().lines().count(), 1);
         assert!(error.to_string().contains(&port.to_string()));
+    }
+
+    /// A WebSocket by hand: the upgrade, then nothing is read any more.
+    fn connect_and_stop_reading(port: u16) -> TcpStream {
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();
+        let request = format!(
+            "GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        );
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = [0; 12];
+        stream.read_exact(&mut answer).unwrap();
+        assert_eq!(&answer, b"HTTP/1.1 101");
+        stream
+    }
+
+    /// A short text as a masked frame, the mask being zero.
+    fn text_frame(text: &str) -> Vec<u8> {
+        let length = u8::try_from(text.len()).unwrap();
+        assert!(length < 126);
+        [&[0x81, 0x80 | length, 0, 0, 0, 0], text.as_bytes()].concat()
+    }
+
+    #[test]
+    fn a_page_that_reads_nothing_costs_nothing_and_can_still_stop() {
+        let (session, publisher) = crate::session::open(super::super::test_scene());
+        let server = serve(session, 0).unwrap();
+        let mut page = connect_and_stop_reading(server.port());
+        // Each round fills what waits for it; together they are many times what sockets hold.
+        let block = [control_core::controller::Sample::default(); 32];
+        for round in 0..200 {
+            let begin = Instant::now();
+            for number in 0..20_000 / 32 {
+                let tick = round * 20_000 + number * 32;
+                publisher.samples(tick, &block);
+                publisher.event(link::frames::Event { tick, kind: link::frames::EventKind::Started });
+            }
+            assert!(begin.elapsed() < Duration::from_secs(2), "the device waits for the page");
+            std::thread::sleep(Duration::from_millis(8));
+        }
+        page.write_all(&text_frame(r#"{"do":"stop"}"#)).unwrap();
+        let asked = (0..500).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            publisher.next_control()
+        });
+        assert_eq!(asked, Some(crate::session::Control::Stop));
+    }
+
+    #[test]
+    fn nonsense_from_a_page_ends_its_connection_and_nothing_else() {
+        let (session, publisher) = crate::session::open(super::super::test_scene());
+        let server = serve(session, 0).unwrap();
+        let mut page = connect_and_stop_reading(server.port());
+        page.write_all(&text_frame(r#"{"do":"drag","depth_mm":1e9}"#)).unwrap();
+        page.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        let mut rest = Vec::new();
+        page.read_to_end(&mut rest).unwrap();
+        assert!(String::from_utf8_lossy(&rest).contains("not within -200 to 500 mm"));
+        assert_eq!(publisher.next_control(), None);
+        let mut other = connect_and_stop_reading(server.port());
+        other.write_all(&text_frame(r#"{"do":"start"}"#)).unwrap();
+        let asked = (0..500).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            publisher.next_control()
+        });
+        assert_eq!(asked, Some(crate::session::Control::Start));
     }
 }
