@@ -145,13 +145,18 @@ impl Pc {
     /// Lets `milliseconds` pass, with the heartbeat going.
     pub fn run_ms(&mut self, board: &mut Board, milliseconds: u64) {
         for _ in 0..milliseconds {
-            let now_ms = board.now() / 1_000_000;
-            if !self.silent && now_ms >= self.last_beat_ms + HEARTBEAT_MS && self.heard.hello.is_some() {
-                self.last_beat_ms = now_ms;
-                self.send(board, Command::Heartbeat);
-            }
+            self.attend(board);
             board.run_ms(1);
             self.listen(board);
+        }
+    }
+
+    /// Sends the heartbeat, if it is due.
+    pub fn attend(&mut self, board: &mut Board) {
+        let now_ms = board.now() / 1_000_000;
+        if !self.silent && now_ms >= self.last_beat_ms + HEARTBEAT_MS && self.heard.hello.is_some() {
+            self.last_beat_ms = now_ms;
+            self.send(board, Command::Heartbeat);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The symbols and the program bytes of a 32-bit little-endian ELF file, as far as the tests look.
+//! The symbols of a 32-bit little-endian ELF file, as far as the tests look.
 
 /// A named function or object.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,17 +62,4 @@ pub fn symbols(bytes: &[u8]) -> Vec<Symbol> {
         Some(symbols.collect())
     };
     read().unwrap_or_default()
-}
-
-/// An address of the program that holds the instruction `b .`, which runs for ever.
-#[must_use]
-pub fn endless_loop(bytes: &[u8]) -> Option<u32> {
-    const PROGRAM: u32 = 1;
-    const BRANCH_TO_SELF: [u8; 2] = [0xFE, 0xE7];
-    let sections = sections(bytes)?;
-    sections.iter().filter(|section| section[0] == PROGRAM && section[1] >> 24 == 0x08).find_map(|section| {
-        let code = bytes.get(section[2] as usize..(section[2] + section[3]) as usize)?;
-        let at = code.chunks_exact(2).position(|pair| pair == BRANCH_TO_SELF)?;
-        Some(section[1] + 2 * at as u32)
-    })
 }

@@ -126,7 +126,6 @@ pub struct Board {
     probe: Probe,
     flash: flash::Flash,
     symbols: Vec<elf::Symbol>,
-    endless_loop: Option<u32>,
     stack: Option<(u64, u64)>,
     now: Nanos,
 }
@@ -138,7 +137,7 @@ impl Board {
         let refuse = |why: String| Refused(format!("{}: {why}", path.display()));
         let bytes = std::fs::read(path)
             .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
-        let (symbols, endless_loop) = (elf::symbols(&bytes), elf::endless_loop(&bytes));
+        let symbols = elf::symbols(&bytes);
         // The linker's own names have no type, so the emulator's reader finds them.
         let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
@@ -163,7 +162,7 @@ impl Board {
             let finished = emulator::run(session, &Start::new(&images), world);
             finished.map(drop).map_err(|error| error.to_string())
         });
-        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, endless_loop, stack, now: 0 })
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, stack, now: 0 })
     }
 
     fn order(&mut self, order: Order) {
@@ -248,12 +247,6 @@ impl Board {
     #[must_use]
     pub fn symbol_at(&self, address: u32) -> Option<&elf::Symbol> {
         self.symbols.iter().find(|symbol| (symbol.address..symbol.address + symbol.size).contains(&address))
-    }
-
-    /// An address in the image where a jump never ends.
-    #[must_use]
-    pub fn endless_loop(&self) -> Option<u32> {
-        self.endless_loop
     }
 
     /// The most stack the firmware has used, and what it has, in bytes; `None` where the image

@@ -1,0 +1,262 @@
+//! What goes wrong takes torque away in time, is reported, and stays until a person starts again.
+
+use control_core::event::Fault;
+use link::Command;
+use link::frames::EventKind;
+use tests::board::tilt::{Health, Model};
+use tests::board::{Effect, MILLISECOND, Nanos, Wiring, plant};
+use tests::rig::{PRESSED, Rig, task};
+
+const TICK: Nanos = 100_000;
+/// What a tick can see is over in two ticks; the look at the pins adds 10 µs.
+const TWO_TICKS: Nanos = 2 * TICK + 10_000;
+const HUNG: Nanos = 20 * MILLISECOND;
+
+fn report(what: &str, time: Nanos) {
+    println!("| {what} | {:.2} ms |", time as f64 / 1e6);
+}
+
+#[test]
+fn an_encoder_that_jumps() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(|_: Nanos, _| PRESSED + 400)));
+    // The shaft's edges take a tick to arrive.
+    let time = rig.time_to_safe(TICK + TWO_TICKS);
+    report("encoder jump", time);
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::path(vec![(0, PRESSED)]))));
+    rig.comes_back_after(Fault::EncoderJump);
+}
+
+#[test]
+fn an_encoder_that_stands_still_under_torque() {
+    let mut rig = Rig::pressed();
+    // The wires are off: whatever the motor does, the count stays.
+    let time = rig.time_to_safe(5_000 * MILLISECOND);
+    report("frozen encoder under torque", time);
+    rig.comes_back_after(Fault::EncoderFrozen);
+}
+
+fn tilt_fault(model: Model, health: Health, limit: Nanos) {
+    let mut rig = Rig::pressed_on(Wiring { tilt: Some(model), ..Wiring::default() });
+    rig.board.at_stop(move |stopped| stopped.tilt().expect("an accelerometer").health = health);
+    let time = rig.time_to_safe(limit);
+    report(&format!("{model:?} {health:?}"), time);
+    rig.board.at_stop(|stopped| stopped.tilt().expect("an accelerometer").health = Health::Good);
+    rig.comes_back_after(Fault::Tilt);
+}
+
+#[test]
+fn an_accelerometer_that_goes_absent() {
+    tilt_fault(Model::Lis302dl, Health::Absent, 60 * MILLISECOND);
+    tilt_fault(Model::Lis3dsh, Health::Absent, 60 * MILLISECOND);
+}
+
+#[test]
+fn an_accelerometer_that_answers_nonsense() {
+    tilt_fault(Model::Lis302dl, Health::Nonsense, 60 * MILLISECOND);
+    tilt_fault(Model::Lis3dsh, Health::Nonsense, 60 * MILLISECOND);
+}
+
+#[test]
+fn an_accelerometer_that_is_stuck() {
+    tilt_fault(Model::Lis302dl, Health::Stuck, 120 * MILLISECOND);
+    tilt_fault(Model::Lis3dsh, Health::Stuck, 120 * MILLISECOND);
+    tilt_fault(Model::Lis3dsh, Health::Frozen, 600 * MILLISECOND);
+}
+
+#[test]
+fn a_host_that_goes_in_the_middle_of_an_insertion() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.usb().host.unplug());
+    let time = rig.time_to_safe(HUNG);
+    report("plug pulled", time);
+    rig.pc.run_ms(&mut rig.board, 500);
+    rig.comes_back_after(Fault::LinkLost);
+}
+
+#[test]
+fn a_bus_that_is_suspended() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.usb().host.suspend());
+    let time = rig.time_to_safe(HUNG);
+    report("bus suspended", time);
+    rig.board.run_ms(500);
+    rig.comes_back_after(Fault::LinkLost);
+}
+
+#[test]
+fn a_program_that_closes_the_port() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.usb().host.close());
+    let time = rig.time_to_safe(HUNG);
+    report("port closed", time);
+    rig.board.at_stop(|stopped| stopped.usb().host.open());
+    rig.comes_back_after(Fault::LinkLost);
+}
+
+#[test]
+fn half_a_frame_and_then_silence() {
+    let mut rig = Rig::pressed();
+    rig.pc.set_silent(true);
+    rig.pc.send_bytes(&mut rig.board, &[0x07, 0x02, 0x03, 0x11, 0x22]);
+    let time = rig.time_to_safe(201 * MILLISECOND);
+    report("half a frame, then silence", time);
+    rig.comes_back_after(Fault::HostSilent);
+}
+
+#[test]
+fn a_heartbeat_that_stops_while_the_port_stays_open() {
+    let mut rig = Rig::pressed();
+    rig.pc.set_silent(true);
+    let time = rig.time_to_safe(201 * MILLISECOND);
+    assert!(time > 100 * MILLISECOND, "not before its time: {time} ns");
+    report("heartbeat stops", time);
+    rig.comes_back_after(Fault::HostSilent);
+}
+
+#[test]
+fn a_program_that_stops_reading_and_stays_alive_keeps_its_device() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.usb().host.set_reading(false));
+    rig.pc.run_ms(&mut rig.board, 1_000);
+    assert!(rig.board.at_stop(|stopped| stopped.drive().enabled), "the heartbeat is there");
+    rig.board.at_stop(|stopped| stopped.usb().host.set_reading(true));
+    rig.pc.run_ms(&mut rig.board, 1_500);
+    let timing = rig.pc.heard.timing.expect("timing");
+    assert_eq!(timing.missed_ticks, 0);
+    assert!(timing.dropped_samples > 0, "what the PC did not take is dropped and counted: {timing:?}");
+    let counts = rig.pc.counts();
+    assert!(counts.lost_samples > 0 && counts.garbage == 0, "and the PC sees it: {counts:?}");
+}
+
+#[test]
+fn a_storm_of_valid_commands_changes_nothing() {
+    let mut rig = Rig::pressed();
+    let since = rig.board.now();
+    for _ in 0..1_000 {
+        let config = control_core::Config::default();
+        for command in [Command::Start, Command::Zero, Command::Heartbeat, Command::Configure(config)] {
+            if rig.board.at_stop(|stopped| stopped.usb().host.unsent()) < 4_096 {
+                rig.pc.send(&mut rig.board, command);
+            }
+        }
+        rig.pc.run_ms(&mut rig.board, 1);
+    }
+    let switched =
+        rig.board.at_stop(move |stopped| stopped.log().enable.iter().filter(|&&(at, _)| at >= since).count());
+    assert_eq!(switched, 0, "the amplifier stays on");
+    assert!(!rig.pc.heard_event(|kind| matches!(kind, EventKind::Fault { .. })));
+    let timing = rig.pc.heard.timing.expect("timing");
+    assert_eq!((timing.missed_ticks, timing.garbage_frames), (0, 0));
+}
+
+fn hung(what: &str, exception: u32) {
+    let mut rig = Rig::pressed();
+    let effect = rig.hang();
+    rig.upset(exception, effect);
+    let time = rig.time_to_safe(HUNG);
+    report(what, time);
+    rig.board.run_ms(50);
+    assert_eq!(rig.board.at_stop(|stopped| stopped.resets().len()), 1, "the watchdog ends it");
+    rig.wait_for_port();
+    rig.comes_back_after(Fault::Watchdog);
+}
+
+#[test]
+fn a_tilt_task_that_hangs() {
+    hung("tilt task hangs", task::TILT);
+}
+
+#[test]
+fn a_telemetry_task_that_hangs() {
+    hung("telemetry task hangs", task::TELEMETRY);
+}
+
+#[test]
+fn a_usb_stack_that_hangs() {
+    hung("USB task hangs", task::USB);
+}
+
+#[test]
+fn a_supervisor_that_hangs() {
+    hung("supervisor hangs", task::SUPERVISOR);
+}
+
+#[test]
+fn a_tick_that_hangs() {
+    hung("tick hangs", task::TICK);
+}
+
+fn crash(what: &str, exception: u32, effect: impl Fn(&Rig) -> Effect) {
+    let mut rig = Rig::pressed();
+    let effect = effect(&rig);
+    rig.upset(exception, effect);
+    // The task may have to wait for its turn: the slowest runs every 5 ms.
+    let time = rig.time_to_safe(5 * MILLISECOND + TWO_TICKS);
+    report(what, time);
+    rig.board.run_ms(50);
+    assert_eq!(rig.board.at_stop(|stopped| stopped.resets().len()), 1, "it resets itself");
+    rig.wait_for_port();
+    rig.comes_back_after(Fault::Crash);
+}
+
+#[test]
+fn a_panic() {
+    let panic = |rig: &Rig| {
+        let panics = rig.board.symbols().iter().find(|symbol| symbol.name.ends_with("rust_begin_unwind"));
+        Effect::Jump(panics.expect("a panic handler").address)
+    };
+    crash("panic in telemetry", task::TELEMETRY, panic);
+    crash("panic in the tick", task::TICK, panic);
+}
+
+#[test]
+fn a_hard_fault() {
+    // Nothing answers there.
+    const NOWHERE: u32 = 0x6000_0000;
+    crash("hard fault in tilt", task::TILT, |_| Effect::Jump(NOWHERE));
+    crash("hard fault in the tick", task::TICK, |_| Effect::Jump(NOWHERE));
+}
+
+#[test]
+fn a_tick_that_overruns() {
+    let mut rig = Rig::pressed();
+    // A tick and a half.
+    rig.upset(task::TICK, Effect::Stall(25_000));
+    let time = rig.time_to_safe(2 * TICK + TWO_TICKS);
+    report("tick overruns", time);
+    rig.comes_back_after(Fault::Overrun);
+}
+
+#[test]
+fn a_supply_that_dips_under_torque() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.reset_by_pin());
+    let time = rig.time_to_safe(TWO_TICKS);
+    report("supply dip, reset", time);
+    rig.wait_for_port();
+    rig.comes_back_after(Fault::Brownout);
+}
+
+#[test]
+fn a_supply_that_falls() {
+    const PVD: u16 = 1;
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.pulse(PVD));
+    let time = rig.time_to_safe(TWO_TICKS);
+    report("supply's early warning", time);
+    rig.comes_back_after(Fault::Brownout);
+}
+
+#[test]
+fn nothing_drives_the_motor_before_the_first_tick_after_a_reset() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.reset_by_pin());
+    let since = rig.board.now();
+    rig.board.run_ms(200);
+    assert!(rig.enabled_since(since).is_empty());
+    let codes: Vec<u16> = rig.board.at_stop(move |stopped| {
+        stopped.log().put_out.iter().filter(|output| output.at > since).map(|output| output.code).collect()
+    });
+    assert!(codes.iter().all(|&code| code == tests::rig::ZERO_TORQUE), "{codes:?}");
+}
