@@ -1,16 +1,17 @@
 //! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one table. A program gives a
-//! row by printing `name=value`, with a name of [`crate::rows`]; a peer beside it by `name.peer=who name.peer_value=…`. A
-//! row that nothing measures is left out: no number here was written by hand.
+//! row by printing `name=value`, with a name of [`crate::rows`], or as JSON, `"row": "name", … "value": …`; a peer beside it
+//! by `name.peer=who name.peer_value=…`. A row that nothing measures is left out: no number here was written by hand.
 
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
 use crate::shell::{self, Failure, cargo};
 use crate::{firmware, test};
 use std::collections::{BTreeMap, BTreeSet};
+use std::env::consts::EXE_EXTENSION;
 use std::fmt::Write as _;
 use std::fs;
-use std::process::Stdio;
-use std::time::Instant;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// Examples that measure: their package and name.
 const EXAMPLES: [(&str, &str); 6] = [
@@ -47,6 +48,7 @@ pub(crate) fn run() -> Result<(), Failure> {
         }
     }
     measure("stream", stream());
+    measure("diagnosis", diagnosis());
     for name in test::test_programs()? {
         if measures(&name) {
             measure(&name, test_program(&name));
@@ -64,20 +66,37 @@ pub(crate) fn run() -> Result<(), Failure> {
     if troubles.is_empty() { Ok(()) } else { Err(Failure::new(troubles.join("; "))) }
 }
 
-/// Tests that print rows: their text names one.
+/// Tests that print rows: their text names one, as a word or in JSON.
 fn measures(name: &str) -> bool {
     let path = shell::top().join("tests/tests").join(name).with_extension("rs");
-    fs::read_to_string(path).is_ok_and(|text| ROWS.iter().any(|row| text.contains(&format!("{}=", row.name))))
+    fs::read_to_string(path).is_ok_and(|text| {
+        ROWS.iter().any(|row| {
+            text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
+        })
+    })
 }
 
-/// `name=value` among the words of `text`, where the table knows the name.
+/// `name=value` among the words of `text`, and rows in JSON, where the table knows the name.
 fn values_in(text: &str) -> Values {
     let known = |name: &str| ROWS.iter().any(|row| Some(row.name) == name.split('.').next());
-    text.split_whitespace()
+    let mut values: Values = text
+        .split_whitespace()
         .filter_map(|word| word.split_once('='))
         .filter(|(name, _)| known(name))
         .map(|(name, value)| (name.to_string(), value.to_string()))
-        .collect()
+        .collect();
+    let words: Vec<&str> = text.split_whitespace().map(|word| word.trim_end_matches([',', '}'])).collect();
+    let mut row = None;
+    for pair in words.windows(2) {
+        match pair {
+            ["\"row\":", name] => row = Some(name.trim_matches('"')).filter(|name| known(name)),
+            ["\"value\":", value] => {
+                values.extend(row.take().map(|name| (name.to_string(), value.to_string())));
+            }
+            _ => {}
+        }
+    }
+    values
 }
 
 fn example(package: &str, name: &str) -> Result<Values, Failure> {
@@ -166,6 +185,50 @@ fn stream() -> Result<Values, Failure> {
     Ok(Values::from([("stream_samples_per_s".into(), format!("{:.0}", samples / seconds))]))
 }
 
+/// Time and memory of a diagnosis: about a minute of recording to fit, another one to judge, made by the virtual device.
+fn diagnosis() -> Result<Values, Failure> {
+    let folder = shell::target().join("bench-recordings");
+    let run = || {
+        let mut run = cargo();
+        run.args(["run", "--release", "--quiet", "-p", MAIN, "--"]);
+        run
+    };
+    shell::run(run().arg("characterise").arg("--out").arg(&folder))?;
+    // The program itself and not cargo around it: the memory is to be its own.
+    let mut diagnose = Command::new(shell::target().join("release").join(MAIN).with_extension(EXE_EXTENSION));
+    diagnose.current_dir(shell::top()).arg("diagnose").arg("--rig").arg(folder.join("rig.toml"));
+    diagnose.arg("--fit").arg(folder.join("fit.csv")).arg("--holdout").arg(folder.join("holdout.csv"));
+    diagnose.arg("--out").arg(folder.join("diagnosis")).stdout(Stdio::null());
+    let begin = Instant::now();
+    let mut child =
+        diagnose.spawn().map_err(|error| Failure::new(format!("{MAIN} could not be started: {error}")))?;
+    let status_file = format!("/proc/{}/status", child.id());
+    let mut peak_kib = None;
+    let status = loop {
+        // Gone with the process; the last look counts.
+        peak_kib = fs::read_to_string(&status_file).ok().as_deref().and_then(peak_of).or(peak_kib);
+        match child.try_wait() {
+            Ok(None) => std::thread::sleep(Duration::from_millis(20)),
+            Ok(Some(status)) => break status,
+            Err(error) => return Err(Failure::new(format!("the diagnosis was lost: {error}"))),
+        }
+    };
+    let seconds = begin.elapsed().as_secs_f64();
+    if !status.success() {
+        return Err(Failure::new(format!("the diagnosis failed ({status})")));
+    }
+    let mut values = Values::from([("diagnose_60s_s".into(), format!("{seconds:.2}"))]);
+    values.extend(peak_kib.map(|kib| ("diagnose_peak_mib".into(), format!("{:.0}", kib / 1024.0))));
+    Ok(values)
+}
+
+/// The most memory that a process has had, in KiB, from Linux' own account of it.
+fn peak_of(status: &str) -> Option<f64> {
+    status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB")?.trim().parse().ok())
+}
+
 /// Somebody else's number for the same thing.
 struct Peer {
     who: String,
@@ -179,7 +242,7 @@ fn peer(values: &Values, row: &str) -> Option<Peer> {
 }
 
 fn commit() -> String {
-    let mut git = std::process::Command::new("git");
+    let mut git = Command::new("git");
     git.current_dir(shell::top()).args(["rev-parse", "HEAD"]).stderr(Stdio::null());
     shell::output(&mut git).map_or_else(|_| "unknown".into(), |text| text.trim().to_string())
 }
@@ -245,6 +308,22 @@ mod tests {
         assert_eq!(values["tick_host_ns"], "81.5");
         let peer = peer(&values, "tick_host_ns").unwrap();
         assert_eq!((peer.who.as_str(), peer.value), ("idsp", 90.0));
+    }
+
+    #[test]
+    fn rows_are_found_in_json() {
+        let text = "{ \"rows\": [ { \"peer\": null, \"row\": \"page_mb\", \"unit\": \"MB\", \"value\": 0.25 },\n\
+                    { \"row\": \"other\", \"value\": 3 }, { \"row\": \"build_s\", \"value\": 61, \"peer\": null } ] }";
+        let values = values_in(text);
+        assert_eq!(
+            values,
+            Values::from([("page_mb", "0.25"), ("build_s", "61")].map(|(n, v)| (n.into(), v.into())))
+        );
+    }
+
+    #[test]
+    fn memory_is_read_from_the_account() {
+        assert_eq!(peak_of("Name:\tx\nVmPeak:\t   9 kB\nVmHWM:\t   51200 kB\n"), Some(51_200.0));
     }
 
     #[test]
