@@ -64,6 +64,7 @@ impl Rig {
     #[must_use]
     pub fn pressed_on(wiring: Wiring) -> Self {
         let hand = plant::path(vec![(200 * MILLISECOND, 0), (500 * MILLISECOND, PRESSED)]);
+        let hand = plant::by_hand(hand);
         let mut rig = Self { board: board_wired(wiring, hand), pc: Pc::new() };
         rig.pc.connect(&mut rig.board);
         rig.pc.must(&mut rig.board, Command::Start);
@@ -146,7 +147,7 @@ impl Rig {
             // It counts from where it found the shaft: skin begins there now.
             let now = self.board.now();
             let hand = plant::path(vec![(now, PRESSED), (now + 100 * MILLISECOND, 2 * PRESSED)]);
-            self.board.at_stop(|stopped| stopped.set_plant(Box::new(hand)));
+            self.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::by_hand(hand))));
             self.pc.run_ms(&mut self.board, 200);
         }
         let start = self.board.now();

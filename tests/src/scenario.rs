@@ -15,7 +15,7 @@ const SECOND: Nanos = 1_000_000_000;
 pub fn venepuncture(start: Nanos) -> impl PlantSide {
     let mm = |depth: i64| depth * COUNTS_PER_MM;
     let at = |tenths: u64| start + tenths * SECOND / 10;
-    plant::path(vec![
+    plant::by_hand(plant::path(vec![
         (start, 0),
         (at(5), mm(-5)),
         (at(10), mm(-5)),
@@ -24,7 +24,7 @@ pub fn venepuncture(start: Nanos) -> impl PlantSide {
         (at(50), mm(8)),
         (at(60), mm(8)),
         (at(78), mm(-3)),
-    ])
+    ]))
 }
 
 /// The board with the flash image on it, wired as it is meant to be.

@@ -23,16 +23,20 @@ fn an_encoder_that_jumps() {
     // The shaft's edges take a tick to arrive.
     let time = rig.time_to_safe(TICK + TWO_TICKS);
     report("encoder jump", time);
-    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::path(vec![(0, PRESSED)]))));
+    let hand = plant::by_hand(plant::path(vec![(0, PRESSED)]));
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(hand)));
     rig.comes_back_after(Fault::EncoderJump);
 }
 
 #[test]
 fn an_encoder_that_stands_still_under_torque() {
     let mut rig = Rig::pressed();
-    // The wires are off: whatever the motor does, the count stays.
+    // Whatever the motor does, the count stays: not even a hand's tremor is left.
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::path(vec![(0, PRESSED)]))));
     let time = rig.time_to_safe(5_000 * MILLISECOND);
     report("frozen encoder under torque", time);
+    let hand = plant::by_hand(plant::path(vec![(0, PRESSED)]));
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(hand)));
     rig.comes_back_after(Fault::EncoderFrozen);
 }
 

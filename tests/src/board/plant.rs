@@ -57,6 +57,16 @@ pub fn path(points: Vec<(Nanos, i64)>) -> impl PlantSide {
     }
 }
 
+/// A living hand: `plant` with a tremor of 10 Hz, two counts to either side.
+#[must_use]
+pub fn by_hand(mut plant: impl PlantSide) -> impl PlantSide {
+    const PERIOD: Nanos = 100_000_000;
+    move |at: Nanos, drive: Drive| {
+        let eighth = (at % PERIOD * 8 / PERIOD) as usize;
+        plant.step(at, drive) + [0, 1, 2, 1, 0, -1, -2, -1][eighth]
+    }
+}
+
 /// The two tracks of an incremental encoder.
 #[derive(Debug)]
 pub(super) struct Encoder {
@@ -79,9 +89,8 @@ impl Encoder {
     /// The shaft is to be at `target` when the next step comes, `step` from `now`.
     pub(super) fn aim(&mut self, now: Nanos, target: i64, step: Nanos) {
         self.target = target;
-        let edges = target.abs_diff(self.angle);
-        if edges > 0 {
-            self.spacing = (step / edges).max(LEAST_EDGE_SPACING);
+        if let Some(spacing) = step.checked_div(target.abs_diff(self.angle)) {
+            self.spacing = spacing.max(LEAST_EDGE_SPACING);
             self.next_edge = now;
         }
     }
