@@ -40,6 +40,7 @@ pub struct Driver {
     open: bool,
     /// The device has taken its configuration in this connection.
     ready: bool,
+    has_started: bool,
     waiting: VecDeque<Command>,
     pending: Option<Pending>,
     last_samples: Duration,
@@ -66,6 +67,7 @@ impl Driver {
             commands: Commands::default(),
             open: false,
             ready: false,
+            has_started: false,
             waiting: VecDeque::new(),
             pending: None,
             last_samples: Duration::ZERO,
@@ -158,6 +160,17 @@ impl Driver {
         self.ready && now.saturating_sub(self.last_samples) <= SILENCE
     }
 
+    /// Whether the device has ever taken a start.
+    pub fn has_started(&self) -> bool {
+        self.has_started
+    }
+
+    /// Whether a start is on its way.
+    pub fn is_starting(&self) -> bool {
+        let pending = self.pending.iter().map(|pending| &pending.command);
+        self.waiting.iter().chain(pending).any(|command| matches!(command, Command::Start))
+    }
+
     /// Something a person should know, once.
     pub fn take_notice(&mut self) -> Option<String> {
         self.notice.take()
@@ -202,6 +215,7 @@ impl Driver {
         let Some(pending) = self.pending.take() else { return };
         match (ack.result, &pending.command) {
             (Ok(()), Command::Configure(_)) => self.ready = true,
+            (Ok(()), Command::Start) => self.has_started = true,
             (Ok(()), _) => {}
             // The same bytes again, soon.
             (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),

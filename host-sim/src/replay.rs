@@ -96,7 +96,7 @@ impl<'a> Replay<'a> {
 
     fn play_due(&mut self) {
         while let Some(message) = self.recording.messages.get(self.next) {
-            if let Some(tick) = tick_of(message) {
+            if let Some(tick) = message.tick() {
                 let jumped =
                     self.last_tick.is_none_or(|last| tick + LONGEST_GAP < last || tick > last + LONGEST_GAP);
                 if jumped {
@@ -131,14 +131,5 @@ impl<'a> Replay<'a> {
             }),
             Message::Setup(_) => {}
         }
-    }
-}
-
-fn tick_of(message: &Message) -> Option<u64> {
-    match message {
-        Message::Samples(block) => Some(block.first_tick),
-        Message::Pose(pose) => Some(pose.tick),
-        Message::Event(event) => Some(event.tick),
-        Message::Hello(_) | Message::Link(_) | Message::Setup(_) => None,
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::profile::{Profile, puncture_depth_mm};
 use crate::recording::export::{Stretch, stretches};
-use crate::recording::messages::Message;
 use crate::recording::read::Recording;
 use control_core::TICK_HZ;
 use control_core::config::Tissue;
@@ -36,11 +35,6 @@ pub struct Insertion {
 
 /// All insertions of a recording against `profile`.
 pub fn score(recording: &Recording, profile: &Profile) -> Vec<Insertion> {
-    let events: Vec<Event> = recording
-        .messages
-        .iter()
-        .filter_map(|m| if let Message::Event(event) = m { Some(*event) } else { None })
-        .collect();
     let vessel_mm = profile
         .config
         .layers
@@ -52,22 +46,24 @@ pub fn score(recording: &Recording, profile: &Profile) -> Vec<Insertion> {
     stretches
         .iter()
         .flat_map(|stretch| {
-            spans(stretch, &events)
+            spans(stretch)
                 .into_iter()
-                .map(|span| insertion(stretch, span, &events, profile.entry_rad, vessel_mm, zero_tick))
+                .map(|span| insertion(stretch, span, profile.entry_rad, vessel_mm, zero_tick))
                 .collect::<Vec<_>>()
         })
         .collect()
 }
 
 /// Ticks of each insertion: from the touch of layer 0 to leaving it.
-fn spans(stretch: &Stretch, events: &[Event]) -> Vec<(u64, u64)> {
-    let end = stretch.first_tick + stretch.samples.len() as u64;
+fn spans(stretch: &Stretch) -> Vec<(u64, u64)> {
+    let end = stretch.end_tick();
     let (mut spans, mut begun) = (Vec::new(), None);
-    for event in events.iter().filter(|e| (stretch.first_tick..end).contains(&e.tick)) {
+    for event in &stretch.events {
         match event.kind {
             EventKind::Contact { layer: 0 } => begun = begun.or(Some(event.tick)),
-            EventKind::Exit { layer: 0 } => spans.extend(begun.take().map(|begin| (begin, event.tick))),
+            EventKind::Exit { layer: 0 } => {
+                spans.extend(begun.take().map(|begin| (begin, event.tick.max(begin))));
+            }
             _ => {}
         }
     }
@@ -78,7 +74,6 @@ fn spans(stretch: &Stretch, events: &[Event]) -> Vec<(u64, u64)> {
 fn insertion(
     stretch: &Stretch,
     (begin, end): (u64, u64),
-    events: &[Event],
     entry_rad: f64,
     vessel_mm: Option<f64>,
     zero_tick: u64,
@@ -92,12 +87,15 @@ fn insertion(
         .sum();
     let deepest = samples.iter().map(|s| s.count).max().unwrap_or(0);
     let depth_mm = f64::from(deepest) * hello.mm_per_count;
-    let given: Vec<&Event> = events
+    let given: Vec<&Event> = stretch
+        .events
         .iter()
         .filter(|e| (begin..=end).contains(&e.tick) && matches!(e.kind, EventKind::Puncture { .. }))
         .collect();
-    let vessel =
-        events.iter().any(|e| (begin..=end).contains(&e.tick) && matches!(e.kind, EventKind::Vessel { .. }));
+    let vessel = stretch
+        .events
+        .iter()
+        .any(|e| (begin..=end).contains(&e.tick) && matches!(e.kind, EventKind::Vessel { .. }));
     let angle =
         given.first().and_then(|e| stretch.samples.get(at(e.tick))).map(|s| f64::from(s.tilt_mrad) * 1e-3);
     Insertion {

@@ -115,8 +115,9 @@ pub struct Station<'a> {
     outlets: Outlets,
     /// Set from outside (Ctrl-C) to end the run in good order.
     stop: &'a AtomicBool,
-    /// The person who started the program asked for a start once, not at every reconnection.
-    started: bool,
+    was_ready: bool,
+    /// A person has stopped the device: only a person starts it from now on.
+    was_stopped: bool,
 }
 
 /// What a run came to.
@@ -132,7 +133,7 @@ pub struct Outcome {
 impl<'a> Station<'a> {
     /// Not connected yet.
     pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
-        Self { driver, outlets, stop, started: false }
+        Self { driver, outlets, stop, was_ready: false, was_stopped: false }
     }
 
     /// Runs a simulated device as fast as it goes, in step with it: the clock is the device's. `progress` sees the samples so
@@ -200,7 +201,7 @@ impl<'a> Station<'a> {
             } else {
                 std::thread::sleep(PATIENCE);
             }
-            if !self.started && now > FIRST_ANSWER {
+            if !self.was_ready && now > FIRST_ANSWER {
                 return Err(self.never_ready());
             }
             while let Some(control) = self.outlets.publisher.next_control() {
@@ -248,9 +249,13 @@ impl<'a> Station<'a> {
         }
     }
 
+    /// The person who started the program asked for a start: once, and not again after a stop or a reconnection.
     fn start_once(&mut self, now: Duration) {
-        if !self.started && self.driver.is_ready(now) {
-            self.started = true;
+        if !self.driver.is_ready(now) {
+            return;
+        }
+        self.was_ready = true;
+        if !self.was_stopped && !self.driver.has_started() && !self.driver.is_starting() {
             self.driver.request(Request::Start);
         }
     }
@@ -258,7 +263,10 @@ impl<'a> Station<'a> {
     fn control(&mut self, control: Control, mut hand: impl FnMut(Control)) {
         match control {
             Control::Start => self.driver.request(Request::Start),
-            Control::Stop => self.driver.request(Request::Stop),
+            Control::Stop => {
+                self.was_stopped = true;
+                self.driver.request(Request::Stop);
+            }
             Control::Zero => self.driver.request(Request::Zero),
             other => hand(other),
         }

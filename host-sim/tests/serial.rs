@@ -49,15 +49,22 @@ impl Plugged {
         let pump = std::thread::spawn(move || {
             let _held = held;
             let mut bytes = [0; 4096];
+            let mut outgoing = Vec::new();
             while !end.load(Ordering::Relaxed) {
                 if let Ok(count) = board.read(&mut bytes)
                     && wire.write(&bytes[..count]).is_err()
                 {
                     return;
                 }
-                let Ok(count) = wire.read(&mut bytes, Duration::from_millis(1)) else { return };
-                // Nobody reads: the terminal's buffer is full, and the board's bytes are gone.
-                let _ = board.write_all(&bytes[..count]);
+                if outgoing.is_empty() {
+                    let Ok(count) = wire.read(&mut bytes, Duration::from_millis(1)) else { return };
+                    outgoing.extend(&bytes[..count]);
+                }
+                // What the terminal's buffer does not take yet waits here, as in a board's endpoint.
+                match board.write(&outgoing) {
+                    Ok(written) => drop(outgoing.drain(..written)),
+                    Err(_) => std::thread::sleep(Duration::from_millis(1)),
+                }
             }
         });
         Self { path: path.to_owned(), unplug, pump: Some(pump) }
@@ -90,6 +97,17 @@ fn the_same_bytes_over_a_terminal_lose_nothing() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!((figure(&stdout, "samples"), figure(&stdout, "lost")), (60_000.0, 0.0), "{stdout}");
     assert_eq!((figure(&stdout, "punctures"), figure(&stdout, "lost_samples")), (2.0, 0.0), "{stdout}");
+}
+
+#[test]
+fn a_port_where_nobody_answers_is_one_line_and_status_one() {
+    let dir = folder("mute");
+    let path = dir.join("ttyMute");
+    let (near, _far) = host_sim::device::pipe::cable();
+    let _plugged = Plugged::new(&path, Box::new(near));
+    let output =
+        host_sim(&["run", "--headless", "--device", text(&path)]).output().expect("the program starts");
+    common::refused(&output, 1, &["did not answer"]);
 }
 
 #[test]

@@ -11,18 +11,43 @@ pub struct Bearing {
     pub breakaway: f64,
 }
 
+/// A bearing under an inertia, in steps of a fixed length: every division done.
+#[derive(Clone, Copy, Debug)]
+pub struct BearingStep {
+    /// Change of speed for a torque, rad/s for N·m.
+    per_torque: f64,
+    /// Share of its speed that viscous friction leaves.
+    keep: f64,
+    /// Speed that dry friction takes while it turns.
+    dry: f64,
+    /// Speed below which it does not break away.
+    breakaway: f64,
+}
+
 impl Bearing {
-    /// The speed after `dt` s under `torque` N·m on `inertia` kg·m².
+    /// Steps of `dt` s under `inertia` kg·m².
+    pub fn steps(&self, inertia: f64, dt: f64) -> BearingStep {
+        let per_torque = dt / inertia;
+        BearingStep {
+            per_torque,
+            keep: 1.0 / (1.0 + self.viscous * per_torque),
+            dry: self.coulomb * per_torque,
+            breakaway: self.breakaway * per_torque,
+        }
+    }
+}
+
+impl BearingStep {
+    /// The speed after a step under `torque` N·m.
     ///
     /// Dry friction is an impulse that can stop the bearing and never turn it round (time stepping after Moreau): it sticks at
     /// exactly zero, takes energy only, and does not chatter whatever the step.
     #[inline]
-    pub fn step(&self, speed: f64, torque: f64, inertia: f64, dt: f64) -> f64 {
+    pub fn step(&self, speed: f64, torque: f64) -> f64 {
         // Viscous friction implicitly: stable for any coefficient.
-        let free = (speed + torque * dt / inertia) / (1.0 + self.viscous * dt / inertia);
-        let dry = if speed == 0.0 { self.breakaway } else { self.coulomb };
-        let stop = dry * dt / inertia;
-        if free.abs() <= stop { 0.0 } else { free - (self.coulomb * dt / inertia).copysign(free) }
+        let free = (speed + torque * self.per_torque) * self.keep;
+        let stop = if speed == 0.0 { self.breakaway } else { self.dry };
+        if free.abs() <= stop { 0.0 } else { free - self.dry.copysign(free) }
     }
 }
 
@@ -36,8 +61,9 @@ mod tests {
 
     #[test]
     fn it_sticks_below_breakaway_turns_above_and_settles_at_its_terminal_speed() {
+        let bearing = BEARING.steps(INERTIA, DT);
         let run = |torque: f64, from: f64, seconds: f64| {
-            (0..(seconds / DT) as u32).fold(from, |speed, _| BEARING.step(speed, torque, INERTIA, DT))
+            (0..(seconds / DT) as u32).fold(from, |speed, _| bearing.step(speed, torque))
         };
         assert_eq!(run(4.7e-4, 0.0, 1.0), 0.0, "below breakaway it does not move at all");
         assert!(run(4.9e-4, 0.0, 1.0) > 10.0, "above breakaway it turns");
@@ -51,9 +77,10 @@ mod tests {
     fn coasting_it_comes_to_rest_where_the_equation_says_and_stays() {
         // ω̇ = −(b·ω + c)/J from ω₀: t = (J/b)·ln(1 + b·ω₀/c).
         let expected = INERTIA / BEARING.viscous * (1.0 + BEARING.viscous * 100.0 / BEARING.coulomb).ln();
+        let bearing = BEARING.steps(INERTIA, DT);
         let (mut speed, mut rest) = (100.0, None);
         for step in 0..200_000_u32 {
-            speed = BEARING.step(speed, 0.0, INERTIA, DT);
+            speed = bearing.step(speed, 0.0);
             if speed == 0.0 {
                 rest = rest.or(Some(f64::from(step) * DT));
             }

@@ -8,7 +8,7 @@ pub mod bearing;
 pub mod hand;
 pub mod motor;
 
-use bearing::Bearing;
+use bearing::{Bearing, BearingStep};
 use hand::{Grip, Hand};
 use motor::{Amplifier, Motor};
 
@@ -61,6 +61,13 @@ impl PlantConfig {
     }
 }
 
+/// A quantity that has decayed below anything physical is zero: left alone it would end among the subnormal numbers, where
+/// every operation costs a hundred times as much.
+#[inline]
+fn settled(x: f64) -> f64 {
+    if x.abs() < 1e-30 { 0.0 } else { x }
+}
+
 /// The mechanism in motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -74,8 +81,14 @@ pub struct Plant {
     tip_speed: f64,
     /// How far the coat is sheared: needle ahead of the roller's surface, m.
     shear: f64,
-    sin_tilt: f64,
     tilt: f64,
+    /// Weight of the needle along its axis, N.
+    weight: f64,
+    bearing: BearingStep,
+    /// Change of the needle's speed in a step for a force, m/s for N.
+    per_force: f64,
+    /// Shear at which the coat lets the needle slip, m.
+    most_shear: f64,
     hand: Hand,
     hand_force: f64,
 }
@@ -90,8 +103,11 @@ impl Plant {
             tip,
             tip_speed: 0.0,
             shear: 0.0,
-            sin_tilt: 0.0,
             tilt: 0.0,
+            weight: 0.0,
+            bearing: config.bearing.steps(config.inertia, STEP_S),
+            per_force: STEP_S / config.needle_mass,
+            most_shear: config.grip_force / config.coat_stiffness,
             hand: Hand::new(grip, tip),
             hand_force: 0.0,
             config,
@@ -101,7 +117,7 @@ impl Plant {
     /// Inclines the insertion axis below the horizontal, rad.
     pub fn set_tilt(&mut self, tilt: f64) {
         self.tilt = tilt;
-        self.sin_tilt = tilt.sin();
+        self.weight = self.config.needle_mass * GRAVITY * tilt.sin();
     }
 
     /// Inclination below the horizontal, rad.
@@ -114,36 +130,33 @@ impl Plant {
     /// has let go.
     pub fn tick(&mut self, set_value: f64, enable: bool, hand: Option<(f64, f64)>) {
         let tremor = self.hand.tremor_tick();
-        for step in 0..STEPS_PER_TICK {
-            let into = f64::from(step) * STEP_S;
-            let wanted =
-                hand.map(|(place, speed)| (place + tremor.0 + (speed + tremor.1) * into, speed + tremor.1));
-            self.step(set_value, enable, wanted);
+        let mut hand = hand.map(|(place, speed)| (place + tremor.0, speed + tremor.1));
+        let wanted = enable.then(|| self.config.motor.wanted_current(set_value));
+        for _ in 0..STEPS_PER_TICK {
+            self.step(wanted, hand);
+            if let Some((place, speed)) = &mut hand {
+                *place += *speed * STEP_S;
+            }
         }
     }
 
-    fn step(&mut self, set_value: f64, enable: bool, hand: Option<(f64, f64)>) {
+    /// A step, semi-implicit: speeds from forces, then places from speeds.
+    #[inline]
+    fn step(&mut self, wanted_current: Option<f64>, hand: Option<(f64, f64)>) {
         let c = &self.config;
         self.hand_force = self.hand.force(hand, self.tip, self.tip_speed);
-        let grip = self.grip_force();
-        let torque = self.amplifier.step(&c.motor, set_value, enable, self.speed);
+        let slide = self.tip_speed - self.speed * c.roller_radius;
+        let grip =
+            (c.coat_stiffness * self.shear + c.coat_damping * slide).clamp(-c.grip_force, c.grip_force);
+        let torque = self.amplifier.step(&c.motor, wanted_current, self.speed);
 
-        let weight = c.needle_mass * GRAVITY * self.sin_tilt;
-        self.tip_speed += STEP_S * (self.hand_force + weight - grip) / c.needle_mass;
-        self.speed = c.bearing.step(self.speed, torque + grip * c.roller_radius, c.inertia, STEP_S);
+        self.tip_speed = settled(self.tip_speed + self.per_force * (self.hand_force + self.weight - grip));
+        self.speed = self.bearing.step(self.speed, torque + grip * c.roller_radius);
         self.tip += STEP_S * self.tip_speed;
         self.angle += STEP_S * self.speed;
-        self.shear += STEP_S * (self.tip_speed - self.speed * c.roller_radius);
         // Beyond the grip the needle slips: the coat holds what it can and no more.
-        let most = c.grip_force / c.coat_stiffness;
-        self.shear = self.shear.clamp(-most, most);
-    }
-
-    /// Force of the needle on the roller's surface, N.
-    fn grip_force(&self) -> f64 {
-        let c = &self.config;
-        let slide = self.tip_speed - self.speed * c.roller_radius;
-        (c.coat_stiffness * self.shear + c.coat_damping * slide).clamp(-c.grip_force, c.grip_force)
+        let shear = self.shear + STEP_S * (self.tip_speed - self.speed * c.roller_radius);
+        self.shear = shear.clamp(-self.most_shear, self.most_shear);
     }
 
     /// What the encoder has counted since the tip was at the skin, quantised.

@@ -1,6 +1,6 @@
 //! A DC motor behind a servo amplifier in current mode: electrical pole, supply and current limits, enable line.
 
-use super::STEP_S;
+use super::{STEP_S, settled};
 
 /// What motor and amplifier are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,21 +42,28 @@ pub struct Amplifier {
     current: f64,
 }
 
+impl Motor {
+    /// The current in A that a set value of −1 to 1 asks for, within the limit.
+    pub fn wanted_current(&self, set_value: f64) -> f64 {
+        let asked = set_value * self.full_scale_torque / self.torque_constant;
+        asked.clamp(-self.current_limit, self.current_limit)
+    }
+}
+
 impl Amplifier {
-    /// One physics step; the torque in N·m. `set_value` is −1 to 1, `speed` the rotor's in rad/s.
+    /// One physics step; the torque in N·m. `wanted` is the current asked for in A, or `None` where the enable line is low;
+    /// `speed` the rotor's in rad/s.
     #[inline]
-    pub fn step(&mut self, motor: &Motor, set_value: f64, enable: bool, speed: f64) -> f64 {
+    pub fn step(&mut self, motor: &Motor, wanted: Option<f64>, speed: f64) -> f64 {
         let back = motor.torque_constant * speed;
-        if enable {
-            let asked = set_value * motor.full_scale_torque / motor.torque_constant;
-            let wanted = asked.clamp(-motor.current_limit, motor.current_limit);
-            let voltage =
-                motor.current_gain * (wanted - self.current) + motor.resistance * self.current + back;
-            let voltage = voltage.clamp(-motor.supply, motor.supply);
-            self.current += STEP_S * (voltage - motor.resistance * self.current - back) / motor.inductance;
+        let rate = STEP_S / motor.inductance;
+        if let Some(wanted) = wanted {
+            let drop = motor.resistance * self.current + back;
+            let voltage = motor.current_gain * (wanted - self.current) + drop;
+            self.current = settled(self.current + rate * (voltage.clamp(-motor.supply, motor.supply) - drop));
         } else {
             // The bridge is open: current decays through the diodes against the supply and does not turn round.
-            let fall = STEP_S * (motor.supply + motor.resistance * self.current.abs()) / motor.inductance;
+            let fall = rate * (motor.supply + motor.resistance * self.current.abs());
             self.current = self.current.signum() * (self.current.abs() - fall).max(0.0);
         }
         self.torque(motor)
@@ -80,7 +87,7 @@ mod tests {
         let wanted = 0.01 * motor.full_scale_torque;
         let mut seen = None;
         for step in 1..200_u32 {
-            let torque = amplifier.step(&motor, 0.01, true, 0.0);
+            let torque = amplifier.step(&motor, Some(motor.wanted_current(0.01)), 0.0);
             if torque > wanted * (1.0 - (-1.0_f64).exp()) {
                 seen = seen.or(Some(f64::from(step) * STEP_S));
             }
@@ -93,7 +100,7 @@ mod tests {
         let weak = Motor { supply: 1.0, ..motor };
         let mut amplifier = Amplifier::default();
         for step in 1..=2_000_u32 {
-            amplifier.step(&weak, 1.0, true, 0.0);
+            amplifier.step(&weak, Some(weak.wanted_current(1.0)), 0.0);
             // Euler's steps run ahead of the exponential by a step at the most.
             let time = f64::from(step + 1) * STEP_S;
             let bound =
@@ -108,15 +115,15 @@ mod tests {
         let motor = Motor::re25(0.0288);
         let mut amplifier = Amplifier::default();
         for _ in 0..100 {
-            assert_eq!(amplifier.step(&motor, 1.0, false, 100.0), 0.0);
+            assert_eq!(amplifier.step(&motor, None, 100.0), 0.0);
         }
         let small = Motor { current_limit: 0.5, ..motor };
         for _ in 0..1_000 {
-            amplifier.step(&small, -1.0, true, 0.0);
+            amplifier.step(&small, Some(small.wanted_current(-1.0)), 0.0);
         }
         assert!((amplifier.current + 0.5).abs() < 1e-6);
         let mut steps = 0;
-        while amplifier.step(&small, -1.0, false, 0.0) != 0.0 {
+        while amplifier.step(&small, None, 0.0) != 0.0 {
             steps += 1;
         }
         assert!(steps < 10, "dropping enable takes the torque away at once, not after {steps} steps");

@@ -8,6 +8,7 @@ use crate::plant::{GRAVITY, PlantConfig};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use diagnosis::rig::{Actuator, Encoder, Kind, Model, Rig, Uncertainty};
+use link::frames::Event;
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -21,6 +22,8 @@ pub struct Stretch {
     pub first_tick: u64,
     /// 10 kHz.
     pub samples: Vec<Sample>,
+    /// What happened during these samples.
+    pub events: Vec<Event>,
 }
 
 /// What was written.
@@ -35,12 +38,19 @@ pub struct Exported {
 /// The stretches of a recording, in order.
 pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let (mut all, mut hello): (Vec<Stretch>, Option<Hello>) = (Vec::new(), None);
+    // An event is told before the block of samples that it happened in.
+    let mut told = Vec::new();
     for message in &recording.messages {
         match message {
-            Message::Hello(new) => hello = Some(new.clone()),
+            Message::Hello(new) => {
+                hello = Some(new.clone());
+                // What a device told of samples that never came is forgotten with them.
+                told.clear();
+            }
+            Message::Event(event) => told.push(*event),
             Message::Samples(block) => {
                 let Some(hello) = &hello else { continue };
-                extend(&mut all, hello, block);
+                extend(&mut all, hello, block, &mut told);
             }
             _ => {}
         }
@@ -48,15 +58,30 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     all
 }
 
-fn extend(all: &mut Vec<Stretch>, hello: &Hello, block: &Samples) {
-    let follows = all.last().is_some_and(|last| {
-        last.first_tick + last.samples.len() as u64 == block.first_tick && same_scale(&last.hello, hello)
-    });
+fn extend(all: &mut Vec<Stretch>, hello: &Hello, block: &Samples, told: &mut Vec<Event>) {
+    let follows =
+        all.last().is_some_and(|last| last.end_tick() == block.first_tick && same_scale(&last.hello, hello));
     if !follows {
-        all.push(Stretch { hello: hello.clone(), first_tick: block.first_tick, samples: Vec::new() });
+        all.push(Stretch {
+            hello: hello.clone(),
+            first_tick: block.first_tick,
+            samples: Vec::new(),
+            events: Vec::new(),
+        });
     }
     if let Some(last) = all.last_mut() {
         last.samples.extend(block.rows().map(|row| row.1));
+        let end = last.end_tick();
+        let first = last.first_tick;
+        last.events.extend(told.iter().filter(|e| (first..end).contains(&e.tick)));
+        told.retain(|event| event.tick >= end);
+    }
+}
+
+impl Stretch {
+    /// Tick after the last sample.
+    pub fn end_tick(&self) -> u64 {
+        self.first_tick + self.samples.len() as u64
     }
 }
 

@@ -121,6 +121,18 @@ pub enum Message {
     Link(Link),
 }
 
+impl Message {
+    /// When, for what has a time.
+    pub fn tick(&self) -> Option<u64> {
+        match self {
+            Message::Samples(block) => Some(block.first_tick),
+            Message::Pose(pose) => Some(pose.tick),
+            Message::Event(event) => Some(event.tick),
+            Message::Hello(_) | Message::Link(_) | Message::Setup(_) => None,
+        }
+    }
+}
+
 impl From<&frames::Hello> for Hello {
     fn from(hello: &frames::Hello) -> Self {
         Self {
@@ -143,6 +155,13 @@ impl From<&frames::Hello> for Hello {
 }
 
 impl Hello {
+    /// Whether a device could have said this: what follows divides by it.
+    pub fn is_plausible(&self) -> bool {
+        (1e-6..=10.0).contains(&self.mm_per_count)
+            && (0.1..=1_000.0).contains(&self.roller_radius_mm)
+            && (1e-3..=100_000.0).contains(&self.full_scale_torque_mnm)
+    }
+
     /// The converter.
     pub fn dac(&self) -> DacWidth {
         if self.dac_bits == 8 { DacWidth::Bits8 } else { DacWidth::Bits12 }

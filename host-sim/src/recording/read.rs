@@ -78,14 +78,23 @@ impl Recording {
     }
 }
 
-fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, serde_json::Error> {
-    Ok(Some(match topic {
-        "/setup" => Message::Setup(serde_json::from_slice(json)?),
-        "/hello" => Message::Hello(serde_json::from_slice(json)?),
-        "/samples" => Message::Samples(serde_json::from_slice(json)?),
-        "/pose" => Message::Pose(serde_json::from_slice(json)?),
-        "/event" => Message::Event(serde_json::from_slice(json)?),
-        "/link" => Message::Link(serde_json::from_slice(json)?),
+/// Ticks beyond this are no device's: it would be 28,000 years old.
+const LATEST_TICK: u64 = 1 << 53;
+
+fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
+    let understood = match topic {
+        "/setup" => serde_json::from_slice(json).map(Message::Setup),
+        "/hello" => serde_json::from_slice(json).map(Message::Hello),
+        "/samples" => serde_json::from_slice(json).map(Message::Samples),
+        "/pose" => serde_json::from_slice(json).map(Message::Pose),
+        "/event" => serde_json::from_slice(json).map(Message::Event),
+        "/link" => serde_json::from_slice(json).map(Message::Link),
         _ => return Ok(None),
-    }))
+    };
+    let message = understood.map_err(|cause| cause.to_string())?;
+    match &message {
+        Message::Hello(hello) if !hello.is_plausible() => Err("its scale is no device's".into()),
+        other if other.tick().is_some_and(|tick| tick > LATEST_TICK) => Err("its tick is no device's".into()),
+        _ => Ok(Some(message)),
+    }
 }
