@@ -55,8 +55,11 @@ pub(crate) enum Toolchain {
 
 /// The board's target.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-/// Debian's compiler, cargo and sources of the core library, newer than its release.
-const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+/// Debian's compiler, cargo, sources of the core library, and the names under which the compiler finds its linker; all
+/// newer than its release.
+const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"];
+/// The linker for the board, a link to the package of its version.
+const DEBIAN_LINKER: &str = "/usr/bin/rust-lld";
 
 /// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's compiler.
 pub(crate) fn toolchain() -> Result<Toolchain, Failure> {
@@ -74,6 +77,9 @@ pub(crate) fn toolchain() -> Result<Toolchain, Failure> {
     }
     if !has_debian_compiler() {
         install(&DEBIAN_PACKAGES, "the image for the board")?;
+    }
+    if let Some(package) = missing_debian_linker() {
+        install(&[&package], "the image for the board")?;
     }
     if has_debian_compiler() {
         Ok(Toolchain::Debian)
@@ -111,6 +117,13 @@ fn has_target() -> bool {
             entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
         })
     })
+}
+
+/// The package, named as the program that the link leads to, where that is not there.
+fn missing_debian_linker() -> Option<String> {
+    let program = fs::read_link(DEBIAN_LINKER).ok()?;
+    let is_there = Path::new("/usr/bin").join(&program).exists();
+    if is_there { None } else { Some(program.file_name()?.to_str()?.to_string()) }
 }
 
 fn has_debian_compiler() -> bool {

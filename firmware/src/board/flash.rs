@@ -69,7 +69,8 @@ impl ConfigFlash for Sectors {
 
     fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
         let done = self.operate(timing::FLASH_WORD_TURNS, |flash| {
-            flash.cr().write(|w| w.psize().psize32().pg().set_bit());
+            // A register written whole begins from its reset value, which locks.
+            flash.cr().write(|w| w.lock().clear_bit().psize().psize32().pg().set_bit());
             // SAFETY: an aligned word of flash that no variable lies in, open for programming.
             unsafe { Self::address(slot, index).write_volatile(word) };
             cortex_m::asm::dsb();
