@@ -167,7 +167,15 @@ fn patch(s: &Search, last: &Candidate) -> Rig {
     let theta = last.fit.theta(0);
     for (index, effect) in last.model.effects.iter().enumerate() {
         let mut effect = effect.clone();
-        if let Some(law) = crate::effects::Law::new(&effect) {
+        if effect.name == EffectName::MissedCounts {
+            // The steps of the first recording, as they happened.
+            let track = &s.fit_tracks[0];
+            for (i, w) in track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]) {
+                let n = effect.shape.len() + 1;
+                effect.shape.insert(format!("time_{n}"), track.start[i + 1]);
+                effect.coefficients.insert(format!("step_{n}"), w[1] - w[0]);
+            }
+        } else if let Some(law) = crate::effects::Law::new(&effect) {
             for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
                 let Key::Term { effect: e, term } = column.key else { continue };
                 if e != index {
@@ -266,6 +274,10 @@ fn place(s: &Search, last: &Candidate, index: usize) -> Place {
     place
 }
 
+/// Part of the force below which what hangs together over time casts no doubt.
+const LEFT_MATTERS: f64 = 0.025;
+/// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
+const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
 /// Part by which a refit must lower the held-out residual before values are called wrong.
@@ -309,14 +321,29 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = if explained > 0.0 { left / explained } else { 0.0 };
-    let doubt = 1.0 / (1.0 + (leftover / 0.6).powi(2));
+    let matters = left.sqrt() > LEFT_MATTERS * table.force_rms.fit;
+    let doubt = if matters { 1.0 / (1.0 + (leftover / 0.6).powi(2)) } else { 1.0 };
+    // A model that leaves half of the force has not understood it, whatever it names.
+    let understood = table.patched.holdout < 0.5 * table.force_rms.holdout;
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
         let mut class = vec![name];
         let mut near: Vec<&Rival> = one.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < BEHIND).collect();
         near.sort_by(|a, b| a.z.total_cmp(&b.z));
-        class.extend(near.iter().take(2).map(|r| r.name));
+        // What no recording of motion tells apart: a drive that clips and a roller that slips at a constant force.
+        if name == EffectName::CommandSaturation {
+            class.push(EffectName::RollerSlip);
+        }
+        // A spring that explains little of what it should explain may well have a gap.
+        if name == EffectName::DriveCompliance && table.patched.fit.powi(2) > 0.3 * table.refit.fit.powi(2) {
+            class.push(EffectName::Backlash);
+        }
+        for rival in near {
+            if class.len() < 3 && !class.contains(&rival.name) {
+                class.push(rival.name);
+            }
+        }
         let named = Named {
             name,
             subsystem: name.subsystem(),
@@ -328,7 +355,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         };
         effects.push((one.holdout.sum, named));
     }
-    effects.retain(|(_, e)| e.confidence >= 0.5);
+    effects.retain(|(_, e)| e.confidence >= 0.5 && understood);
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
     let above = |x: f64| (x * x - floor * floor).max(0.0);
@@ -339,9 +366,20 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let carries = maps.iter().any(|m| m.significant && m.carries > 0.1);
     let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
     let refit_matters = table.refit.holdout < (1.0 - REFIT_MATTERS) * table.nominal.holdout;
+    let foreign = table.patched.holdout > FOREIGN * table.force_rms.holdout
+        && table.patched.fit > FOREIGN * table.force_rms.fit;
+    if foreign {
+        return Ok(Outcome::cannot_tell(
+            &nominal.rig,
+            format!(
+                "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is off                  (seconds, counts, command) or where the axis is moved by something that was not recorded",
+                100.0 * table.patched.holdout / table.force_rms.holdout.max(1e-300)
+            ),
+        ));
+    }
     let verdict = if !effects.is_empty() {
         Verdict::MissingPhysics
-    } else if (disturbed && carries) || !found.is_empty() {
+    } else if disturbed && (carries || (understood && !found.is_empty())) {
         Verdict::Unexplained
     } else if disturbed {
         Verdict::RandomDisturbance

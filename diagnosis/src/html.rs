@@ -87,11 +87,11 @@ fn what(out: &mut String, outcome: &Outcome) {
 fn one(out: &mut String, effect: &Named) {
     let _ = write!(
         out,
-        "<article><h3>{} <em>{:.0} % sure</em></h3><p><code>{}</code>, in the {:?}</p>",
+        "<article><h3>{} <em>{:.0} % sure</em></h3><p><code>{}</code>, in the {}</p>",
         safe(effect.name.in_words()),
         100.0 * effect.confidence,
         effect.name,
-        effect.subsystem
+        format!("{:?}", effect.subsystem).to_lowercase()
     );
     if !effect.parameters.is_empty() {
         out.push_str(

@@ -10,8 +10,6 @@ use crate::track::{Total, Track};
 
 /// A model laid on one held-out recording.
 pub(crate) struct Laid {
-    /// Coefficient of each column.
-    pub(crate) theta: Vec<f64>,
     pub(crate) total: Total,
     /// Cost of each segment, in log-likelihood.
     pub(crate) costs: Vec<f64>,
@@ -189,7 +187,7 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
         .zip(one.weights())
         .map(|(square, (_, count))| 0.5 * count * tolerant(square / count).0)
         .collect();
-    Laid { total: total(track, &one.columns, &theta), theta, costs }
+    Laid { total: total(track, &one.columns, &theta), costs }
 }
 
 /// Deterministic pseudo-random numbers (xorshift64*), seeded by a constant.

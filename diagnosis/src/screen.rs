@@ -1,6 +1,6 @@
 //! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
 
-use crate::effects::Effect;
+use crate::effects::{Effect, EffectName};
 use crate::fit::{Fit, dot};
 use crate::model::{Model, effect_inputs, effective_command, own_phase};
 use crate::solve::{Factor, Square};
@@ -11,13 +11,13 @@ use rayon::prelude::*;
 /// any balance of forces, and so explains nothing.
 const EXPLAINED_AWAY: f64 = 0.35;
 
+const CLIPPED_AWAY: f64 = 0.6;
+
 /// What a score test says.
 #[derive(Debug, Clone)]
 pub(crate) struct Score {
     /// Gain of log-likelihood if the terms were free.
     pub(crate) gain: f64,
-    /// Coefficients; those of each recording one after another where phases are their own.
-    pub(crate) coefficients: Vec<f64>,
 }
 
 /// Whitened responses of an effect's terms over each recording: `[recording][term][block]`.
@@ -33,7 +33,8 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
         let after = effective_command(track, &with).expect("the effect acts on the command");
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         let size = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
-        if size(&change) > EXPLAINED_AWAY * size(command) {
+        let most = if effect.name == EffectName::CommandDeadband { EXPLAINED_AWAY } else { CLIPPED_AWAY };
+        if size(&change) > most * size(command) {
             return vec![Input::Held(vec![0.0; track.blocks()])];
         }
         return vec![track.rows_input(&change)];
@@ -113,7 +114,7 @@ pub(crate) fn score(
         // The change of the command enters with the gain itself, or the shape would mean nothing.
         let gain = fit.value(crate::model::Key::Gain).unwrap_or(0.0);
         let value = gain * sums.score[0] - 0.5 * gain * gain * sums.information.at(0, 0);
-        return Score { gain: if value.is_finite() { value } else { 0.0 }, coefficients: vec![gain] };
+        return Score { gain: if value.is_finite() { value } else { 0.0 } };
     }
     let coefficients = Factor::new(&sums.information).solve(&sums.score);
     let mut gain = 0.5 * dot(&coefficients, &sums.score);
@@ -122,7 +123,7 @@ pub(crate) fn score(
         let x = coefficients[0].clamp(low, high);
         gain = x * sums.score[0] - 0.5 * x * x * sums.information.at(0, 0);
     }
-    Score { gain: if gain.is_finite() { gain } else { 0.0 }, coefficients }
+    Score { gain: if gain.is_finite() { gain } else { 0.0 } }
 }
 
 /// The best shape of an effect on its grid, with its gain.

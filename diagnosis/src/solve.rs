@@ -17,12 +17,6 @@ impl Square {
     pub(crate) fn add(&mut self, i: usize, j: usize, x: f64) {
         self.a[i * self.n + j] += x;
     }
-    /// Adds another of the same size.
-    pub(crate) fn plus(&mut self, other: &Self, times: f64) {
-        for (a, b) in self.a.iter_mut().zip(&other.a) {
-            *a += times * b;
-        }
-    }
 }
 
 /// Cholesky factor of a symmetric matrix scaled to a unit diagonal; directions without information are left out.
@@ -67,11 +61,6 @@ impl Factor {
             }
         }
         Self { n, l, scale, live }
-    }
-
-    /// Whether a direction has information of its own beside those before it.
-    pub(crate) fn is_live(&self, i: usize) -> bool {
-        self.live[i]
     }
 
     pub(crate) fn solve(&self, b: &[f64]) -> Vec<f64> {

@@ -4,9 +4,9 @@ use crate::fit::{Fit, dot};
 use crate::track::{Input, Track};
 
 /// Gain of log-likelihood of a single jump: above every jump that noise makes in a recording.
-const PER_JUMP: f64 = 25.0;
+const PER_JUMP: f64 = 14.0;
 /// A jump of position must explain this many times what a jump of speed would: impacts are forces.
-const OVER_IMPACT: f64 = 2.0;
+const OVER_IMPACT: f64 = 1.3;
 /// Most jumps per recording, fewest for it to be a fault, and the reach of a response in blocks.
 const MOST: usize = 60;
 const FEWEST: usize = 2;

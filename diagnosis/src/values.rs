@@ -222,8 +222,13 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             let relative = found.name == N::TorqueRipple;
             let waves = waves_of(&candidate.model, effect);
             let turn = found.shape.get("turn").copied();
+            // Free periods are numbered from the strongest.
+            let size = |k: usize| term(2 * k).0.hypot(term(2 * k + 1).0);
+            let mut by_size: Vec<usize> = (0..waves.len()).collect();
+            by_size.sort_by(|a, b| size(*b).total_cmp(&size(*a)));
             let mut square = (0.0, 0.0);
-            for (k, wave) in waves.iter().enumerate() {
+            for (rank, k) in by_size.into_iter().enumerate() {
+                let wave = waves[k];
                 let (x, s) = sized(&[term(2 * k), term(2 * k + 1)]);
                 let (v, s) = if relative { ((x / ratio).abs(), (s / ratio).abs()) } else { scaled((x, s)) };
                 let unit = if relative { "1" } else { force };
@@ -233,9 +238,10 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
                         put(&format!("order_{order}"), v, s, unit.into());
                     }
                     None => {
-                        put(&format!("amplitude_{}", k + 1), v, s, unit.into());
+                        put(&format!("amplitude_{}", rank + 1), v, s, unit.into());
                         let period = std::f64::consts::TAU / wave;
-                        let name = if k == 0 { "period".to_owned() } else { format!("period_{}", k + 1) };
+                        let name =
+                            if rank == 0 { "period".to_owned() } else { format!("period_{}", rank + 1) };
                         put(&name, period, 0.002 * period, length.into());
                     }
                 }

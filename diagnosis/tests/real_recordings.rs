@@ -1,0 +1,88 @@
+//! The diagnosis on recordings of real machines, where they are at hand. They are not part of the project: where they are
+//! absent these tests say so and check nothing.
+
+use diagnosis::effects::EffectName;
+use diagnosis::{Outcome, Request, Verdict, diagnose};
+use std::path::PathBuf;
+
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("DID NOT RUN: {} is not here", path.display());
+    None
+}
+
+fn run(dir: &std::path::Path, fit: &[&str], held: &[&str]) -> Outcome {
+    let list = |names: &[&str]| names.iter().map(|name| dir.join(name)).collect();
+    let request = Request { rig: dir.join("rig.toml"), fit: list(fit), holdout: list(held) };
+    diagnose(&request, &|_, _| ()).expect("the recordings are usable")
+}
+
+fn names(outcome: &Outcome) -> Vec<EffectName> {
+    outcome.report.effects.iter().map(|e| e.name).collect()
+}
+
+/// Part of the held-out force that the patched model leaves, root mean square, per cent.
+fn held_error(outcome: &Outcome) -> f64 {
+    100.0 * outcome.report.fit.patched.holdout / outcome.report.fit.force_rms.holdout
+}
+
+#[test]
+fn emps_names_dry_friction_then_direction_or_did_not_run() {
+    let Some(dir) = shared("emps") else { return };
+    for (fit, held) in [("train.csv", "pulses.csv"), ("pulses.csv", "train.csv")] {
+        let outcome = run(&dir, &[fit], &[held]);
+        println!("{}", outcome.summary());
+        assert_eq!(outcome.report.verdict, Verdict::MissingPhysics);
+        let names = names(&outcome);
+        assert_eq!(names[0], EffectName::CoulombFriction);
+        assert_eq!(names[1], EffectName::AsymmetricFriction);
+        assert!(held_error(&outcome) <= 5.4, "force error {:.2} %", held_error(&outcome));
+        // Published: 20.39 N; and (166.7 − 240.4)/(166.7 + 240.4) = −0.181.
+        let coulomb = outcome.report.effects[0].parameters["coulomb"].value;
+        assert!((19.5..21.5).contains(&coulomb), "{coulomb} N");
+        let asymmetry = outcome.report.effects[1].parameters["viscous_asymmetry"].value;
+        assert!((-0.21..-0.15).contains(&asymmetry), "{asymmetry}");
+        assert!(outcome.report.unexplained_fraction > 0.005, "something remains and must be said");
+    }
+}
+
+#[test]
+fn emps_ripple_of_2_5_mm_is_found_or_did_not_run() {
+    let Some(dir) = shared("emps") else { return };
+    let outcome = run(&dir, &["train.csv"], &["pulses.csv"]);
+    let cogging = outcome.report.effects.iter().find(|e| e.name == EffectName::Cogging);
+    let cogging = cogging.expect("the ripple is named");
+    let period = cogging.parameters["period"].value;
+    assert!((period - 0.0025).abs() < 2e-5, "{period} m");
+    let amplitude = cogging.parameters["amplitude_1"].value;
+    assert!((0.8..1.3).contains(&amplitude), "{amplitude} N");
+}
+
+#[test]
+fn anticogging_names_cogging_or_did_not_run() {
+    let Some(dir) = shared("anticogging") else { return };
+    let outcome =
+        run(&dir, &["tenth_rev_per_s_a.csv", "tenth_rev_per_s_b.csv"], &["slower_0_03_rev_per_s.csv"]);
+    println!("{}", outcome.summary());
+    assert_eq!(names(&outcome)[0], EffectName::Cogging);
+    let parameters = &outcome.report.effects[0].parameters;
+    assert!(parameters.contains_key("order_7") && parameters.contains_key("order_28"));
+    let strongest = parameters
+        .iter()
+        .filter(|(k, _)| k.starts_with("order_"))
+        .max_by(|a, b| a.1.value.total_cmp(&b.1.value));
+    assert_eq!(strongest.expect("there are orders").0, "order_7");
+    // Variance of the held-out force about its mean that is explained.
+    let series = outcome.evidence.series.iter().find(|s| s.held_out).expect("one is held out");
+    let variance = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / values.len() as f64
+    };
+    let (force, left): (Vec<f64>, Vec<f64>) =
+        series.force.iter().zip(&series.patched).filter_map(|(f, p)| p.map(|p| (*f, p))).unzip();
+    let explained = 1.0 - variance(&left) / variance(&force);
+    assert!(explained >= 0.85, "{explained:.3} of the variance explained");
+}

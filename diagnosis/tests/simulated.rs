@@ -1,0 +1,152 @@
+//! Verdicts on recordings of a small simulator: nulls, wrong values, disturbance, effects, and input that cannot tell.
+
+mod common;
+
+use common::{Setup, record, rig};
+use diagnosis::effects::EffectName;
+use diagnosis::recording::Recording;
+use diagnosis::rig::Rig;
+use diagnosis::{Outcome, Verdict, diagnose_recordings};
+
+fn setup(effect: &'static str) -> Setup {
+    Setup { effect, size: 1.0, closed: false, rate: 1000.0, seconds: 12.0, disturbance: 0.05, seed: 5 }
+}
+
+fn run(rig: &Rig, setup: &Setup) -> Outcome {
+    diagnose_recordings(rig, &[record(setup, 1)], &[record(setup, 2)], &|_, _| ()).expect("usable")
+}
+
+const OFFSET: &str = "offset = 0.0";
+const OFF: [f64; 4] = [0.1, -0.3, 0.3, -0.05];
+
+#[test]
+fn a_null_is_no_mismatch() {
+    for closed in [false, true] {
+        let outcome = run(&rig([0.0; 4], OFFSET), &Setup { closed, ..setup("none") });
+        assert_eq!(outcome.report.verdict, Verdict::NoMismatch, "{}", outcome.summary());
+    }
+}
+
+#[test]
+fn wrong_values_are_parameters_only() {
+    for closed in [false, true] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed, ..setup("none") });
+        assert_eq!(outcome.report.verdict, Verdict::ParametersOnly, "{}", outcome.summary());
+    }
+}
+
+#[test]
+fn a_pure_disturbance_is_called_one() {
+    for closed in [false, true] {
+        let outcome = run(&rig([0.0; 4], OFFSET), &Setup { closed, ..setup("random_disturbance") });
+        assert_eq!(outcome.report.verdict, Verdict::RandomDisturbance, "{}", outcome.summary());
+    }
+}
+
+#[test]
+fn strong_effects_are_named_with_their_values() {
+    // Effect, parameter, true value, tolerance.
+    let cases: [(&'static str, &str, f64, f64); 8] = [
+        ("quadratic_drag", "coefficient", 4e-7, 0.2),
+        ("cogging", "order_4", 1.2e-4, 0.2),
+        ("friction_drift", "change", -0.5, 0.15),
+        ("gain_drift", "change", -0.3, 0.15),
+        ("command_deadband", "half_width", 0.012, 0.1),
+        ("electrical_lag", "time_constant", 0.004, 0.15),
+        ("tilt_gravity", "weight", 5e-4, 0.2),
+        ("load_dependent_friction", "coefficient", 0.5, 0.2),
+    ];
+    for (effect, parameter, truth, tolerance) in cases {
+        let outcome = run(&rig(OFF, OFFSET), &setup(effect));
+        let found =
+            outcome.report.effects.first().unwrap_or_else(|| panic!("{effect}: {}", outcome.summary()));
+        assert_eq!(found.name.as_str(), effect, "{}", outcome.summary());
+        let value = found.parameters[parameter].value;
+        assert!(
+            ((value - truth) / truth).abs() < tolerance,
+            "{effect}: {parameter} {value} instead of {truth}"
+        );
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_answer_to_the_last_digit() {
+    let rig = rig(OFF, OFFSET);
+    let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");
+    let again = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");
+    assert_eq!(once, again);
+}
+
+fn verdict_of(change: impl Fn(&mut Recording)) -> Result<Outcome, diagnosis::InputError> {
+    let (mut fit, mut held) = (record(&setup("none"), 1), record(&setup("none"), 2));
+    change(&mut fit);
+    change(&mut held);
+    diagnose_recordings(&rig([0.0; 4], OFFSET), &[fit], &[held], &|_, _| ())
+}
+
+fn keep(recording: &mut Recording, which: impl Fn(usize) -> bool) {
+    for column in [&mut recording.time_s, &mut recording.command, &mut recording.position_counts] {
+        let mut index = 0;
+        column.retain(|_| {
+            index += 1;
+            which(index - 1)
+        });
+    }
+}
+
+#[test]
+fn what_cannot_tell_is_not_named() {
+    type Change = Box<dyn Fn(&mut Recording)>;
+    let cases: Vec<(&str, Change)> = vec![
+        ("constant command", Box::new(|r| r.command.fill(0.1))),
+        ("one second", Box::new(|r| keep(r, |i| i < 1000))),
+        ("50 Hz", Box::new(|r| keep(r, |i| i % 20 == 0))),
+        ("milliseconds", Box::new(|r| r.time_s.iter_mut().for_each(|t| *t *= 1000.0))),
+        ("counts a thousandfold", Box::new(|r| r.position_counts.iter_mut().for_each(|c| *c *= 1000.0))),
+        (
+            "counts a thousandth",
+            Box::new(|r| r.position_counts.iter_mut().for_each(|c| *c = (*c / 1000.0).round())),
+        ),
+        ("command a thousandfold", Box::new(|r| r.command.iter_mut().for_each(|u| *u *= 1000.0))),
+        ("command a thousandth", Box::new(|r| r.command.iter_mut().for_each(|u| *u /= 1000.0))),
+        ("no motion", Box::new(|r| r.position_counts.fill(7.0))),
+    ];
+    for (name, change) in cases {
+        match verdict_of(change) {
+            Ok(outcome) => {
+                assert_eq!(
+                    outcome.report.verdict,
+                    Verdict::InsufficientExcitation,
+                    "{name}: {}",
+                    outcome.summary()
+                );
+                assert!(
+                    outcome.report.reason.is_some() && outcome.report.separating_experiment.is_some(),
+                    "{name}"
+                );
+                assert!(outcome.report.effects.is_empty());
+            }
+            Err(error) => {
+                assert!(!error.to_string().contains('\n') && error.to_string().len() > 20, "{name}: {error}")
+            }
+        }
+    }
+}
+
+#[test]
+fn files_are_written_whole_and_the_patched_rig_reads_back() {
+    let outcome = run(&rig(OFF, OFFSET), &setup("cogging"));
+    let dir = std::env::temp_dir().join(format!("diagnosis-{}", std::process::id()));
+    outcome.write(&dir).expect("can be written");
+    let patched = Rig::read(&dir.join("patched-rig.toml")).expect("reads back");
+    assert_eq!(patched.effects.len(), 1);
+    assert_eq!(patched.effects[0].name, EffectName::Cogging);
+    let json = std::fs::read_to_string(dir.join("diagnosis.json")).expect("written");
+    let report: diagnosis::Report = serde_json::from_str(&json).expect("reads back");
+    assert_eq!(report.effects.len(), outcome.report.effects.len());
+    let csv = std::fs::read_to_string(dir.join("residuals.csv")).expect("written");
+    assert!(csv.starts_with("recording,time_s,velocity,nominal,refit,patched\n"));
+    assert!(std::fs::read_to_string(dir.join("report.html")).expect("written").contains("</html>"));
+    assert_eq!(std::fs::read_dir(&dir).expect("there").count(), 4, "no half-written file stays");
+    std::fs::remove_dir_all(&dir).expect("can be removed");
+}
