@@ -19,6 +19,8 @@ const HEARTBEAT_MS: u64 = 50;
 /// How long the PC waits for a port, and for an answer.
 const PORT_MS: u64 = 3_000;
 const ANSWER_MS: u64 = 200;
+/// How often it says hello in that time.
+const HELLOS: u64 = 2;
 
 /// What the device has said.
 #[derive(Debug, Default)]
@@ -87,11 +89,14 @@ impl Pc {
     pub fn hello(&mut self, board: &mut Board) {
         self.reception = Reception::default();
         self.heard = Heard::default();
-        self.send(board, Command::Hello { version: PROTOCOL_VERSION });
-        for _ in 0..ANSWER_MS {
-            self.run_ms(board, 1);
-            if self.heard.hello.is_some() {
-                return;
+        // What waited on the cable may swallow the first answer: a PC asks again.
+        for _ in 0..HELLOS {
+            self.send(board, Command::Hello { version: PROTOCOL_VERSION });
+            for _ in 0..ANSWER_MS / HELLOS {
+                self.run_ms(board, 1);
+                if self.heard.hello.is_some() {
+                    return;
+                }
             }
         }
         panic!("no answer to a hello within {ANSWER_MS} ms");

@@ -257,7 +257,22 @@ fn stop(page: &mut Page) -> Result<(), Failure> {
     page.wait("a start", SOON, running)?;
     page.click("demo")?;
     page.wait("the demo", SOON, "document.getElementById('hand-note').textContent.startsWith('Demo')")?;
-    page.wait("the scripted hand", A_FEW_INSERTIONS, "__stats.depthMm > 6")
+    page.wait("the scripted hand", A_FEW_INSERTIONS, "__stats.depthMm > 6")?;
+    // Arrow keys take the needle from the script, too, and hold it.
+    page.evaluate("document.getElementById('section').focus()")?;
+    for _ in 0..5 {
+        page.press("ArrowLeft", "ArrowLeft", 37)?;
+    }
+    page.wait(
+        "the needle taken",
+        SOON,
+        "document.getElementById('hand-note').textContent.startsWith('You hold')",
+    )?;
+    std::thread::sleep(Duration::from_millis(2_500));
+    let held = page.number("__stats.depthMm")?;
+    let wanted = page.number("Number(document.getElementById('section').getAttribute('aria-valuenow'))")?;
+    check("the needle where the keys put it", (held - wanted).abs() < 0.4, (held, wanted))?;
+    page.click("demo")
 }
 
 /// The program ends and is started again: the page says so, shows old data as old, and is back by itself.

@@ -67,6 +67,7 @@ fn a_tick_takes_at_most_five_per_cent_of_the_processor() {
     let (used, size) = board.stack_use().expect("the image says where its stack is");
     println!("stack: {used} of {size} bytes");
     println!("the firmware's own times: {:?}", pc.heard.timing.map(|timing| timing.stages));
+    println!("tick_instructions_longest={}", worst.0);
     assert!(worst.0 <= WANTED, "a tick of {} instructions in state {}", worst.0, worst.1);
     assert!(2 * used <= size, "less than half of the stack is left: {used} of {size} bytes");
 }
