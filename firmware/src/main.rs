@@ -1,11 +1,14 @@
 //! On the board: the firmware (`app.rs` the tasks, `board.rs` the wiring). On a PC: a launcher that builds the image, flashes it
 //! through a debug probe and shows its log, so that `cargo run -p firmware --release` does what it says.
 #![cfg_attr(target_os = "none", no_std, no_main)]
+// Direct access to registers has its few places, each with its reason; everything else is held to the safe language.
+#![deny(unsafe_code)]
 
 #[cfg(target_os = "none")]
 use defmt_rtt as _;
 
 #[cfg(target_os = "none")]
+#[allow(unsafe_code, reason = "RTIC writes the interrupts' entries")]
 mod app;
 #[cfg(target_os = "none")]
 mod board;

@@ -37,6 +37,7 @@ pub(crate) static DISCARD: AtomicBool = AtomicBool::new(false);
 static TILT_MRAD: AtomicI32 = AtomicI32::new(0);
 
 /// What survives a reset: start-up code leaves this section alone.
+#[allow(unsafe_code, reason = "any bits are valid in it, and it says itself which mean something")]
 #[unsafe(link_section = ".uninit.last_words")]
 pub(crate) static LAST_WORDS: LastWords = LastWords::new();
 
