@@ -2,7 +2,7 @@
 //!
 //! A tick, as data: count → [`kinematics`] (depth, speed) → [`tissue`] (layers, their state, the force law) → torque →
 //! [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
-//! operating mode; [`config`] turns what a person wrote into a validated [`config::Plan`] or refuses it with the reason.
+//! operating mode; [`config`] is what a person writes and [`plan`] what may run, or the reason why not.
 //!
 //! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board and the simulator run
 //! the very same code.
