@@ -4,6 +4,8 @@
 const KEY_STEP_MM = 0.2;
 /** How far the hand may be moved from the entry point. */
 const REACH_MM = { low: -30, high: 60 };
+/** The server hears of a new hand a little later; until then what it says of the old one does not count. */
+const NEWS_MS = 500;
 
 export class Hand {
   /**
@@ -21,6 +23,7 @@ export class Hand {
     this.actual = 0; // where the tip is, mm
     this.pointer = null;
     this.unsent = false;
+    this.takenAt = -Infinity;
     canvas.addEventListener("pointerdown", (event) => this.take(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.letGo(event));
@@ -46,6 +49,7 @@ export class Hand {
     this.actual = depth;
     const person = this.movable && hand === "person";
     if (person === this.person || this.pointer !== null) return;
+    if (this.person && performance.now() - this.takenAt < NEWS_MS) return;
     this.person = person;
     if (person) this.depth = depth;
     this.say();
@@ -54,7 +58,7 @@ export class Hand {
   say() {
     this.demo.disabled = !this.person;
     let text = "Moved by hand, on the device";
-    if (this.movable) text = this.person ? "You hold the needle: drag, or arrow keys" : "Demo hand: drag the needle to take it";
+    if (this.movable) text = this.person ? "You hold the needle: drag, or arrow keys" : "Demo hand: drag to take the needle";
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 
@@ -72,6 +76,7 @@ export class Hand {
     this.unsent = true;
     if (!this.person) {
       this.person = true;
+      this.takenAt = performance.now();
       this.say();
     }
   }

@@ -144,6 +144,7 @@ export class TimePlot {
     g.textAlign = "left";
     g.textBaseline = "middle";
     g.lineWidth = 1;
+    let free = left;
     for (const mark of this.marks) {
       const x = Math.round(left + wide * (1 - (now - mark.t) / WINDOW_S)) + 0.5;
       if (x < left || x > left + wide) continue;
@@ -156,7 +157,10 @@ export class TimePlot {
       g.setLineDash([]);
       g.fillStyle = this.colours.muted;
       // A name waits until there is room for it.
-      if (x + 4 + g.measureText(mark.text).width < left + wide) g.fillText(mark.text, x + 4, between);
+      const end = x + 4 + g.measureText(mark.text).width;
+      if (x < free || end > left + wide) continue;
+      g.fillText(mark.text, x + 4, between);
+      free = end;
     }
   }
 }

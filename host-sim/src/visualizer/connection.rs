@@ -30,7 +30,7 @@ pub(super) async fn run(socket: WebSocket, shared: Shared) {
         why = obey(stream, &shared) => why,
     };
     if let Some(why) = why {
-        let frame = CloseFrame { code: close_code::POLICY, reason: shortened(why).into() };
+        let frame = CloseFrame { code: close_code::POLICY, reason: shortened(why) };
         // It may have gone already.
         let _ = timeout(SEND_TIMEOUT, sink.send(Message::Close(Some(frame)))).await;
     }
