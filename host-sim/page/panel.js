@@ -114,7 +114,8 @@ export class Panel {
     else chip("link", "Link: nothing lost", "good");
     const recording = link.recording;
     const name = recording ? recording.file.split(/[\\/]/).at(-1) : "";
-    if (recording) chip("recording", `Recording ${name}, ${(recording.bytes / 1e6).toFixed(1)} MB`, "bad");
+    if (condition === "lost") chip("recording", "Recording not known", "off");
+    else if (recording) chip("recording", `Recording ${name}, ${(recording.bytes / 1e6).toFixed(1)} MB`, "bad");
     else chip("recording", "Not recording", "off");
   }
 

@@ -144,9 +144,10 @@ export class TimePlot {
     g.textAlign = "left";
     g.textBaseline = "middle";
     g.lineWidth = 1;
-    let free = left;
-    for (const mark of this.marks) {
-      const x = Math.round(left + wide * (1 - (now - mark.t) / WINDOW_S)) + 0.5;
+    const place = (mark) => Math.round(left + wide * (1 - (now - mark.t) / WINDOW_S)) + 0.5;
+    for (let i = 0; i < this.marks.length; i++) {
+      const { text } = this.marks[i];
+      const x = place(this.marks[i]);
       if (x < left || x > left + wide) continue;
       g.strokeStyle = this.colours.muted;
       g.setLineDash([3, 3]);
@@ -155,12 +156,12 @@ export class TimePlot {
       g.lineTo(x, bottom);
       g.stroke();
       g.setLineDash([]);
+      // Names stand to the left of the first line of a close pair and to the right of all others, once there is room.
+      const long = g.measureText(text).width + 8;
+      const crowded = i + 1 < this.marks.length && place(this.marks[i + 1]) < x + long;
       g.fillStyle = this.colours.muted;
-      // A name waits until there is room for it.
-      const end = x + 4 + g.measureText(mark.text).width;
-      if (x < free || end > left + wide) continue;
-      g.fillText(mark.text, x + 4, between);
-      free = end;
+      if (crowded && x - long > left) g.fillText(text, x - long + 4, between);
+      else if (!crowded && x + long < left + wide) g.fillText(text, x + 4, between);
     }
   }
 }
