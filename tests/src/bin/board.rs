@@ -88,7 +88,8 @@ fn run(options: Options) -> Result<(), String> {
     println!("the device's serial port: {path}");
 
     board.at_stop(|stopped| stopped.usb().host.plug());
-    let (started, mut port, mut enabled) = (Instant::now(), Port::Absent, false);
+    let (mut port, mut enabled) = (Port::Absent, false);
+    let (mut started, mut paced_from) = (Instant::now(), board.now());
     let mut waiting = Vec::new();
     loop {
         board.run_ms(1);
@@ -129,8 +130,12 @@ fn run(options: Options) -> Result<(), String> {
             return Ok(());
         }
         if !options.fast {
-            let ahead = Duration::from_nanos(board.now()).saturating_sub(started.elapsed());
-            std::thread::sleep(ahead);
+            let device = Duration::from_nanos(board.now() - paced_from);
+            match device.checked_sub(started.elapsed()) {
+                Some(ahead) => std::thread::sleep(ahead),
+                // Time that was lost is not made up for: the device would find its PC too slow.
+                None => (started, paced_from) = (Instant::now(), board.now()),
+            }
         }
     }
 }
