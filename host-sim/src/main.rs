@@ -1,6 +1,14 @@
 //! The command line of the needle device's PC side. It parses, calls the library, prints, and turns failures into one line
 //! and an exit status: 1 when what was asked for did not work out, 2 for unusable input.
 
+/// Prints a line. A pipe that nobody reads any longer is no reason to fail.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 mod cli;
 
 use clap::Parser;

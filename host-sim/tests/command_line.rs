@@ -33,6 +33,12 @@ fn a_minute_takes_seconds_and_loses_nothing() {
     // Twice 8 mm of depth, and a tremor on top.
     assert!((16.0..20.0).contains(&figure(&scored, "mean_path_mm")), "{scored}");
     assert!(run_well(&["score", text(&mcap), "--json"]).contains("\"angle_error_deg\""));
+
+    // Into a pipe that is closed at once, as `| head` does.
+    let mut child = host_sim(&["score", text(&mcap)]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    drop(child.as_mut().expect("the program starts").stdout.take());
+    let output = child.and_then(|child| child.wait_with_output()).expect("it ends");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
 #[test]

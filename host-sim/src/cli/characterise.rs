@@ -66,10 +66,10 @@ impl Characterise {
         };
         drop(bar);
         for path in written::write_all(&self.out, &tracks)? {
-            println!("{}", path.display());
+            say!("{}", path.display());
         }
         for track in &tracks {
-            println!("{} rows={}", track.file, track.samples.len());
+            say!("{} rows={}", track.file, track.samples.len());
         }
         Ok(())
     }

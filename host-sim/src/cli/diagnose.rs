@@ -45,8 +45,8 @@ impl Diagnose {
                 self.out.display()
             ))
         })?;
-        print!("{}", outcome.summary());
-        println!("report: {}", self.out.join("report.html").display());
+        say!("{}", outcome.summary().trim_end());
+        say!("report: {}", self.out.join("report.html").display());
         Ok(())
     }
 }

@@ -32,7 +32,8 @@ enum Command {
 impl Cli {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.command {
-            None => run::Run::default().run(),
+            // As if `run` had been said: its defaults stand in one place.
+            None => Self::parse_from(["host-sim", "run"]).run(),
             Some(Command::Run(command)) => command.run(),
             Some(Command::Replay(command)) => command.run(),
             Some(Command::Export(command)) => command.run(),

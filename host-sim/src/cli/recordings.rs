@@ -75,7 +75,7 @@ impl Replay {
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;
         let samples = Player::new(&recording, &publisher, &stop).run(!self.once);
-        println!("samples={samples}");
+        say!("samples={samples}");
         Ok(())
     }
 }
@@ -84,9 +84,9 @@ impl Export {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let recording = read(&self.file)?;
         let exported = export::export(&recording, &self.out)?;
-        println!("{}", exported.rig.display());
+        say!("{}", exported.rig.display());
         for (path, rows) in exported.recordings {
-            println!("{} rows={rows}", path.display());
+            say!("{} rows={rows}", path.display());
         }
         Ok(())
     }
@@ -102,10 +102,10 @@ impl Score {
         let insertions = score(&recording, &profile);
         if self.json {
             let text = serde_json::to_string_pretty(&insertions).map_err(Failure::failed)?;
-            println!("{text}");
+            say!("{text}");
             return Ok(());
         }
-        println!(
+        say!(
             "begin_s  time_s  path_mm  depth_mm  overshoot_mm  peak_force_n  punctures  vessel  angle_deg (error)"
         );
         for one in &insertions {
@@ -118,7 +118,7 @@ impl Score {
 
 fn print_row(one: &Insertion) {
     let optional = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
-    println!(
+    say!(
         "{:7.2}  {:6.2}  {:7.2}  {:8.2}  {:>12}  {:12.3}  {:9}  {:>6}  {} ({})",
         one.begin_s,
         one.time_s,
@@ -136,7 +136,7 @@ fn print_row(one: &Insertion) {
 fn print_total(all: &[Insertion]) {
     let count = all.len().max(1) as f64;
     let mean = |value: fn(&Insertion) -> f64| all.iter().map(value).sum::<f64>() / count;
-    println!(
+    say!(
         "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={}",
         all.len(),
         mean(|one| one.time_s),

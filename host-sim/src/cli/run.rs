@@ -68,22 +68,6 @@ enum Model {
     Xr,
 }
 
-impl Default for Run {
-    fn default() -> Self {
-        Self {
-            device: "virtual".into(),
-            procedure: "venepuncture".into(),
-            profile: "adult".into(),
-            model: Model::Jog,
-            headless: false,
-            seconds: None,
-            fast: false,
-            record: None,
-            port: 8710,
-        }
-    }
-}
-
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let seconds = self.check()?;
@@ -154,10 +138,10 @@ impl Run {
 
     fn report(&self, outcome: &Outcome) {
         if let (Some(path), Some(bytes)) = (&self.record, outcome.recorded_bytes) {
-            println!("recorded {bytes} bytes to {}", path.display());
+            say!("recorded {bytes} bytes to {}", path.display());
         }
         let (link, tally) = (&outcome.link, &outcome.tally);
-        println!(
+        say!(
             "samples={} frames={} lost={} punctures={} peak_force_n={:.3} lost_samples={} garbage={} vessels={} faults={}",
             tally.samples,
             link.frames,
@@ -175,16 +159,15 @@ impl Run {
 /// Serves the page and says where.
 pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
     let server = visualizer::serve(session, port).map_err(Failure::failed)?;
-    println!("visualizer at {}", server.url());
+    say!("visualizer at {}", server.url());
     Ok(server)
 }
 
 /// Ctrl-C and a polite kill end the run in good order: torque off, recording closed, last line printed.
 pub(crate) fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second one ends the program at once.
-        signal_hook::flag::register_conditional_shutdown(signal, 1, stop.clone())
-            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
+        // Not more: some send a signal twice, and the first must be able to close the recording.
+        signal_hook::flag::register(signal, stop.clone())
             .map_err(|cause| Failure::failed(format_args!("signals cannot be listened for ({cause})")))?;
     }
     Ok(())
