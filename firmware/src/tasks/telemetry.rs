@@ -20,6 +20,9 @@ use stm32f4xx_hal::pac::Interrupt;
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
 const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
 
+/// The byte at which every frame ends.
+const FRAME_END: u8 = 0;
+
 /// Telemetry's own state.
 pub(crate) struct Telemetry {
     endpoint: Endpoint,
@@ -100,6 +103,8 @@ impl Telemetry {
         let in_session = self.endpoint.in_session();
         if in_session && !self.in_session {
             shared::STAGES.forget_longest();
+            // Ends whatever half frame the USB core still held from before; nothing else is in hand yet.
+            let _ = self.filling.push(FRAME_END);
         }
         self.in_session = in_session;
     }
