@@ -218,6 +218,7 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Failure> {
     let deep = (near.0 + 60.0 * TILT_RAD.cos(), near.1 + 60.0 * TILT_RAD.sin());
     for step in 0..LATENCY_STEPS {
         // Not in step with the screen.
+        page.wait("the needle drawn back", SOON, "__stats.depthMm < 0.9")?;
         std::thread::sleep(Duration::from_millis(150 + (step as u64 * 7) % 17));
         page.mouse("mouseMoved", deep)?;
         page.wait("the force to answer", SOON, &format!("__latency.times.length > {step}"))?;

@@ -311,7 +311,8 @@ mod tests {
     fn a_puncture_is_told_with_the_force_before_the_drop() {
         let mut condenser = Condenser::default();
         let poses = vec![pose(0, 2.98, 0.99), pose(10, 3.0, 1.0), pose(20, 3.01, 0.4)];
-        let events = vec![frames::Event { tick: 14, kind: EventKind::Puncture { layer: 0 } }];
+        // The pose of the same tick is from after the drop.
+        let events = vec![frames::Event { tick: 20, kind: EventKind::Puncture { layer: 0 } }];
         let frame = condenser.take(Batch { poses, events, ..Batch::default() }).1;
         assert_eq!(frame.events[0].force_n, Some(1.0));
         assert_eq!(frame.events[0].layer, Some(0));
