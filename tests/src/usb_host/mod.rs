@@ -7,6 +7,7 @@
 
 mod control;
 pub mod descriptors;
+mod state;
 pub mod wire;
 
 use std::collections::VecDeque;
@@ -14,6 +15,8 @@ use std::collections::VecDeque;
 use control::{Ended, Transfer};
 use descriptors::{CdcPort, Identity, cdc_port, text};
 use wire::{Device, Handshake};
+
+pub use state::{Counts, Port};
 
 /// Virtual time, in nanoseconds.
 type Nanos = u64;
@@ -42,40 +45,6 @@ const CONTROL_PACKET: usize = 64;
 /// The wire time of a transaction with `bytes` of payload: 12 Mbit/s, three packets' overhead.
 fn wire_time(bytes: usize) -> Nanos {
     (bytes as u64 + 16) * 8 * 1_000 / 12
-}
-
-/// Where the port stands.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Port {
-    /// No cable, or a device that doesn't show itself.
-    Absent,
-    /// Debounce, reset or enumeration.
-    Enumerating,
-    /// The serial port is there.
-    Configured,
-    /// The serial port is there and the bus sleeps.
-    Suspended,
-    /// The device answered wrongly, and why.
-    Failed(String),
-}
-
-/// What the host counted since it was made.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// How often the serial port appeared.
-    pub enumerations: u32,
-    /// How often it went away without the cable being pulled: the device restarted.
-    pub disconnects: u32,
-    /// Transactions that the device did not answer after it was configured.
-    pub silences: u64,
-    /// Halted bulk endpoints.
-    pub stalls: u64,
-    /// IN packets with the wrong data toggle, which a host throws away.
-    pub toggle_errors: u64,
-    /// Bytes given to the application, and taken from it.
-    pub bytes_in: u64,
-    /// Bytes the device acknowledged.
-    pub bytes_out: u64,
 }
 
 #[derive(Debug)]
