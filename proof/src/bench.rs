@@ -29,17 +29,28 @@ impl Drop for Scratch {
     }
 }
 
-/// Runs every case that the time allows; records in the order of `specs`.
-pub(crate) fn run_cases(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<Vec<Record>, String> {
+/// Runs every case that the time allows; records in the order of `specs`, and how many cases no machine drawn could show.
+pub(crate) fn run_cases(
+    options: &Options,
+    specs: &[Spec],
+    tool: &dyn Tool,
+) -> Result<(Vec<Record>, usize), String> {
     let scratch = Scratch::new()?;
     let records = pool::map(options.jobs, options.budget(), "proving", specs, |spec| {
         run_case(spec, options, tool, &scratch.0)
     });
-    records.into_iter().flatten().collect()
+    let begun: Vec<Option<Record>> = records.into_iter().flatten().collect::<Result<_, String>>()?;
+    let unbuilt = begun.iter().filter(|r| r.is_none()).count();
+    Ok((begun.into_iter().flatten().collect(), unbuilt))
 }
 
-fn run_case(spec: &Spec, options: &Options, tool: &dyn Tool, scratch: &Path) -> Result<Record, String> {
-    let case = build(spec, options.seed, options.quick);
+fn run_case(
+    spec: &Spec,
+    options: &Options,
+    tool: &dyn Tool,
+    scratch: &Path,
+) -> Result<Option<Record>, String> {
+    let Some(case) = build(spec, options.seed, options.quick) else { return Ok(None) };
     let dir = scratch.join(format!("case-{:04}", spec.id));
     let paths = files::write_case(&case, &dir).map_err(|e| format!("cannot write {}: {e}", dir.display()))?;
     let start = Instant::now();
@@ -48,7 +59,7 @@ fn run_case(spec: &Spec, options: &Options, tool: &dyn Tool, scratch: &Path) -> 
     let opinions = rivals::judge(&case).to_vec();
     let record = Record::new(&case, answer, opinions, seconds);
     std::fs::remove_dir_all(&dir).map_err(|e| format!("cannot remove {}: {e}", dir.display()))?;
-    Ok(record)
+    Ok(Some(record))
 }
 
 /// Seconds that the tool takes for 60 s at 10 kHz (three recordings of 20 s), with the machine to itself.
@@ -63,7 +74,7 @@ pub(crate) fn measure_speed(seed: u64, tool: &dyn Tool) -> Result<f64, String> {
         poor: None,
         recorder: Some((10_000.0, 20.0)),
     };
-    let case = build(&spec, seed, false);
+    let case = build(&spec, seed, false).ok_or("no machine for the speed measurement; try another --seed")?;
     let dir = scratch.0.join("speed");
     let paths = files::write_case(&case, &dir).map_err(|e| format!("cannot write {}: {e}", dir.display()))?;
     let start = Instant::now();
@@ -106,13 +117,14 @@ mod tests {
             s.category == Category::Null || s.hidden == ["cogging"] || s.hidden == ["tilt_gravity"]
         });
         specs.truncate(5);
-        let records = run_cases(&options, &specs, &AlwaysCogging).unwrap();
+        let (records, unbuilt) = run_cases(&options, &specs, &AlwaysCogging).unwrap();
         let sums = sum(&records);
         assert_eq!(sums.null_alarms.hits, sums.null_alarms.trials);
         assert!(sums.false_names.hits >= 3, "{:?}", sums.false_names);
         // It improves nothing, so its share of the oracle's improvement is nothing.
         assert!(sums.shares.iter().all(|s| *s == 0.0));
-        let run = report::Run { options, tool: "a joke".into(), seconds: 1.0, speed: None, planned: 5 };
+        let run =
+            report::Run { options, tool: "a joke".into(), seconds: 1.0, speed: None, planned: 5, unbuilt };
         let text = report::markdown(&records, &sums, &run);
         assert!(text.contains("| false alarms on nulls | ≤ 1 %, upper bound ≤ 2.5 % | 100.0 %"), "{text}");
         // What goes to the tool's author holds no single case.
@@ -125,13 +137,14 @@ mod tests {
         let mut specs = list(Amounts::quick(), 11);
         specs.truncate(2);
         let text = || {
-            let records = run_cases(&options, &specs, &AlwaysCogging).unwrap();
+            let (records, unbuilt) = run_cases(&options, &specs, &AlwaysCogging).unwrap();
             let run = report::Run {
                 options: options.clone(),
                 tool: "t".into(),
                 seconds: 0.0,
                 speed: None,
                 planned: 2,
+                unbuilt,
             };
             report::markdown(&records, &sum(&records), &run)
         };

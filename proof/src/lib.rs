@@ -38,7 +38,7 @@ pub fn run(options: &Options) -> Result<(), String> {
 
 fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(), String> {
     let start = std::time::Instant::now();
-    let records = bench::run_cases(options, specs, tool)?;
+    let (records, unbuilt) = bench::run_cases(options, specs, tool)?;
     let speed = if options.quick || options.only.is_some() {
         None
     } else {
@@ -50,6 +50,7 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(),
         seconds: start.elapsed().as_secs_f64(),
         speed,
         planned: specs.len(),
+        unbuilt,
     };
     let sums = judge::sum(&records);
     print!("{}", report::terminal(&records, &sums, &run));
@@ -108,16 +109,16 @@ fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String
     };
     std::fs::create_dir_all(&keys).map_err(|e| failed(&keys, e))?;
     let written = pool::map(options.jobs, None, "writing cases", specs, |spec| {
-        let case = build(spec, options.seed, options.quick);
+        let Some(case) = build(spec, options.seed, options.quick) else { return Ok(0) };
         let name = format!("case-{:04}", spec.id);
         let folder = dir.join("cases").join(&name);
         files::write_case(&case, &folder).map_err(|e| failed(&folder, e))?;
         let key = keys.join(format!("{name}.json"));
         let text = serde_json::to_string_pretty(&files::key(&case)).map_err(|e| e.to_string())?;
-        std::fs::write(&key, text + "\n").map_err(|e| failed(&key, e))
+        std::fs::write(&key, text + "\n").map_err(|e| failed(&key, e)).map(|()| 1)
     });
-    let written: Result<Vec<()>, String> = written.into_iter().flatten().collect();
-    println!("{} cases in {}, their keys in {}", written?.len(), dir.join("cases").display(), keys.display());
+    let written: usize = written.into_iter().flatten().sum::<Result<usize, String>>()?;
+    println!("{} cases in {}, their keys in {}", written, dir.join("cases").display(), keys.display());
     Ok(())
 }
 

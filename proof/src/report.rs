@@ -21,6 +21,8 @@ pub(crate) struct Run {
     pub(crate) speed: Option<f64>,
     /// Cases that the run would have had with time for all.
     pub(crate) planned: usize,
+    /// Cases that no machine drawn could show at the strength asked for: not run.
+    pub(crate) unbuilt: usize,
 }
 
 /// (measure, wanted, measured).
@@ -53,6 +55,7 @@ fn rows(s: &Sums, run: &Run) -> Vec<[String; 3]> {
     let time = run.speed.map_or("not measured in this run".into(), |t| format!("{t:.1} s"));
     list.push(row("60 s at 10 kHz, two cores", "≤ 10 s", time));
     list.push(row("cases in which the tool gave no report", "0", s.failures.to_string()));
+    list.push(row("cases that no machine drawn could show, not run", "–", run.unbuilt.to_string()));
     list
 }
 
@@ -69,7 +72,7 @@ fn table(out: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<Str
 pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
     let mut out = String::new();
     let o = &run.options;
-    let cut = if records.len() < run.planned {
+    let cut = if records.len() + run.unbuilt < run.planned {
         format!(" of {} planned, in an order that says nothing, stopped by --minutes", run.planned)
     } else {
         String::new()
@@ -284,6 +287,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
         "draws": run.options.cases,
         "only": run.options.only,
         "planned": run.planned,
+        "unbuilt": run.unbuilt,
         "right": s.right.iter().map(rate_json).collect::<Vec<_>>(),
         "exactly_right": s.exact.iter().map(rate_json).collect::<Vec<_>>(),
         "by_effect": by_effect,

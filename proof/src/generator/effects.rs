@@ -111,7 +111,11 @@ pub(crate) fn bounds(name: &str, m: &Machine) -> (f64, f64, f64) {
         "torque_ripple" => (0.003, 0.5, 0.05),
         "command_deadband" => (0.01, 2.5, 0.2),
         // The limit stays above what friction alone asks for.
-        "command_saturation" | "roller_slip" => (0.15, 1.7, 0.7),
+        "command_saturation" => {
+            let lowest = 1.25 * m.plant.dry.coulomb / m.plant.gain;
+            (0.02, (m.peak_command / lowest - 0.9).max(0.03), 0.3)
+        }
+        "roller_slip" => (0.15, 1.7, 0.7),
         "command_delay" | "electrical_lag" => (2e-5, (0.3 / m.bandwidth).min(0.03), 1e-3),
         "gain_drift" => (0.003, 0.4, 0.06),
         "backlash" => {
@@ -195,7 +199,7 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
         }
         "command_saturation" => {
             let knee = if rng.chance(0.6) { 0.0 } else { rng.range(0.02, 0.08) };
-            plant.clip = Some(Clip { limit: (2.5 * coulomb / plant.gain / s).min(m.limit), knee });
+            plant.clip = Some(Clip { limit: (m.peak_command / (0.9 + s)).min(m.limit), knee });
         }
         "command_delay" => plant.delay = s,
         "electrical_lag" => plant.lag = s,

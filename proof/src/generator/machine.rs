@@ -49,6 +49,8 @@ pub(crate) struct Machine {
     /// Tilt is recorded.
     pub(crate) tilt: bool,
     pub(crate) clock: Clock,
+    /// |command| that the recordings exceed in 2 % of their rows; the drive's limit until it is measured.
+    pub(crate) peak_command: f64,
     /// Loop bandwidth, rad/s.
     pub(crate) bandwidth: f64,
     /// Disturbance rms as a share of the dry friction, before a strength asks for less.
@@ -192,6 +194,7 @@ impl Machine {
             weight_key,
             tilt,
             clock,
+            peak_command: limit,
             bandwidth,
             noise_share: rng.log_range(0.015, 0.06),
             plant: Plant {

@@ -234,7 +234,7 @@ fn spec(category: Category, hidden: Vec<&'static str>, strength: f64) -> Spec {
 fn a_seed_gives_the_same_files_and_another_seed_others() {
     let write = |seed: u64, tag: &str| {
         let dir = std::env::temp_dir().join(format!("proof-seed-{}-{tag}", std::process::id()));
-        let case = build(&spec(Category::Single, vec!["cogging"], 3.0), seed, true);
+        let case = build(&spec(Category::Single, vec!["cogging"], 3.0), seed, true).unwrap();
         let paths = files::write_case(&case, &dir).unwrap();
         let text = |p: &std::path::Path| std::fs::read_to_string(p).unwrap();
         let all = [text(&paths.rig), text(&paths.fit[0]), text(&paths.fit[1]), text(&paths.holdout[0])];
@@ -248,10 +248,15 @@ fn a_seed_gives_the_same_files_and_another_seed_others() {
 
 #[test]
 fn a_case_has_the_strength_asked_for_and_a_null_has_none() {
-    for (name, strength) in [("stribeck_friction", 3.0), ("command_delay", 10.0), ("tilt_gravity", 1.0)] {
-        let case = build(&spec(Category::Single, vec![name], strength), 8, true);
+    for (name, strength) in [
+        ("stribeck_friction", 3.0),
+        ("command_delay", 10.0),
+        ("tilt_gravity", 1.0),
+        ("command_saturation", 10.0),
+    ] {
+        let case = build(&spec(Category::Single, vec![name], strength), 8, true).unwrap();
         assert!((case.alone[0] / strength).ln().abs() < 0.25, "{name}: {} for {strength}", case.alone[0]);
     }
-    let null = build(&spec(Category::Null, vec![], 0.0), 8, true);
+    let null = build(&spec(Category::Null, vec![], 0.0), 8, true).unwrap();
     assert!(null.together.effect < 1e-2 * null.together.noise, "{:?}", null.together);
 }
