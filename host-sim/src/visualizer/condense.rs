@@ -121,7 +121,7 @@ impl Condenser {
     fn events(&self, batch: &Batch) -> Vec<messages::Event> {
         let before = |tick: u64| {
             let earlier =
-                |pose: &&Pose| pose.tick <= tick && tick - pose.tick <= u64::from(DEFAULT_TICK_HZ) / 10;
+                |pose: &&Pose| pose.tick < tick && tick - pose.tick <= u64::from(DEFAULT_TICK_HZ) / 10;
             batch.poses.iter().rev().find(earlier).or(self.last_pose.as_ref().filter(earlier))
         };
         batch.events.iter().map(|event| self.event(event, before(event.tick))).collect()
