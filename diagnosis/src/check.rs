@@ -8,7 +8,7 @@ const SHORTEST_S: f64 = 1.9;
 const SLOWEST_HZ: f64 = 90.0;
 const FEWEST_ROWS: usize = 300;
 /// Fewest counts of travel.
-const FEWEST_COUNTS: f64 = 24.0;
+const FEWEST_COUNTS: f64 = 100.0;
 
 /// The reason why a recording cannot tell, if there is one.
 pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {

@@ -366,14 +366,16 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let carries = maps.iter().any(|m| m.significant && m.carries > 0.1);
     let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
     let refit_matters = table.refit.holdout < (1.0 - REFIT_MATTERS) * table.nominal.holdout;
-    let foreign = table.patched.holdout > FOREIGN * table.force_rms.holdout
-        && table.patched.fit > FOREIGN * table.force_rms.fit;
+    // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something.
+    let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
+    let foreign =
+        judged.holdout > FOREIGN * table.force_rms.holdout && judged.fit > FOREIGN * table.force_rms.fit;
     if foreign {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,
             format!(
                 "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is off                  (seconds, counts, command) or where the axis is moved by something that was not recorded",
-                100.0 * table.patched.holdout / table.force_rms.holdout.max(1e-300)
+                100.0 * judged.holdout / table.force_rms.holdout.max(1e-300)
             ),
         ));
     }

@@ -83,7 +83,7 @@ impl Estimator {
 
     /// Root mean square of residuals over the rows that move.
     pub(crate) fn rms(&self, residuals: &[Vec<f64>], tracks: &[Track]) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut sum, mut count) = (0.0, 0.0_f64);
         for (residual, track) in residuals.iter().zip(tracks) {
             for (x, moving) in residual.iter().zip(self.moving(track)) {
                 if moving {
@@ -92,6 +92,6 @@ impl Estimator {
                 }
             }
         }
-        if count > 0.0 { (sum / count as f64).sqrt() } else { 0.0 }
+        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 }

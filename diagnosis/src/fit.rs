@@ -124,15 +124,18 @@ pub(crate) struct Fit {
     /// For each recording the place of each column in the common solution.
     pub(crate) places: Vec<Vec<usize>>,
     /// The key of each place and, where it is a recording's own, which.
-    pub(crate) keys: Vec<(Key, Option<usize>)>,
+    pub(crate) keys: Vec<Place>,
     pub(crate) solution: Solution,
     /// Log-likelihood with the noise it was fitted under, up to a constant of the data.
     pub(crate) log_likelihood: f64,
 }
 
+/// A place in the common vector: its key and, where it is a recording's own, which.
+type Place = (Key, Option<usize>);
+
 /// Where each column of each recording stands in the common vector of coefficients.
-pub(crate) fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<(Key, Option<usize>)>) {
-    let mut keys: Vec<(Key, Option<usize>)> = Vec::new();
+fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<Place>) {
+    let mut keys: Vec<Place> = Vec::new();
     let places = prepared
         .iter()
         .enumerate()

@@ -213,10 +213,14 @@ pub(crate) struct Gain {
     pub(crate) high: f64,
     /// Mean over standard error; neighbours are taken together so that what lasts longer than a segment counts once.
     pub(crate) z: f64,
+    /// The same with the gain of each block limited.
+    pub(crate) steady: f64,
 }
 
 /// Resamplings of the bootstrap.
 const RESAMPLED: usize = 400;
+/// Largest gain that one block counts with, in log-likelihood.
+const WITNESS: f64 = 10.0;
 /// Neighbouring segments that are taken together.
 const TOGETHER: usize = 3;
 
@@ -225,14 +229,20 @@ pub(crate) fn bootstrap(gains: &[f64]) -> Gain {
     let blocks: Vec<f64> = gains.chunks(TOGETHER).map(|c| c.iter().sum()).collect();
     let n = blocks.len();
     let sum: f64 = blocks.iter().sum();
-    let mean = sum / n as f64;
-    let variance = blocks.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n.max(2) - 1) as f64;
     let mut random = Random::new(0x9E37_79B9_7F4A_7C15);
     let mut sums: Vec<f64> = (0..RESAMPLED).map(|_| (0..n).map(|_| blocks[random.below(n)]).sum()).collect();
     sums.sort_by(f64::total_cmp);
-    let error = (variance * n as f64).sqrt();
-    let z = if error > 0.0 { sum / error } else { 0.0 };
-    Gain { sum, low: sums[RESAMPLED * 25 / 1000], high: sums[RESAMPLED * 975 / 1000], z }
+    let over_error = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / n as f64;
+        let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n.max(2) - 1) as f64;
+        let error = (variance / n as f64).sqrt();
+        if error > 0.0 { mean / error } else { 0.0 }
+    };
+    let z = over_error(&blocks);
+    // One stretch with a huge gain is one witness: each counts up to a limit.
+    let limited: Vec<f64> = blocks.iter().map(|x| x.clamp(-WITNESS, WITNESS)).collect();
+    let steady = over_error(&limited);
+    Gain { sum, low: sums[RESAMPLED * 25 / 1000], high: sums[RESAMPLED * 975 / 1000], z, steady }
 }
 
 /// Held-out gain of one model over another under the same noise.

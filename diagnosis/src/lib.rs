@@ -9,6 +9,9 @@
 //! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` (where), `conclude`, `values`
 //! and `prescribe` (what follows), `outcome` and `html` (what people read).
 
+// Matrices are read by row and column.
+#![allow(clippy::needless_range_loop)]
+
 mod check;
 mod conclude;
 pub mod effects;

@@ -83,13 +83,16 @@ pub(crate) fn maps(
                     gains.push(gain);
                 }
             }
+            // In units of a segment's mean square, so that the limit per witness means the same everywhere.
+            let unit = (whole / gains.len().max(1) as f64).max(1e-300);
+            gains.iter_mut().for_each(|gain| *gain /= unit);
             let gain: Gain = bootstrap(&gains);
             Map {
                 variable: name,
                 edges,
                 forward: sums.iter().map(|s| mean(s[0])).collect(),
                 backward: sums.iter().map(|s| mean(s[1])).collect(),
-                carries: if whole > 0.0 { gain.sum / whole } else { 0.0 },
+                carries: if whole > 0.0 { gain.sum / gains.len() as f64 } else { 0.0 },
                 significant: gain.low > 0.0 && gain.z > 2.6,
             }
         })

@@ -42,10 +42,10 @@ const SHARE: f64 = 0.05;
 impl Found {
     /// Why an effect may not be named, if it may not.
     fn weakness(&self) -> Option<String> {
-        if self.holdout.low <= 0.0 || self.holdout.z < 2.0 {
+        if self.holdout.low <= 0.0 || self.holdout.z.max(self.holdout.steady) < 2.0 {
             return Some("its gain does not carry to the held-out recordings".into());
         }
-        if self.fit.z < 2.0 {
+        if self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0 {
             return Some("its gain rests on few moments of the fitted recordings".into());
         }
         if self.share < SHARE {

@@ -1,6 +1,6 @@
 //! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
 
-use crate::effects::{Effect, EffectName};
+use crate::effects::Effect;
 use crate::fit::{Fit, dot};
 use crate::model::{Model, effect_inputs, effective_command, own_phase};
 use crate::solve::{Factor, Square};
@@ -10,8 +10,6 @@ use rayon::prelude::*;
 /// A command effect may change this part of the command's mean size at the most: a drive that ignores its command explains
 /// any balance of forces, and so explains nothing.
 const EXPLAINED_AWAY: f64 = 0.35;
-
-const CLIPPED_AWAY: f64 = 0.6;
 
 /// What a score test says.
 #[derive(Debug, Clone)]
@@ -33,8 +31,7 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
         let after = effective_command(track, &with).expect("the effect acts on the command");
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         let size = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
-        let most = if effect.name == EffectName::CommandDeadband { EXPLAINED_AWAY } else { CLIPPED_AWAY };
-        if size(&change) > most * size(command) {
+        if size(&change) > EXPLAINED_AWAY * size(command) {
             return vec![Input::Held(vec![0.0; track.blocks()])];
         }
         return vec![track.rows_input(&change)];

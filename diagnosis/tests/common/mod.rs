@@ -1,5 +1,5 @@
 //! A small simulator for calibrating thresholds: written from the physics, apart from the crate's own effect models.
-#![allow(dead_code)]
+#![allow(dead_code, unreachable_pub, missing_docs)]
 
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
@@ -67,7 +67,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
     let substeps = (40_000.0 / setup.rate).round().max(1.0) as usize;
     let dt = 1.0 / setup.rate / substeps as f64;
     let rows = (setup.seconds * setup.rate) as usize;
-    let zero = random.between(0.0, 6.28);
+    let zero = random.between(0.0, std::f64::consts::TAU);
     let (mut q, mut v) = (0.0f64, 0.0f64);
     let start = q + zero;
     let mut out = Recording {
@@ -81,7 +81,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
     };
     // Excitation: a triangle of changing height with a multisine on top.
     let tones: Vec<(f64, f64, f64)> = (0..14)
-        .map(|i| (0.4 * 1.42f64.powi(i), random.between(0.0, 6.28), random.between(0.6, 1.4)))
+        .map(|i| {
+            (0.4 * 1.42f64.powi(i), random.between(0.0, std::f64::consts::TAU), random.between(0.6, 1.4))
+        })
         .collect();
     let pace = random.between(0.22, 0.3);
     let mut slow = 0.0;
@@ -96,7 +98,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
         let jitter = random.normal() * 2e-6;
         let tilt = 0.6 * (0.7 * t).sin();
         let load = 8e-4 * (1.3 * t).sin() + 4e-4 * (4.1 * t).sin();
-        let wave: f64 = tones.iter().map(|(f, p, a)| a * (6.283 * f * t + p).sin()).sum();
+        let wave: f64 = tones.iter().map(|(f, p, a)| a * (std::f64::consts::TAU * f * t + p).sin()).sum();
         let triangle = {
             let x = (pace * t).fract();
             if x < 0.5 { 4.0 * x - 1.0 } else { 3.0 - 4.0 * x }
@@ -221,9 +223,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 let jm = J - jl;
                 let gap = if is("backlash") { 0.04 * s } else { 0.0 };
                 let k = if is("backlash") {
-                    jl * (6.283f64 * 120.0).powi(2)
+                    jl * (std::f64::consts::TAU * 120.0).powi(2)
                 } else {
-                    jl * (6.283f64 * 25.0 / s.sqrt()).powi(2)
+                    jl * (std::f64::consts::TAU * 25.0 / s.sqrt()).powi(2)
                 };
                 let twist = q - ql;
                 let wound = if twist > 0.5 * gap {
