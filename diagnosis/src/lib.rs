@@ -6,8 +6,8 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` (where), `conclude`, `values`
-//! and `prescribe` (what follows), `outcome` and `html` (what people read).
+//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` (where), `conclude`, `patch`,
+//! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
@@ -27,6 +27,7 @@ mod model;
 mod noise;
 mod null;
 mod outcome;
+mod patch;
 mod periodic;
 mod pipeline;
 mod prescribe;

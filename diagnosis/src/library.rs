@@ -22,6 +22,9 @@ pub(crate) struct Span {
     pub(crate) block: f64,
     /// One count.
     pub(crate) count: f64,
+    /// Smallest part of the largest command at which a drive may clip. Where the inertia is hardly known, a drive that
+    /// clips at little explains slow motion as well as forces in balance do.
+    pub(crate) clip: f64,
     /// Whether the columns are there and vary.
     pub(crate) tilt: bool,
     pub(crate) force: bool,
@@ -52,6 +55,7 @@ impl Span {
             row: seconds / rows,
             block: seconds / blocks,
             count: 1.0 / nominal.rig.encoder.counts_per_unit,
+            clip: if nominal.anchor.is_some() { 0.45 } else { 0.27 },
             tilt: varies(tracks.iter().flat_map(|t| column(&t.tilt))),
             force: varies(tracks.iter().flat_map(|t| column(&t.force))),
         }
@@ -121,14 +125,15 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             }
             out
         }
-        N::CommandSaturation => {
-            one("limit", (0..10).map(|i| span.command * (0.45 + 0.055 * f64::from(i))).collect())
-        }
+        N::CommandSaturation => one(
+            "limit",
+            (0..10).map(|i| span.command * (span.clip + (0.945 - span.clip) / 9.0 * f64::from(i))).collect(),
+        ),
         N::RollerSlip => {
             let mut out = Vec::new();
             for ratio in [0.6, 0.8] {
                 for i in 0..10 {
-                    let limit = span.command * (0.45 + 0.055 * f64::from(i));
+                    let limit = span.command * (span.clip + (0.945 - span.clip) / 9.0 * f64::from(i));
                     out.push(Effect::shaped(name, &[("limit", limit), ("ratio", ratio)]));
                 }
             }
@@ -171,8 +176,8 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::PreslidingFriction => vec![("deflection", 0.5 * span.count, 0.1 * span.travel())],
         N::FrictionDrift | N::GainDrift => vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)],
         N::CommandDeadband => vec![("half_width", 0.001 * span.command, 0.35 * span.command)],
-        N::CommandSaturation => vec![("limit", 0.4 * span.command, span.command)],
-        N::RollerSlip => vec![("limit", 0.4 * span.command, span.command), ("ratio", 0.3, 0.92)],
+        N::CommandSaturation => vec![("limit", 0.9 * span.clip * span.command, span.command)],
+        N::RollerSlip => vec![("limit", 0.9 * span.clip * span.command, span.command), ("ratio", 0.3, 0.92)],
         N::CommandDelay => vec![("delay", 1e-6, 0.06)],
         N::ElectricalLag => vec![("time_constant", 1e-6, 0.2)],
         N::PositionSpring if effect.shape_or("one_sided", 0.0) > 0.5 => Vec::new(),
