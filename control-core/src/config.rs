@@ -225,7 +225,7 @@ impl Default for Config {
                 stiffness: Stiffness(I16F16::from_bits(2 << 16)),
                 heartbeat_ms: 200,
             },
-            speed: SpeedMethod::EdgeTiming,
+            speed: SpeedMethod::Window,
             damping: Damping::default(),
             // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),

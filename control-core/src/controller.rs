@@ -16,6 +16,11 @@ use crate::units::{
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
+/// An encoder without a count for this long under torque is dead: 2 s.
+const FROZEN_TICKS: u32 = 2 * crate::TICK_HZ;
+/// Torque that counts for that: an eighth of the limit, several times the dry friction of motor and needle.
+const FROZEN_TORQUE_SHARE: i32 = 8;
+
 /// What the tick reads.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickInput {
@@ -94,6 +99,7 @@ pub struct Controller {
     winding: Winding,
     limiter: Limiter,
     silent_ticks: u32,
+    frozen_ticks: u32,
     tripped: Option<Fault>,
 }
 
@@ -125,6 +131,7 @@ impl Controller {
             winding: Winding::default(),
             limiter: Limiter::default(),
             silent_ticks: 0,
+            frozen_ticks: 0,
             tripped: None,
         }
     }
@@ -164,6 +171,7 @@ impl Controller {
         self.limiter.restart();
         self.observer = Observer::default();
         self.silent_ticks = 0;
+        self.frozen_ticks = 0;
         self.mode = mode;
     }
 
@@ -213,8 +221,18 @@ impl Controller {
             self.trip(Fault::EncoderJump);
         } else if is_beyond {
             self.trip(Fault::Travel);
+        } else if self.is_frozen(step) {
+            self.trip(Fault::EncoderFrozen);
         }
         count
+    }
+
+    /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead.
+    fn is_frozen(&mut self, step: i32) -> bool {
+        let pushes =
+            self.limiter.given().0.saturating_abs() >= self.plan.torque_limits.torque / FROZEN_TORQUE_SHARE;
+        self.frozen_ticks = if pushes && step == 0 { self.frozen_ticks.saturating_add(1) } else { 0 };
+        self.frozen_ticks > FROZEN_TICKS
     }
 
     fn watch_host(&mut self) {

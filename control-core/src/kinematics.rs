@@ -47,6 +47,8 @@ pub(crate) struct SpeedEstimator {
     window: [i32; WINDOW_TICKS as usize],
     edges: [Edge; EDGES],
     latest: Edge,
+    /// Where the span that ends at `latest` begins.
+    first: Edge,
     next_edge: usize,
     now: u32,
 }
@@ -65,6 +67,7 @@ impl SpeedEstimator {
             window: [count.0; WINDOW_TICKS as usize],
             edges: [edge; EDGES],
             latest: edge,
+            first: edge,
             next_edge: 0,
             now: 0,
         }
@@ -97,12 +100,13 @@ impl SpeedEstimator {
                 *slot = self.latest;
                 self.next_edge = (self.next_edge + 1) % EDGES;
             }
+            self.first = self.oldest_in_window();
         }
         let silent = self.now.wrapping_sub(self.latest.tick);
         if silent > REST_TICKS {
             return MillimetresPerSecond::default();
         }
-        let first = self.oldest_in_window();
+        let first = self.first;
         let span = self.latest.tick.wrapping_sub(first.tick);
         // Waiting for the next edge bounds the speed from above: it cannot have been less than `silent` away.
         scale.speed(self.latest.count.wrapping_sub(first.count), span.max(silent).max(1))

@@ -27,6 +27,11 @@ impl Limiter {
         *self = Self::default();
     }
 
+    /// What was given last.
+    pub(crate) fn given(&self) -> MillinewtonMetres {
+        MillinewtonMetres(self.given)
+    }
+
     /// Clamps to the limit, fades in, bounds the change in a tick; says what was in force.
     pub(crate) fn tick(
         &mut self,

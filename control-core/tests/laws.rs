@@ -176,3 +176,21 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
     let trips = (0..2_000).filter_map(|t| tick_at(&mut c, t * 2).tripped).collect::<Vec<_>>();
     assert_eq!(trips, [Fault::Travel], "4,000 counts are 63 mm");
 }
+
+#[test]
+fn an_encoder_without_a_count_under_torque_is_dead_and_a_resting_needle_is_not() {
+    let mut c = started(&Config::default());
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 2.5, 10.0, |_| {});
+    let count = (at / c.plan().mm_per_count().to_num::<f64>()).round() as i32;
+    let trips =
+        (0..30_000).filter_map(|t| tick_at(&mut c, count).tripped.map(|f| (t, f))).collect::<Vec<_>>();
+    assert!(matches!(trips[..], [(19_990..=20_010, Fault::EncoderFrozen)]), "{trips:?}");
+
+    // Let go in tissue, where friction holds a fraction of a newton, the needle rests as long as it likes.
+    let mut c = started(&Config::default());
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 4.5, 10.0, |_| {});
+    assert_eq!(hold(&mut c, at, 5.0).tripped, None);
+    assert!(hold(&mut c, at, 0.1).enable);
+}

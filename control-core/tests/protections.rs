@@ -110,14 +110,16 @@ fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &Ti
         wall.puncture_travel = Millimetres(q(0.75));
     }
     let plan = Plan::new(&config).expect("sound");
-    // 0.7 mm into 7 N/mm: about 5 N, 50 mN·m.
+    // 0.7 mm into 6 N/mm: about 5 N, 50 mN·m.
     let count = Counts((0.7 / plan.mm_per_count().to_num::<f64>()) as i32);
     let zero = f64::from(plan.zero_torque_code().0);
     let mut c = Controller::new(plan);
     c.tick(TickInput { count, ..TickInput::default() });
     c.order(Order::Start);
-    for _ in 0..seconds * 10_000 {
+    for tick in 0..seconds * 10_000 {
         c.order(Order::Heartbeat);
+        // A hand has a tremor: without it the encoder would pass for dead.
+        let count = Counts(count.0 + i32::from(tick / 500 % 2 == 1));
         let output = c.tick(TickInput { count, ..TickInput::default() });
         see((zero - f64::from(output.dac.0)) * 60.0 / 2047.0, &output);
     }
