@@ -56,6 +56,9 @@ impl Wall {
     /// Force of the wall that has given way. `frontier` is the furthest travel since then; drawn back from it, the force
     /// lets go along the unloading slope and never pulls.
     pub(crate) fn relief_force(&self, travel: Millimetres, frontier: Millimetres) -> Newtons {
+        if !self.is_relieving(frontier) && self.relief.base <= 0 {
+            return Newtons::default();
+        }
         let cutting = self.relief.force(Millimetres(frontier.0.min(self.relief.vertex)));
         let drawn_back = frontier.0.saturating_sub(travel.0);
         let unloaded = drawn_back.saturating_mul(self.unload.0);

@@ -30,6 +30,16 @@ impl Scale {
         Millimetres(exact.saturating_to_num())
     }
 
+    /// Speed of `counts` over the window: the same without a division, which takes a hundred instructions.
+    fn window_speed(&self, counts: i32) -> MillimetresPerSecond {
+        const WINDOWS_PER_1024_S: i64 = TICK_HZ as i64 * 1024 / WINDOW_TICKS as i64;
+        let counts = I32F0::from_bits(counts.clamp(-self.count_limit, self.count_limit));
+        let travel: I34F30 = counts.wide_mul(self.mm_per_count);
+        let per_1024_s: I34F30 = travel.saturating_mul_int(WINDOWS_PER_1024_S);
+        let per_second = per_1024_s >> 10_u32;
+        MillimetresPerSecond(per_second.saturating_to_num())
+    }
+
     /// Speed of `counts` in `ticks`.
     fn speed(&self, counts: i32, ticks: u32) -> MillimetresPerSecond {
         let counts = I32F0::from_bits(counts.clamp(-self.count_limit, self.count_limit));
@@ -87,7 +97,7 @@ impl SpeedEstimator {
         let Some(oldest) = self.window.get_mut(slot) else { return MillimetresPerSecond::default() };
         let moved = count.wrapping_sub(*oldest);
         *oldest = count;
-        scale.speed(moved, WINDOW_TICKS)
+        scale.window_speed(moved)
     }
 
     fn between_edges(&mut self, scale: &Scale, count: i32) -> MillimetresPerSecond {
