@@ -16,8 +16,8 @@ use crate::units::{
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
-/// An encoder without a count for this long under torque is dead: 2 s.
-const FROZEN_TICKS: u32 = 2 * crate::TICK_HZ;
+/// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
+const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
 /// Torque that counts for that: an eighth of the limit, several times the dry friction of motor and needle.
 const FROZEN_TORQUE_SHARE: i32 = 8;
 
