@@ -19,6 +19,9 @@ pub struct DevTools {
     events: Vec<Value>,
 }
 
+/// Time for events that are on their way.
+const DRAIN_TIME: std::time::Duration = std::time::Duration::from_millis(300);
+
 impl DevTools {
     /// Connects to the address that the browser announced.
     pub fn connect(address: &str) -> Result<Self, Failure> {
@@ -66,7 +69,11 @@ impl DevTools {
 
     /// Events that have arrived since the last time, oldest first.
     pub fn events(&mut self) -> Result<Vec<Value>, Failure> {
-        while let Some(message) = self.receive()? {
+        // A page that streams never falls silent: what has not come by now is not waited for.
+        let begin = Instant::now();
+        while begin.elapsed() < DRAIN_TIME
+            && let Some(message) = self.receive()?
+        {
             self.events.push(message);
         }
         Ok(std::mem::take(&mut self.events))
