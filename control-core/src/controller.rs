@@ -4,7 +4,7 @@
 use crate::event::{Fault, Limits, State, Transitions};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
-use crate::math::times;
+use crate::math::{multiply, times};
 use crate::passivity::Observer;
 use crate::plan::Plan;
 use crate::safety::Limiter;
@@ -18,8 +18,6 @@ use serde::{Deserialize, Serialize};
 
 /// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
 const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
-/// Torque that counts for that: an eighth of the limit, several times the dry friction of motor and needle.
-const FROZEN_TORQUE_SHARE: i32 = 8;
 
 /// What the tick reads.
 #[derive(Clone, Copy, Debug, Default)]
@@ -146,7 +144,7 @@ impl Controller {
         match order {
             Order::Start if !self.mode.is_powered() => self.power_up(Mode::Running),
             Order::Excite(excitation) if !self.mode.is_powered() => {
-                let depth = self.plan.scale.depth(self.previous.map_or(Counts(0), |p| moved(self.origin, p)));
+                let depth = self.plan.scale.depth(self.latest_count());
                 self.power_up(Mode::Exciting(Player::new(&excitation, depth)));
             }
             Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
@@ -157,8 +155,7 @@ impl Controller {
             }
             Order::Heartbeat => self.silent_ticks = 0,
             Order::Configure(plan) if !self.mode.is_powered() => {
-                let count = self.previous.map_or(Counts(0), |p| moved(self.origin, p));
-                self.speed = SpeedEstimator::new(plan.config.speed, count);
+                self.speed = SpeedEstimator::new(plan.config.speed, self.latest_count());
                 self.tissue = Tissue::default();
                 self.plan = plan;
             }
@@ -169,7 +166,7 @@ impl Controller {
 
     fn power_up(&mut self, mode: Mode) {
         self.limiter.restart();
-        self.observer = Observer::default();
+        self.observer = Observer::new(self.plan.scale.depth(self.latest_count()));
         self.silent_ticks = 0;
         self.frozen_ticks = 0;
         self.mode = mode;
@@ -207,6 +204,11 @@ impl Controller {
         }
     }
 
+    /// Counts past the zero in the tick before.
+    fn latest_count(&self) -> Counts {
+        self.previous.map_or(Counts(0), |previous| moved(self.origin, previous))
+    }
+
     /// Counts past the zero; a jump or a needle beyond its travel trips.
     fn count(&mut self, absolute: Counts) -> Counts {
         let step = self.previous.map_or(0, |previous| moved(previous, absolute).0);
@@ -229,8 +231,7 @@ impl Controller {
 
     /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead.
     fn is_frozen(&mut self, step: i32) -> bool {
-        let pushes =
-            self.limiter.given().0.saturating_abs() >= self.plan.torque_limits.torque / FROZEN_TORQUE_SHARE;
+        let pushes = self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
         self.frozen_ticks = if pushes && step == 0 { self.frozen_ticks.saturating_add(1) } else { 0 };
         self.frozen_ticks > FROZEN_TICKS
     }
@@ -263,9 +264,9 @@ impl Controller {
         match &mut self.mode {
             Mode::Running => {
                 let resisting = Newtons(force.0.saturating_add(times(speed.0, self.plan.damping)));
-                let (given, damped) = self.observer.tick(self.plan.passivity_damping, depth, resisting);
+                let (given, damped) = self.observer.tick(self.plan.bounce_damping, depth, resisting);
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
-                let torque = I16F16::ZERO.saturating_sub(given.0.saturating_mul(radius.0));
+                let torque = I16F16::ZERO.saturating_sub(multiply(given.0, radius.0));
                 Some((MillinewtonMetres(torque), limits))
             }
             Mode::Exciting(player) => {
@@ -282,11 +283,18 @@ impl Controller {
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
         let most = self.plan.torque_limits.torque;
         let allowed = self.winding.largest(&self.plan.thermal, most);
-        let cooled = wanted.0.clamp(-allowed, allowed);
-        let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(cooled));
-        let thermal = if cooled != wanted.0 && allowed < most { Limits::THERMAL } else { Limits::default() };
-        // Where the torque limit itself was reached, `cooled` hides it from the limiter.
-        let torque_limit = if wanted.0.saturating_abs() > most { Limits::TORQUE } else { Limits::default() };
-        (torque, in_force.with(thermal).with(torque_limit).with(limits))
+        let held = wanted.0.clamp(-allowed, allowed);
+        let mut limits = limits;
+        if held != wanted.0 {
+            let thermal = if allowed < most { Limits::THERMAL } else { Limits::default() };
+            let torque = if wanted.0.unsigned_abs() > most.unsigned_abs() {
+                Limits::TORQUE
+            } else {
+                Limits::default()
+            };
+            limits = limits.with(thermal).with(torque);
+        }
+        let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(held));
+        (torque, in_force.with(limits))
     }
 }

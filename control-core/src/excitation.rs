@@ -5,7 +5,7 @@
 //! follow: it plays the same [`Reference`].
 
 use crate::TICK_HZ;
-use crate::math::times;
+use crate::math::{multiply, times};
 use crate::plan::{Field, Plan, Refusal, within};
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
 use fixed::types::{I2F30, I16F16, I32F32};
@@ -344,8 +344,8 @@ impl Player {
         let behind = self.begin.0.saturating_add(target.position.0).saturating_sub(depth.0);
         let slower = target.speed.0.saturating_sub(speed.0);
         let damping = I2F30::saturating_from_num(self.servo.damping.0);
-        let force = behind.saturating_mul(self.servo.stiffness.0).saturating_add(times(slower, damping));
-        Some(MillinewtonMetres(force.saturating_mul(roller_radius.0).saturating_add(target.torque.0)))
+        let force = multiply(behind, self.servo.stiffness.0).saturating_add(times(slower, damping));
+        Some(MillinewtonMetres(multiply(force, roller_radius.0).saturating_add(target.torque.0)))
     }
 
     /// Whether the motor is further from the beginning than allowed.

@@ -1,6 +1,6 @@
 //! Friction along the needle inside tissue (seed 001, eq. 2): as printed, and as a clamped proxy that holds.
 
-use crate::math::{exp, times};
+use crate::math::{exp, multiply, saturate, times};
 use crate::units::{Millimetres, Newtons, Stiffness};
 use fixed::types::{I2F30, I16F16, I32F32};
 
@@ -24,13 +24,14 @@ pub(crate) enum Law {
 /// The anchor `w` of either law: P_curr_f of the paper, the proxy of the cone.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Anchor {
+    /// Finer than a depth: the paper's anchor follows by shares of a thousandth and less.
     position: I32F32,
 }
 
 impl Anchor {
     /// No friction: the anchor is where the needle is.
     pub(crate) fn release(&mut self, depth: Millimetres) {
-        self.position = depth.0.into();
+        self.position = fine(depth.0);
     }
 
     /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit there.
@@ -43,22 +44,41 @@ impl Anchor {
     ) -> Newtons {
         match law {
             Law::Paper { per_level_length, level_cap, follow, stiffness, limit } => {
-                let ahead: I16F16 = I32F32::from(depth.0).saturating_sub(self.position).saturating_to_num();
-                let step: I32F32 = I32F32::saturating_from_num(ahead.wide_mul(*follow));
-                self.position = self.position.saturating_add(step);
-                let stretch: I16F16 = I32F32::from(depth.0).saturating_sub(self.position).saturating_to_num();
+                self.follow(depth, *follow);
                 let level = exp(times(inserted.0, *per_level_length)).min(*level_cap);
-                let force = stretch.saturating_mul(level).saturating_mul(stiffness.0);
+                let force = multiply(multiply(self.stretch(depth), level), stiffness.0);
                 Newtons(force.clamp(-limit.0, limit.0))
             }
             Law::Cone { stiffness, inverse_stiffness } => {
-                let reach = I32F32::from(limit.0.saturating_mul(*inverse_stiffness));
-                let x = I32F32::from(depth.0);
-                // The proxy is dragged only when the cone is full; a resting needle keeps its force.
-                self.position = self.position.clamp(x.saturating_sub(reach), x.saturating_add(reach));
-                let stretch: I16F16 = x.saturating_sub(self.position).saturating_to_num();
-                Newtons(stretch.saturating_mul(stiffness.0).clamp(-limit.0, limit.0))
+                self.drag(depth, multiply(limit.0, *inverse_stiffness));
+                Newtons(multiply(self.stretch(depth), stiffness.0).clamp(-limit.0, limit.0))
             }
         }
     }
+
+    /// Goes `share` of the way to the needle.
+    fn follow(&mut self, depth: Millimetres, share: I2F30) {
+        let step_q46 = i64::from(self.stretch(depth).to_bits()) * i64::from(share.to_bits());
+        self.position = self.position.saturating_add(I32F32::from_bits(step_q46 >> 14));
+    }
+
+    /// Is dragged along only when the cone is full; a resting needle keeps its force.
+    fn drag(&mut self, depth: Millimetres, reach: I16F16) {
+        let (nearest, furthest) = (depth.0.saturating_sub(reach), depth.0.saturating_add(reach));
+        self.position = fine(coarse(self.position).clamp(nearest, furthest));
+    }
+
+    /// `x − w`.
+    fn stretch(&self, depth: Millimetres) -> I16F16 {
+        I16F16::from_bits(saturate((fine(depth.0) - self.position).to_bits() >> 16))
+    }
+}
+
+fn fine(length: I16F16) -> I32F32 {
+    I32F32::from_bits(i64::from(length.to_bits()) << 16)
+}
+
+/// Of a position that began as a depth and never left the range of one.
+fn coarse(position: I32F32) -> I16F16 {
+    I16F16::from_bits((position.to_bits() >> 16) as i32)
 }

@@ -2,8 +2,9 @@
 
 use crate::TICK_HZ;
 use crate::config::SpeedMethod;
+use crate::math::{product, saturate};
 use crate::units::{Counts, Millimetres, MillimetresPerSecond};
-use fixed::types::{I2F30, I32F0, I34F30};
+use fixed::types::{I2F30, I8F24, I14F18, I16F16};
 
 /// Length of the speed window: 12.8 ms, so that one count is 1.2 mm/s at a 10 mm roller.
 pub const WINDOW_TICKS: u32 = 128;
@@ -14,40 +15,53 @@ const EDGE_SPACING_TICKS: u32 = WINDOW_TICKS / EDGES as u32;
 /// No edge for this long is rest: 0.1 s.
 const REST_TICKS: u32 = TICK_HZ / 10;
 
-/// Length of one count along the needle.
+/// Length of one count along the needle, and the speed of one count in a given time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     pub(crate) mm_per_count: I2F30,
-    /// Counts beyond this, either way, are taken as this: 1 m.
-    pub(crate) count_limit: i32,
+    /// Speed of one count in a window: below 48 mm/s.
+    window_speed_per_count: I8F24,
+    /// Speed of one count in a tick: below 6,200 mm/s.
+    tick_speed_per_count: I14F18,
 }
 
 impl Scale {
-    /// Depth of `counts` past the zero.
-    pub(crate) fn depth(&self, counts: Counts) -> Millimetres {
-        let counts = I32F0::from_bits(counts.0.clamp(-self.count_limit, self.count_limit));
-        let exact: I34F30 = counts.wide_mul(self.mm_per_count);
-        Millimetres(exact.saturating_to_num())
+    /// Of counts of this length, at most 0.62 mm.
+    pub(crate) fn new(mm_per_count: I2F30) -> Self {
+        let per_tick_q30 = i64::from(mm_per_count.to_bits()) * i64::from(TICK_HZ);
+        let per_window_q30 = per_tick_q30 / i64::from(WINDOW_TICKS);
+        Self {
+            mm_per_count,
+            window_speed_per_count: I8F24::from_bits(saturate(per_window_q30 >> 6)),
+            tick_speed_per_count: I14F18::from_bits(saturate(per_tick_q30 >> 12)),
+        }
     }
 
-    /// Speed of `counts` over the window: the same without a division, which takes a hundred instructions.
+    /// Depth of `counts` past the zero.
+    pub(crate) fn depth(&self, counts: Counts) -> Millimetres {
+        Millimetres(I16F16::from_bits(product(counts.0, self.mm_per_count.to_bits(), 14)))
+    }
+
+    /// Speed of `counts` in a window.
     fn window_speed(&self, counts: i32) -> MillimetresPerSecond {
-        const WINDOWS_PER_1024_S: i64 = TICK_HZ as i64 * 1024 / WINDOW_TICKS as i64;
-        let counts = I32F0::from_bits(counts.clamp(-self.count_limit, self.count_limit));
-        let travel: I34F30 = counts.wide_mul(self.mm_per_count);
-        let per_1024_s: I34F30 = travel.saturating_mul_int(WINDOWS_PER_1024_S);
-        let per_second = per_1024_s >> 10_u32;
-        MillimetresPerSecond(per_second.saturating_to_num())
+        MillimetresPerSecond(I16F16::from_bits(product(counts, self.window_speed_per_count.to_bits(), 8)))
     }
 
     /// Speed of `counts` in `ticks`.
     fn speed(&self, counts: i32, ticks: u32) -> MillimetresPerSecond {
-        let counts = I32F0::from_bits(counts.clamp(-self.count_limit, self.count_limit));
-        let travel: I34F30 = counts.wide_mul(self.mm_per_count);
-        // A metre in Q30 times 10,000 is below 2^54: no overflow, and dividing last keeps every bit.
-        let per_second = travel.saturating_mul_int(i64::from(TICK_HZ)).to_bits() / i64::from(ticks.max(1));
-        MillimetresPerSecond(I34F30::from_bits(per_second).saturating_to_num())
+        let in_a_tick_q18 =
+            u64::from(counts.unsigned_abs()) * u64::from(self.tick_speed_per_count.to_bits().unsigned_abs());
+        let magnitude = quotient(in_a_tick_q18 >> 2, ticks);
+        MillimetresPerSecond(I16F16::from_bits(if counts < 0 { -magnitude } else { magnitude }))
     }
+}
+
+/// `dividend / divisor` to 20 bits or more for a divisor below 2^11, saturating: the board divides 32 bits in one
+/// instruction and 64 in a hundred.
+fn quotient(dividend: u64, divisor: u32) -> i32 {
+    let excess = 32 - ((dividend >> 32) as u32).leading_zeros();
+    let quotient = (dividend >> excess) as u32 / divisor.max(1);
+    i32::try_from(u64::from(quotient) << excess).unwrap_or(i32::MAX)
 }
 
 /// Speed from counts. Memory for either method; a tick costs the same however fast the needle is.
@@ -122,17 +136,19 @@ impl SpeedEstimator {
         scale.speed(self.latest.count.wrapping_sub(first.count), span.max(silent).max(1))
     }
 
-    /// The oldest stored edge within the window before the latest one, else the one just before it.
+    /// The oldest stored edge within the window before the latest one, else the last one before it.
     fn oldest_in_window(&self) -> Edge {
-        let age = |e: &Edge| self.latest.tick.wrapping_sub(e.tick);
-        let inside =
-            self.edges.iter().filter(|e| (1..=WINDOW_TICKS).contains(&age(e))).max_by_key(|e| age(e));
-        let before = self
-            .edges
-            .iter()
-            .filter(|e| age(e) > WINDOW_TICKS && age(e) <= REST_TICKS)
-            .min_by_key(|e| age(e));
-        *inside.or(before).unwrap_or(&self.latest)
+        let mut before = self.latest;
+        // The slot that is overwritten next holds the oldest.
+        for slot in 0..EDGES {
+            let Some(&edge) = self.edges.get((self.next_edge + slot) % EDGES) else { break };
+            match self.latest.tick.wrapping_sub(edge.tick) {
+                1..=WINDOW_TICKS => return edge,
+                age if age > WINDOW_TICKS && age <= REST_TICKS => before = edge,
+                _ => {}
+            }
+        }
+        before
     }
 }
 

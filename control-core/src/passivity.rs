@@ -2,52 +2,87 @@
 //! active and rings; then damping takes the surplus away (time-domain passivity control, Hannaford and Ryu 2002). It may
 //! reduce the force that pushes out and never turns it round.
 
-use crate::math::times;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
-use fixed::types::{I2F30, I16F16, I32F32};
+use crate::TICK_HZ;
+use crate::math::product;
+use crate::units::{Damping, Millimetres, Newtons};
+use fixed::types::{I8F24, I16F16, I32F32, U16F16};
 
 /// Below this the tissue stores nothing worth counting, and a new count begins: 5 mN.
-const NOTHING: I16F16 = I16F16::from_bits(328);
+const NOTHING: U16F16 = U16F16::from_bits(328);
 /// Ticks over which the speed of a bounce is taken: 0.8 ms, for the speed window is too slow for it.
 const BOUNCE_TICKS: usize = 8;
+
+/// The observer's damping ready for the tick; none leaves it off.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BounceDamping {
+    /// Force for each mm that the needle has moved in [`BOUNCE_TICKS`].
+    newtons_per_mm: I8F24,
+}
+
+impl BounceDamping {
+    /// `damping` is at most 0.02 N·s/mm; [`crate::plan`] has seen to it.
+    pub(crate) fn new(damping: Damping) -> Self {
+        const BOUNCES_PER_SECOND: i32 = (TICK_HZ as usize / BOUNCE_TICKS) as i32;
+        Self { newtons_per_mm: damping.0.saturating_mul_int(BOUNCES_PER_SECOND) }
+    }
+}
 
 /// The observer with its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observer {
     /// Energy that went in and has not come out, in mJ.
     energy: I32F32,
-    force: I16F16,
-    depths: [I16F16; BOUNCE_TICKS],
+    force: Newtons,
+    depth: Millimetres,
+    depths: [Millimetres; BOUNCE_TICKS],
     next: usize,
 }
 
 impl Observer {
-    /// One tick: the force to give instead of `wanted`, and whether damping was added.
-    pub(crate) fn tick(&mut self, damping: I2F30, depth: Millimetres, wanted: Newtons) -> (Newtons, bool) {
-        let last = self.depths.get((self.next + BOUNCE_TICKS - 1) % BOUNCE_TICKS).copied().unwrap_or(depth.0);
-        self.energy = self.energy.saturating_add(self.force.wide_mul(depth.0.saturating_sub(last)));
-        if wanted.0.saturating_abs() < NOTHING {
-            self.energy = I32F32::ZERO;
-        }
-        let speed = self.bounce_speed(depth);
-        let reduces =
-            damping > 0 && self.energy < I32F32::ZERO && (wanted.0 > 0) == (speed.0 < 0) && speed.0 != 0;
-        let given = if reduces {
-            let surplus = times(speed.0.saturating_abs(), damping).min(wanted.0.saturating_abs());
-            wanted.0.saturating_sub(if wanted.0 > 0 { surplus } else { -surplus })
-        } else {
-            wanted.0
-        };
-        self.force = given;
-        (Newtons(given), reduces)
+    /// From where the needle is, with no energy counted yet.
+    pub(crate) fn new(depth: Millimetres) -> Self {
+        Self { depth, depths: [depth; BOUNCE_TICKS], ..Self::default() }
     }
 
-    fn bounce_speed(&mut self, depth: Millimetres) -> MillimetresPerSecond {
-        let Some(oldest) = self.depths.get_mut(self.next) else { return MillimetresPerSecond::default() };
-        let moved = depth.0.saturating_sub(*oldest);
-        *oldest = depth.0;
-        self.next = (self.next + 1) % BOUNCE_TICKS;
-        const PER_SECOND: i32 = (crate::TICK_HZ as usize / BOUNCE_TICKS) as i32;
-        MillimetresPerSecond(moved.saturating_mul_int(PER_SECOND))
+    /// One tick: the force to give instead of `wanted`, and whether damping was added.
+    pub(crate) fn tick(
+        &mut self,
+        damping: BounceDamping,
+        depth: Millimetres,
+        wanted: Newtons,
+    ) -> (Newtons, bool) {
+        self.count_energy(depth, wanted);
+        let moved = self.moved_in_a_bounce(depth);
+        let is_pushed_along = moved != I16F16::ZERO && wanted.0.is_negative() != moved.is_negative();
+        let reduces = self.energy < I32F32::ZERO && is_pushed_along && damping.newtons_per_mm > I8F24::ZERO;
+        let given = if reduces { reduced(damping, moved, wanted) } else { wanted };
+        self.force = given;
+        (given, reduces)
     }
+
+    /// What the force of the tick before did over the way since then.
+    fn count_energy(&mut self, depth: Millimetres, wanted: Newtons) {
+        let way = depth.0.saturating_sub(self.depth.0);
+        self.depth = depth;
+        self.energy = if wanted.0.unsigned_abs() < NOTHING {
+            I32F32::ZERO
+        } else {
+            self.energy.saturating_add(self.force.0.wide_mul(way))
+        };
+    }
+
+    fn moved_in_a_bounce(&mut self, depth: Millimetres) -> I16F16 {
+        let Some(oldest) = self.depths.get_mut(self.next) else { return I16F16::ZERO };
+        let moved = depth.0.saturating_sub(oldest.0);
+        *oldest = depth;
+        self.next = (self.next + 1) % BOUNCE_TICKS;
+        moved
+    }
+}
+
+/// `wanted` without what damping takes, towards zero.
+fn reduced(damping: BounceDamping, moved: I16F16, wanted: Newtons) -> Newtons {
+    let surplus = product(moved.saturating_abs().to_bits(), damping.newtons_per_mm.to_bits(), 24);
+    let left = wanted.0.saturating_abs().saturating_sub(I16F16::from_bits(surplus)).max(I16F16::ZERO);
+    Newtons(if wanted.0 < I16F16::ZERO { -left } else { left })
 }

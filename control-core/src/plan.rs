@@ -6,12 +6,13 @@ use crate::config::{Config, FrictionLaw, Layer, Parabola, Tissue, Wall};
 use crate::friction::Law;
 use crate::jog;
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
+use crate::passivity::BounceDamping;
 use crate::safety::{DacScale, TorqueLimits};
 use crate::thermal::ThermalLimits;
 use crate::tissue::{self, Layers};
 use crate::units::{Millimetres, Newtons};
 use core::fmt;
-use fixed::types::{I2F30, I16F16};
+use fixed::types::{I2F30, I16F16, U16F16};
 use serde::{Deserialize, Serialize};
 
 /// A wall heals when the tip is this far outside it: 0.2 mm.
@@ -22,6 +23,9 @@ const LARGEST_CONTACT_STEP: I16F16 = I16F16::from_bits(3_277);
 const LARGEST_STIFFNESS: I16F16 = I16F16::from_bits(7 << 16);
 /// 0.0005 N·s/mm: with 30 g and the speed estimate's 6 ms of delay, more would itself ring.
 const LARGEST_DAMPING_BITS: i32 = 8_389;
+/// Torque at which an encoder without a count counts as dead: an eighth of the limit, several times the dry friction of motor
+/// and needle.
+const FROZEN_TORQUE_SHARE: u32 = 8;
 
 /// A configuration that may run.
 #[derive(Clone, Debug)]
@@ -30,8 +34,10 @@ pub struct Plan {
     pub(crate) scale: Scale,
     pub(crate) layers: Layers,
     pub(crate) torque_limits: TorqueLimits,
+    /// Torque under which a motor that is not held moves.
+    pub(crate) frozen_torque: U16F16,
     pub(crate) thermal: ThermalLimits,
-    pub(crate) passivity_damping: I2F30,
+    pub(crate) bounce_damping: BounceDamping,
     pub(crate) damping: I2F30,
     pub(crate) dac: DacScale,
     pub(crate) travel_counts: i32,
@@ -184,13 +190,8 @@ impl Plan {
     /// Checks `config` and prepares it for the tick.
     pub fn new(config: &Config) -> Result<Self, Refusal> {
         check_device(config)?;
-        let dac = DacScale {
-            width: config.device.dac,
-            codes_per_mnm: I16F16::from_num(config.device.dac.span()) / config.device.full_scale_torque.0,
-        };
         let mm_per_count = mm_per_count(config.device.roller_radius, config.device.counts_per_turn);
-        let count_limit = counts_reaching(Millimetres(I16F16::from_num(1000)), mm_per_count);
-        let scale = Scale { mm_per_count, count_limit };
+        let scale = Scale::new(mm_per_count);
         check_friction(config)?;
         let layers = plan_layers(config, scale)?;
         let fade_ticks = i32::from(config.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;
@@ -202,10 +203,11 @@ impl Plan {
                 slew_per_tick: config.limits.slew_per_tick.0,
                 fade_per_tick: I2F30::ONE / fade_ticks,
             },
+            frozen_torque: config.limits.torque.0.unsigned_abs() / FROZEN_TORQUE_SHARE,
             thermal: ThermalLimits::new(config.limits.continuous_torque, config.limits.winding_time_s),
-            passivity_damping: I2F30::saturating_from_num(config.passivity_damping.0),
+            bounce_damping: BounceDamping::new(config.passivity_damping),
             damping: I2F30::saturating_from_num(config.damping.0),
-            dac,
+            dac: DacScale::new(config.device.dac, config.device.full_scale_torque),
             travel_counts: counts_reaching(config.limits.travel, mm_per_count),
             heartbeat_ticks: u32::from(config.limits.heartbeat_ms) * TICK_HZ / 1000,
             config: config.clone(),
@@ -333,13 +335,13 @@ fn largest_force(config: &Config) -> I16F16 {
 }
 
 fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
-    let mut planned = Layers { layers: heapless::Vec::new(), friction: plan_friction(&config.friction) };
+    let (mut layers, mut walls) = (heapless::Vec::new(), heapless::Vec::new());
     let mut friction_above = I16F16::ZERO;
     for (index, layer) in config.layers.iter().enumerate() {
         let number = index as u8;
-        let above = index.checked_sub(1).and_then(|i| config.layers.get(i));
+        let above = config.layers.get(..index).unwrap_or_default();
         check_order(layer, above, number, config)?;
-        if let Some(above) = above {
+        if let Some(above) = above.last() {
             let thickness = layer.top.0.saturating_sub(above.top.0);
             friction_above = friction_above.saturating_add(thickness.saturating_mul(above.friction.0));
         }
@@ -353,31 +355,46 @@ fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
             top: layer.top,
             contact: at(layer.top.0),
             exit: at(layer.top.0.saturating_sub(HEAL_DISTANCE)),
-            wall: layer
-                .wall
-                .as_ref()
-                .map(|w| (at(layer.top.0.saturating_add(w.puncture_travel.0)), jog::Wall::new(w))),
             friction_per_mm: I2F30::saturating_from_num(layer.friction.0),
             friction_above: Newtons(friction_above),
         };
-        // Both vectors hold MAX_LAYERS: the push cannot fail.
-        let _ = planned.layers.push(ready);
+        if let Some(wall) = &layer.wall {
+            let wall = tissue::Wall {
+                layer: number,
+                contact: ready.contact,
+                puncture: at(layer.top.0.saturating_add(wall.puncture_travel.0)),
+                exit: ready.exit,
+                jog: jog::Wall::new(wall, layer.top),
+            };
+            // All vectors hold MAX_LAYERS: the push cannot fail, nor the one below.
+            let _ = walls.push(wall);
+        }
+        let _ = layers.push(ready);
     }
     check_deepest(config, friction_above)?;
-    Ok(planned)
+    Ok(Layers { layers, walls, friction: plan_friction(&config.friction) })
 }
 
-fn check_order(layer: &Layer, above: Option<&Layer>, number: u8, config: &Config) -> Result<(), Refusal> {
+/// A layer begins below the one above it, and a wall below the depth at which the wall above it gives way, whatever lies
+/// between the two.
+fn check_order(layer: &Layer, above: &[Layer], number: u8, config: &Config) -> Result<(), Refusal> {
     within(Field::LayerTop, layer.top.0, I16F16::ZERO, milli(500_000))?;
-    if let Some(above) = above {
-        let gives_way = above.wall.map_or(I16F16::ZERO, |w| w.puncture_travel.0);
-        let next_wall = if layer.wall.is_some() { gives_way } else { I16F16::ZERO };
-        if layer.top.0 <= above.top.0.saturating_add(next_wall) {
-            return Err(Refusal::Overlap { layer: number });
-        }
+    let is_above = above.last().is_none_or(|above| above.top.0 < layer.top.0);
+    let wall_above = above.iter().rev().find(|above| above.wall.is_some());
+    let is_past_wall = layer.wall.is_none() || wall_above.is_none_or(|above| gives_way(above) < layer.top.0);
+    if !is_above || !is_past_wall {
+        return Err(Refusal::Overlap { layer: number });
     }
-    let end = layer.wall.map_or(I16F16::ZERO, |w| w.puncture_travel.0).saturating_add(layer.top.0);
-    if end >= config.limits.travel.0 { Err(Refusal::BeyondTravel { layer: number }) } else { Ok(()) }
+    if gives_way(layer) >= config.limits.travel.0 {
+        Err(Refusal::BeyondTravel { layer: number })
+    } else {
+        Ok(())
+    }
+}
+
+/// The depth at which the layer's wall gives way; where there is none, its top.
+fn gives_way(layer: &Layer) -> I16F16 {
+    layer.top.0.saturating_add(layer.wall.map_or(I16F16::ZERO, |wall| wall.puncture_travel.0))
 }
 
 fn check_wall(wall: &Wall, layer: u8, friction: I16F16, config: &Config) -> Result<(), Refusal> {
@@ -399,8 +416,8 @@ fn check_wall(wall: &Wall, layer: u8, friction: I16F16, config: &Config) -> Resu
     if slope > limit {
         return Err(Refusal::TooStiff { layer, slope, limit });
     }
-    let elastic = jog::Parabola::new(&wall.elastic);
-    let relief = jog::Parabola::new(&wall.relief);
+    let elastic = jog::Parabola::new(&wall.elastic, Millimetres::default());
+    let relief = jog::Parabola::new(&wall.relief, Millimetres::default());
     let step = elastic.force(Millimetres::default()).0;
     if step.unsigned_abs() > LARGEST_CONTACT_STEP.unsigned_abs() {
         return Err(Refusal::ContactStep { layer, force: step });

@@ -2,6 +2,7 @@
 
 use crate::config::DacWidth;
 use crate::event::Limits;
+use crate::math::times;
 use crate::units::{DacCode, MillinewtonMetres};
 use fixed::types::{I2F30, I16F16};
 
@@ -32,20 +33,17 @@ impl Limiter {
         MillinewtonMetres(self.given)
     }
 
-    /// Clamps to the limit, fades in, bounds the change in a tick; says what was in force.
+    /// Fades in and bounds the change in a tick; says what was in force. `wanted` is within the torque limit.
     pub(crate) fn tick(
         &mut self,
         limits: &TorqueLimits,
         wanted: MillinewtonMetres,
     ) -> (MillinewtonMetres, Limits) {
         let mut in_force = Limits::default();
-        let mut torque = wanted.0.clamp(-limits.torque, limits.torque);
-        if torque != wanted.0 {
-            in_force = in_force.with(Limits::TORQUE);
-        }
+        let mut torque = wanted.0;
         if self.faded < I2F30::ONE {
             self.faded = self.faded.saturating_add(limits.fade_per_tick).min(I2F30::ONE);
-            torque = crate::math::times(torque, self.faded);
+            torque = times(torque, self.faded);
             in_force = in_force.with(Limits::FADE_IN);
         }
         let lowest = self.given.saturating_sub(limits.slew_per_tick);
@@ -62,17 +60,23 @@ impl Limiter {
 /// From torque to converter code.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DacScale {
-    pub(crate) width: DacWidth,
-    pub(crate) codes_per_mnm: I16F16,
+    width: DacWidth,
+    codes_per_mnm: I16F16,
 }
 
 impl DacScale {
+    /// For a converter whose full scale is `full_scale` torque.
+    pub(crate) fn new(width: DacWidth, full_scale: MillinewtonMetres) -> Self {
+        Self { width, codes_per_mnm: I16F16::from_num(width.span()) / full_scale.0 }
+    }
+
     /// The nearest code; never beyond the converter's span.
     pub(crate) fn code(&self, torque: MillinewtonMetres) -> DacCode {
+        let steps_q32 = i64::from(torque.0.to_bits()) * i64::from(self.codes_per_mnm.to_bits());
+        let nearest = ((steps_q32 + (1 << 31)) >> 32) as i32;
         let span = i32::from(self.width.span());
-        let steps: I16F16 = torque.0.saturating_mul(self.codes_per_mnm);
-        let steps = steps.saturating_round().to_num::<i32>().clamp(-span, span);
-        DacCode(u16::try_from(i32::from(self.width.mid_scale()) + steps).unwrap_or(self.width.mid_scale()))
+        // Mid-scale is a step more than the span: never below 1 and never above the width.
+        DacCode((i32::from(self.width.mid_scale()) + nearest.clamp(-span, span)) as u16)
     }
 
     /// The code of zero torque.

@@ -2,6 +2,7 @@
 //! torque is reached the torque limit falls to the continuous torque; that is a limit in force, not a fault.
 
 use crate::TICK_HZ;
+use crate::math::{product, saturate, times};
 use crate::units::MillinewtonMetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
@@ -44,10 +45,10 @@ pub(crate) struct Winding {
 impl Winding {
     /// One tick with `given` torque.
     pub(crate) fn tick(&mut self, limits: &ThermalLimits, given: MillinewtonMetres) {
-        let towards: I32F32 = given.0.wide_mul(given.0).saturating_sub(self.heat);
-        // The step is a share of 2^-17 or less: in Q16 with 2^10 taken off last, nothing of it is lost.
-        let step = I16F16::saturating_from_num(towards >> 4).wide_mul(limits.warming);
-        self.heat = self.heat.saturating_add(I32F32::saturating_from_num(step >> 6));
+        let towards_q32 = (given.0.wide_mul(given.0) - self.heat).to_bits();
+        // The step is a share of 2^-13 or less: in Q52, with 20 places taken off last, nothing of it is lost.
+        let step_q52 = i64::from(saturate(towards_q32 >> 20)) * i64::from(limits.warming.to_bits());
+        self.heat += I32F32::from_bits(step_q52 >> 20);
     }
 
     /// The largest torque that the heat allows, between the continuous one and `most`.
@@ -55,8 +56,8 @@ impl Winding {
         if most <= limits.continuous {
             return most;
         }
-        let left: I16F16 = limits.allowed.saturating_sub(self.heat).max(I32F32::ZERO).saturating_to_num();
-        let share: I2F30 = left.wide_mul(limits.per_blend).min(fixed::types::I18F46::ONE).to_num();
-        limits.continuous.saturating_add(crate::math::times(most.saturating_sub(limits.continuous), share))
+        let left_q16 = saturate((limits.allowed - self.heat).to_bits() >> 16).max(0);
+        let share = I2F30::from_bits(product(left_q16, limits.per_blend.to_bits(), 16)).min(I2F30::ONE);
+        limits.continuous.saturating_add(times(most.saturating_sub(limits.continuous), share))
     }
 }
