@@ -244,11 +244,15 @@ fn a_supply_that_dips_under_torque() {
 
 #[test]
 fn a_supply_that_falls() {
-    const PVD: u16 = 1;
     let mut rig = Rig::pressed();
-    rig.board.at_stop(|stopped| stopped.pulse(PVD));
+    // What the real board has on a good day.
+    rig.board.at_stop(|stopped| stopped.set_supply(2_900));
+    rig.board.run_ms(10);
+    assert!(rig.board.at_stop(|stopped| stopped.drive().enabled), "2.9 V are enough");
+    rig.board.at_stop(|stopped| stopped.set_supply(2_600));
     let time = rig.time_to_safe(TWO_TICKS);
     report("supply's early warning", time);
+    rig.board.at_stop(|stopped| stopped.set_supply(3_300));
     rig.comes_back_after(Fault::Brownout);
 }
 

@@ -1,4 +1,4 @@
-//! The supply falls below 2.9 V: the last moment at which the core still surely runs.
+//! The supply falls below 2.66 V: the last moment at which the core still surely runs.
 
 use super::shared;
 use control_core::event::Fault;

@@ -15,13 +15,15 @@ use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::{Error, Gate, Window};
+use rigless::time::VirtualNanos;
 
 use super::Wiring;
 use super::dac::Dac;
+use super::exti::{self, Exti};
 use super::flash::Flash;
-use super::processor::{DAC, OTG, Probe, Probed};
+use super::processor::{DAC, EXTI, OTG, Probe, Probed};
 use super::tilt::Accelerometer;
-use super::usb_port::{INTERRUPTS, UsbPort};
+use super::usb_port::{self, UsbPort};
 
 /// The crystal and the rail of the board.
 const CRYSTAL_HZ: u64 = 8_000_000;
@@ -31,11 +33,13 @@ const RAIL_MILLIVOLTS: u32 = 3_300;
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(INSTRUCTIONS_PER_SECOND).expect("not zero");
 const MCU: &str = "stm32f407";
+/// The strap that says that an analogue inclinometer is fitted: PB1.
+const STRAP: (usize, u8) = (1, 1);
 
 /// The board.
 #[derive(Debug)]
 pub(super) struct Machine {
-    pub(super) mcu: Wired<Wired<Stm32f427, UsbPort>, Dac>,
+    pub(super) mcu: Wired<Wired<Wired<Stm32f427, UsbPort>, Dac>, Exti>,
     probe: Probe,
     flash: Flash,
 }
@@ -52,28 +56,39 @@ impl Machine {
             let select = Select { port: "GPIOE", pin: pin(3), active: Level::Low };
             part.spi[0].attach_selected(Accelerometer::new(model), select);
         }
+        if wiring.inclinometer {
+            part.drive_port(VirtualNanos(0), STRAP.0, |gpio, registers, context| {
+                gpio.drive(pin(STRAP.1), Some(Level::High), registers, context);
+            });
+        }
         let size = |bytes| NonZeroU64::new(bytes).expect("not zero");
         let usb = Window::new("USB", OTG.2, size(OTG.1))
             .gated(Gate::by("RCC", "AHB2ENR", "OTGFSEN"))
-            .raising(&INTERRUPTS);
+            .raising(&usb_port::INTERRUPTS);
         let dac = Window::new("DAC1", DAC.2, size(DAC.1)).gated(Gate::by("RCC", "APB1ENR", "DACEN"));
+        let exti = Window::new("EXTI line 16", EXTI.2, size(EXTI.1)).raising(&exti::INTERRUPTS);
         let with_usb = Wired::new(part, usb, UsbPort::default())?;
-        Ok(Self { mcu: Wired::new(with_usb, dac, Dac::default())?, probe, flash })
+        let with_dac = Wired::new(with_usb, dac, Dac::default())?;
+        Ok(Self { mcu: Wired::new(with_dac, exti, Exti::default())?, probe, flash })
     }
 
     pub(super) fn part(&mut self) -> &mut Stm32f427 {
-        &mut self.mcu.part.part
+        &mut self.mcu.part.part.part
     }
 
     pub(super) fn usb(&mut self) -> &mut UsbPort {
-        self.mcu.part.chip_mut()
+        self.mcu.part.part.chip_mut()
     }
 
     pub(super) fn dac(&self) -> &Dac {
-        self.mcu.chip()
+        self.mcu.part.chip()
     }
 
     pub(super) fn dac_mut(&mut self) -> &mut Dac {
+        self.mcu.part.chip_mut()
+    }
+
+    pub(super) fn exti(&mut self) -> &mut Exti {
         self.mcu.chip_mut()
     }
 }

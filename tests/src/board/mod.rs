@@ -7,6 +7,7 @@
 
 mod dac;
 pub mod elf;
+mod exti;
 pub mod flash;
 mod machine;
 pub mod otg;
@@ -64,6 +65,15 @@ impl Timer {
     }
 }
 
+/// Where the amplifier's set value comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SetValue {
+    /// The part's own converter, 12 bits.
+    OnChip,
+    /// A converter on PE8 to PE15, 8 bits.
+    Lines,
+}
+
 /// What is soldered to the part. The default is what the firmware is written for.
 #[derive(Debug, Clone, Copy)]
 pub struct Wiring {
@@ -74,8 +84,12 @@ pub struct Wiring {
     pub tick: Option<(Timer, u64)>,
     /// The amplifier's enable line: port (0 is A), pin, and the level that enables.
     pub enable: (usize, u8, bool),
+    /// Where the motor's set value comes from.
+    pub set_value: SetValue,
     /// The accelerometer, if any.
     pub tilt: Option<tilt::Model>,
+    /// Whether the strap for an analogue inclinometer is there; its voltage is [`Stopped::set_analogue`].
+    pub inclinometer: bool,
     /// How often the plant moves, in nanoseconds.
     pub plant_period: Nanos,
 }
@@ -86,7 +100,9 @@ impl Default for Wiring {
             encoder: Timer::General(0),
             tick: Some((Timer::General(2), 84_000_000)),
             enable: (3, 7, true),
+            set_value: SetValue::OnChip,
             tilt: Some(tilt::Model::Lis3dsh),
+            inclinometer: false,
             plant_period: 20_000,
         }
     }

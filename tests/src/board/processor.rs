@@ -19,9 +19,11 @@ use super::flash::{Flash, WRITABLE};
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
 /// The same for the DAC.
 pub(super) const DAC: (u64, u64, u64) = (0x4000_7400, 0x400, 0x4010_0000);
+/// The same for the external interrupt controller.
+pub(super) const EXTI: (u64, u64, u64) = (0x4001_3C00, 0x400, 0x4011_0000);
 
 fn window(address: u64) -> u64 {
-    for (base, size, window) in [OTG, DAC] {
+    for (base, size, window) in [OTG, DAC, EXTI] {
         if (base..base + size).contains(&address) {
             return address - base + window;
         }

@@ -14,7 +14,7 @@ use super::plant::{Drive, Encoder, Nanos, PlantSide};
 use super::processor::DAC;
 use super::tilt::Accelerometer;
 use super::usb_port::UsbPort;
-use super::{Timer, Wiring, rtt};
+use super::{SetValue, Timer, Wiring, rtt};
 
 /// A code on its way to the motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,7 +106,7 @@ impl Stopped<'_> {
     /// What drives the plant.
     #[must_use]
     pub fn drive(&self) -> Drive {
-        Drive { code: self.session.board().dac().code(), enabled: self.world.enabled }
+        Drive { code: self.world.code, enabled: self.world.enabled }
     }
 
     /// Every restart of the part, with its cause.
@@ -115,10 +115,15 @@ impl Stopped<'_> {
         self.session.resets().to_vec()
     }
 
-    /// Pends external interrupt `line` once, as an edge at its source would.
-    pub fn pulse(&mut self, line: u16) {
-        let line = rigless::emulator::InterruptLine::new(line).expect("a line of the part");
-        self.session.pulse(line, self.host);
+    /// Sets the part's supply, which its voltage detector watches.
+    pub fn set_supply(&mut self, millivolts: u32) {
+        use rigless::mcu::Operate;
+        const PWR_CSR: u64 = 0x4000_7004;
+        const PVDO: u64 = 1 << 2;
+        let machine = self.session.board_mut();
+        machine.part().set_supply(millivolts);
+        let status = machine.mcu.peek(VirtualNanos(self.at), PWR_CSR, Width::W32).unwrap_or(0);
+        machine.exti().drive_detector(status & PVDO != 0);
     }
 
     /// Pulls the reset pin low for a moment, as a supply supervisor does in a dip.
@@ -245,7 +250,7 @@ impl World {
         }
         if self.next_step <= at {
             self.next_step = at + self.wiring.plant_period;
-            let drive = Drive { code: session.board().dac().code(), enabled: self.enabled };
+            let drive = Drive { code: self.code, enabled: self.enabled };
             let angle = self.plant.step(at, drive);
             self.encoder.aim(at, angle, self.wiring.plant_period);
         }
@@ -274,9 +279,21 @@ impl World {
         Some(count * 1_000_000_000 / hertz)
     }
 
-    /// Notes a new code at the DAC's pin.
+    /// The code that the amplifier sees.
+    fn set_value(&self, session: &mut Session<Machine>) -> Option<u16> {
+        match self.wiring.set_value {
+            SetValue::OnChip => session.board().dac().code(),
+            SetValue::Lines => {
+                let (gpio, registers) = session.board_mut().part().port(LINES.0);
+                let bit = |index| u16::from(gpio.level(pin(index), registers) == Level::High);
+                Some(LINES.1.clone().rev().fold(0, |code, index| code << 1 | bit(index)))
+            }
+        }
+    }
+
+    /// Notes a new code at the amplifier.
     fn watch_output(&mut self, session: &mut Session<Machine>, at: Nanos) {
-        let code = session.board().dac().code();
+        let code = self.set_value(session);
         if code != self.code {
             self.code = code;
             if let Some(code) = code {
@@ -310,6 +327,8 @@ fn timer_register(session: &mut Session<Machine>, at: Nanos, timer: Timer, offse
 }
 
 const COUNT: u64 = 0x24;
+/// The port and the pins of the 8-bit converter, the lowest bit first.
+const LINES: (usize, std::ops::Range<u8>) = (4, 8..16);
 const GPIO_FIRST: u64 = 0x4002_0000;
 const GPIO_LAST: u64 = 0x4002_2BFF;
 const DHR12R1: u64 = 0x08;
@@ -337,7 +356,10 @@ impl Driver<Machine> for World {
                         self.latch_at = self.trigger_due(session, at);
                         session.pause_at(self.latch_at.map(VirtualNanos));
                     }
-                    GPIO_FIRST..=GPIO_LAST if write => self.watch_enable(session, at),
+                    GPIO_FIRST..=GPIO_LAST if write => {
+                        self.watch_enable(session, at);
+                        self.watch_output(session, at);
+                    }
                     address if !write && address == self.wiring.encoder.count_address() => {
                         self.log.encoder.push(EncoderRead { at, value: value as u32 });
                     }
