@@ -1,0 +1,59 @@
+//! What the firmware says over RTT is readable with nothing but its image: the bytes decoded as `defmt`.
+
+use defmt_decoder::{DecodeError, Table};
+use tests::board::tilt::Health;
+use tests::board::{Board, MILLISECOND, firmware_path, plant};
+use tests::rig::{Rig, task};
+use tests::scenario::board;
+
+/// Every line so far, with its level before it.
+fn log(board: &mut Board) -> Vec<String> {
+    let image = std::fs::read(firmware_path()).expect("the image");
+    let table = Table::parse(&image).expect("the image says how it logs").expect("it logs with defmt");
+    let mut decoder = table.new_stream_decoder();
+    decoder.received(&board.at_stop(|stopped| stopped.log().rtt.clone()));
+    let mut lines = vec![];
+    loop {
+        match decoder.decode() {
+            Ok(frame) => {
+                let level = frame.level().map_or("print", |level| level.as_str());
+                lines.push(format!("{level}: {}", frame.display_message()));
+            }
+            Err(DecodeError::UnexpectedEof) => return lines,
+            Err(DecodeError::Malformed) => panic!("after {lines:?} comes what is no frame"),
+        }
+    }
+}
+
+#[test]
+fn a_start_is_one_readable_line() {
+    let mut board = board(plant::held());
+    board.run_ms(100);
+    assert_eq!(log(&mut board), ["info: started; torque is off"]);
+}
+
+#[test]
+fn a_fault_says_what_is_wrong_and_when_it_is_over() {
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| stopped.tilt().expect("an accelerometer").health = Health::Absent);
+    rig.time_to_safe(60 * MILLISECOND);
+    rig.board.run_ms(10);
+    assert_eq!(
+        log(&mut rig.board).last().map(String::as_str),
+        Some("error: the tilt sensor does not answer")
+    );
+    rig.board.at_stop(|stopped| stopped.tilt().expect("an accelerometer").health = Health::Good);
+    rig.board.run_ms(50);
+    assert_eq!(log(&mut rig.board).last().map(String::as_str), Some("info: the tilt sensor measures"));
+}
+
+#[test]
+fn a_hang_is_named_after_the_reset_that_ended_it() {
+    let mut rig = Rig::pressed();
+    let effect = rig.hang();
+    rig.upset(task::TELEMETRY, effect);
+    rig.board.run_ms(100);
+    let lines = log(&mut rig.board);
+    println!("{lines:#?}");
+    assert!(lines.iter().any(|line| line.starts_with("error: ")), "{lines:?}");
+}
