@@ -1,0 +1,193 @@
+//! What protects against too much for too long, on the board: the heat of the winding and the energy of a stiff wall.
+//! Either takes torque back and says so as a limit in force; neither is a fault.
+
+use std::sync::{Arc, Mutex};
+
+use control_core::Config;
+use control_core::config::{FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::event::Limits;
+use control_core::units::{
+    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+};
+use fixed::types::I16F16;
+use link::Command;
+use link::frames::EventKind;
+use tests::board::{Board, Drive, MILLISECOND, Nanos, plant};
+use tests::pc::Pc;
+use tests::rig::ZERO_TORQUE;
+use tests::scenario::board;
+
+const SECOND: Nanos = 1_000 * MILLISECOND;
+/// Steps of the 12-bit converter from zero to full torque.
+const SPAN: f64 = 2_047.0;
+/// A count of the default device along the needle.
+const MM_PER_COUNT: f64 = 0.015_708;
+const CONTINUOUS_MNM: f64 = 28.8;
+const TICKS_PER_S: f64 = 10_000.0;
+
+fn q(value: f64) -> I16F16 {
+    I16F16::from_num(value)
+}
+
+/// One wall of 5.6 N/mm at contact that does not give way within reach.
+fn stiff_wall() -> Config {
+    let parabola = |vertex: f64, compliance: f64, base: f64| Parabola {
+        vertex: Millimetres(q(vertex)),
+        compliance: JogCompliance(q(compliance)),
+        base: Newtons(q(base)),
+    };
+    let layer = Layer {
+        tissue: Tissue::Other,
+        top: Millimetres(q(0.0)),
+        wall: Some(Wall {
+            elastic: parabola(-5.0, 1.8, -25.0 / 1.8),
+            puncture_travel: Millimetres(q(0.4)),
+            relief: parabola(1.0, 1.0, 0.0),
+            unload: Stiffness(q(1.0)),
+        }),
+        friction: FrictionPerMillimetre(q(0.0)),
+    };
+    let mut config = Config {
+        friction: FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) },
+        layers: [layer].into_iter().collect(),
+        ..Config::default()
+    };
+    config.limits.stiffness = Stiffness(q(7.0));
+    config
+}
+
+/// Whether a limit was told, and when first; a fault ends the test.
+fn first_told(pc: &Pc, limit: Limits) -> Option<u64> {
+    let fault = pc.heard.events.iter().find(|event| matches!(event.kind, EventKind::Fault { .. }));
+    assert_eq!(fault, None, "a limit in force is no fault");
+    let tells = |kind: EventKind| matches!(kind, EventKind::Limits { in_force } if in_force.contains(limit));
+    pc.heard.events.iter().find(|event| tells(event.kind)).map(|event| event.tick)
+}
+
+/// Torque of every tick from the start on, in mN·m, and whether the thermal limit was told.
+fn hold_strong(continuous_mnm: f64) -> (Vec<f64>, bool) {
+    const FULL_SCALE_MNM: f64 = 60.0;
+    let mut config = stiff_wall();
+    config.device.full_scale_torque = MillinewtonMetres(q(FULL_SCALE_MNM));
+    config.limits.torque = MillinewtonMetres(q(FULL_SCALE_MNM));
+    config.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
+    config.limits.winding_time_s = 2;
+    if let Some(wall) = &mut config.layers[0].wall {
+        wall.puncture_travel = Millimetres(q(0.75));
+    }
+    // 0.7 mm into 6 N/mm: 4.3 N, 43 mN·m.
+    let deep = (0.7 / MM_PER_COUNT) as i64;
+    let hand = plant::path(vec![(200 * MILLISECOND, 0), (500 * MILLISECOND, deep)]);
+    let mut board = board(plant::by_hand(hand));
+    let mut pc = Pc::new();
+    pc.connect(&mut board);
+    pc.must(&mut board, Command::Configure(config));
+    pc.must(&mut board, Command::Start);
+    board.at_stop(|stopped| stopped.log().written.clear());
+    pc.run_ms(&mut board, 9_000);
+    assert!(board.at_stop(|stopped| stopped.drive().enabled), "torque stays on");
+    let written = board.at_stop(|stopped| std::mem::take(&mut stopped.log().written));
+    let torque = |code: u16| (f64::from(ZERO_TORQUE) - f64::from(code)) * FULL_SCALE_MNM / SPAN;
+    let torques = written.iter().map(|output| torque(output.code)).collect();
+    (torques, first_told(&pc, Limits::THERMAL).is_some())
+}
+
+/// The winding by itself, in floating point: the root of the largest mean square over its time constant of 2 s.
+fn hottest(torques: &[f64]) -> f64 {
+    let (mut heat, mut hottest) = (0.0, 0.0_f64);
+    for torque in torques {
+        heat += (torque * torque - heat) / (2.0 * TICKS_PER_S);
+        hottest = hottest.max(heat);
+    }
+    hottest.sqrt()
+}
+
+#[test]
+fn torque_falls_before_the_continuous_one_is_exceeded_and_the_limit_is_told() {
+    let (torques, told) = hold_strong(CONTINUOUS_MNM);
+    let (peak, last) = (torques.iter().fold(0.0_f64, |a, b| a.max(*b)), torques[torques.len() - 1]);
+    println!("peak {peak:.1}, in the end {last:.1}, over the time constant {:.2} mN·m", hottest(&torques));
+    assert!(peak > 1.4 * CONTINUOUS_MNM, "more than the continuous torque is there for a while");
+    assert!(hottest(&torques) <= 1.001 * CONTINUOUS_MNM, "{} mN·m", hottest(&torques));
+    assert!((last - CONTINUOUS_MNM).abs() < 0.5, "{last} mN·m in the end");
+    assert!(told, "the limit is told");
+
+    let (torques, told) = hold_strong(60.0);
+    println!("without the limit {:.2} mN·m over the time constant", hottest(&torques));
+    assert!(hottest(&torques) > 1.3 * CONTINUOUS_MNM && !told, "without the limit it gets too hot");
+}
+
+/// 30 g of needle and roller under a light hand, which leans on the wall over a second with 0.4 N and is knocked once.
+struct Needle {
+    at: Nanos,
+    leans_from: Nanos,
+    position_m: f64,
+    speed_m_per_s: f64,
+    /// Where it was at every step after the knock, in µm.
+    track: Arc<Mutex<Vec<f64>>>,
+}
+
+impl Needle {
+    const STEP: Nanos = 10_000;
+    const KNOCKED_AFTER: Nanos = 2 * SECOND;
+
+    fn advance(&mut self, pushed_n: f64) {
+        let (mass_kg, spring, hand_damping, damping, dt) = (0.030, 100.0, 0.02, 0.02, 1e-5);
+        let leaning = (self.at.saturating_sub(self.leans_from) as f64 / SECOND as f64).min(1.0);
+        let hand_n = spring * (0.004 * leaning - self.position_m) - hand_damping * self.speed_m_per_s;
+        self.speed_m_per_s += (hand_n - damping * self.speed_m_per_s + pushed_n) / mass_kg * dt;
+        if self.at == self.leans_from + Self::KNOCKED_AFTER {
+            self.speed_m_per_s += 0.03;
+        }
+        self.position_m += self.speed_m_per_s * dt;
+        self.at += Self::STEP;
+    }
+
+    fn step(&mut self, at: Nanos, drive: Drive) -> i64 {
+        let code = drive.code.filter(|_| drive.enabled).unwrap_or(ZERO_TORQUE);
+        // Torque in the insertion direction over 10 mm of roller.
+        let pushed_n = (f64::from(code) - f64::from(ZERO_TORQUE)) * CONTINUOUS_MNM / SPAN / 10.0;
+        while self.at < at {
+            self.advance(pushed_n);
+            if self.at > self.leans_from + Self::KNOCKED_AFTER + SECOND / 2 {
+                self.track.lock().expect("nobody panicked").push(self.position_m * 1e6);
+            }
+        }
+        (self.position_m * 1e3 / MM_PER_COUNT).floor() as i64
+    }
+}
+
+/// Deviation of the needle in the last half second, in µm, and when the observer was told to be in force.
+fn ringing(config: Config) -> (f64, Option<u64>) {
+    let track = Arc::new(Mutex::new(Vec::new()));
+    let mut board: Board = board(plant::held());
+    let mut pc = Pc::new();
+    pc.connect(&mut board);
+    pc.must(&mut board, Command::Configure(config));
+    pc.must(&mut board, Command::Start);
+    let now = board.now();
+    let leans_from = now.next_multiple_of(Needle::STEP);
+    let mut needle =
+        Needle { at: leans_from, leans_from, position_m: 0.0, speed_m_per_s: 0.0, track: track.clone() };
+    board.at_stop(|stopped| {
+        stopped.set_plant(Box::new(move |at: Nanos, drive: Drive| needle.step(at, drive)));
+    });
+    pc.run_ms(&mut board, 3_000);
+    let track = track.lock().expect("nobody panicked");
+    assert!(track.len() > 40_000, "{} steps", track.len());
+    let mean = track.iter().sum::<f64>() / track.len() as f64;
+    let variance = track.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / track.len() as f64;
+    (variance.sqrt(), first_told(&pc, Limits::PASSIVITY))
+}
+
+#[test]
+fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
+    let (quiet, told) = ringing(stiff_wall());
+    let (loud, never) = ringing(Config { passivity_damping: Damping::default(), ..stiff_wall() });
+    println!(
+        "deviation without the observer {loud:.1} µm, with it {quiet:.1} µm; first told in tick {told:?}"
+    );
+    assert!(loud > 50.0, "it should ring without the observer: {loud} µm");
+    assert!(quiet < 8.0, "it should be quiet with the observer: {quiet} µm, one count is 15.7 µm");
+    assert!(told.is_some() && never.is_none(), "the observer is a limit in force: {told:?}, {never:?}");
+}
