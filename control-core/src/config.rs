@@ -234,3 +234,14 @@ impl Default for Config {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_converter_reaches_as_far_one_way_as_the_other() {
+        assert_eq!((DacWidth::Bits8.mid_scale(), DacWidth::Bits8.span()), (128, 127));
+        assert_eq!((DacWidth::Bits12.mid_scale(), DacWidth::Bits12.span()), (2048, 2047));
+    }
+}

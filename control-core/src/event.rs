@@ -131,3 +131,61 @@ impl Transitions {
         self == Self::default()
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::string::ToString;
+
+    #[test]
+    fn a_set_of_limits_holds_each_once() {
+        let both = Limits::TORQUE.with(Limits::SLEW);
+        assert_eq!(both.with(Limits::TORQUE), both);
+        assert!(both.contains(Limits::SLEW) && !both.contains(Limits::THERMAL));
+        assert!(!both.contains(Limits::SLEW.with(Limits::THERMAL)), "all of them");
+    }
+
+    #[test]
+    fn any_transition_is_one() {
+        assert!(Transitions::default().is_empty());
+        for layer in [1, 0x80] {
+            assert!(!Transitions { contact: layer, ..Transitions::default() }.is_empty());
+            assert!(!Transitions { puncture: layer, ..Transitions::default() }.is_empty());
+            assert!(!Transitions { exit: layer, ..Transitions::default() }.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_state_is_its_number_and_six_of_the_eight_have_torque() {
+        for code in 0..8 {
+            let state = State::from_code(code).unwrap();
+            assert_eq!(state as u8, code);
+            assert_eq!(state.is_powered(), (1..=6).contains(&code), "{state:?}");
+        }
+        assert_eq!(State::from_code(8), None);
+    }
+
+    #[test]
+    fn each_fault_has_words_of_its_own() {
+        use Fault::*;
+        let faults = [
+            EncoderJump,
+            Travel,
+            HostSilent,
+            Tilt,
+            Overrun,
+            LinkLost,
+            Watchdog,
+            Crash,
+            Brownout,
+            StoredConfig,
+            EncoderFrozen,
+        ];
+        let words: BTreeSet<_> = faults.iter().map(ToString::to_string).collect();
+        assert_eq!(words.len(), faults.len());
+        assert!(words.iter().all(|word| word.len() > 10), "{words:?}");
+    }
+}

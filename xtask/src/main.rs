@@ -7,6 +7,7 @@ mod bench;
 mod elf;
 mod firmware;
 mod flash;
+mod mutants;
 mod rows;
 mod setup;
 mod shell;
@@ -24,6 +25,7 @@ The project's chores.
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask bench             measures, prints the table and writes target/bench.json
+  cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: most of an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
 
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         "test" => test::run(rest),
         "firmware" => no_more(rest).and_then(|()| firmware::report(&firmware::build()?)),
         "flash" => flash::run(rest),
+        "mutants" => mutants::run(rest),
         "bench" => no_more(rest).and_then(|()| bench::run()),
         other => Err(Failure::usage(format!(
             "`{other}` is no chore of this project; `cargo xtask help` lists them"

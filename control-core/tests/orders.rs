@@ -1,0 +1,195 @@
+//! Every order in every mode, and every bound at the last value within it and the first beyond.
+
+use control_core::config::DacWidth;
+use control_core::event::{Fault, Limits, State};
+use control_core::excitation::{Excitation, Servo, Signal};
+use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Stiffness};
+use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
+use fixed::types::{I8F24, I16F16};
+
+fn controller() -> Controller {
+    Controller::new(Plan::new(&Config::default()).expect("the default is sound"))
+}
+
+fn tick(c: &mut Controller, count: i32) -> TickOutput {
+    c.tick(TickInput { count: Counts(count), ..TickInput::default() })
+}
+
+/// Powered at `count`.
+fn started_at(count: i32) -> Controller {
+    let mut c = controller();
+    tick(&mut c, count);
+    c.order(Order::Start);
+    assert!(tick(&mut c, count).enable);
+    c
+}
+
+fn other_plan() -> Plan {
+    let mut config = Config::default();
+    config.device.dac = DacWidth::Bits8;
+    Plan::new(&config).expect("sound")
+}
+
+fn ramps(travel_mm: i32) -> Excitation {
+    Excitation {
+        signal: Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(1)), ramp_ms: 100 },
+        duration_ms: 1_000,
+        servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
+        travel: Millimetres(I16F16::from_num(travel_mm)),
+    }
+}
+
+fn state(output: &TickOutput) -> Option<State> {
+    State::from_code(output.sample.state)
+}
+
+#[test]
+fn a_stop_takes_torque_away_and_does_not_clear_a_fault() {
+    let mut c = started_at(0);
+    c.order(Order::Stop);
+    let output = tick(&mut c, 0);
+    assert_eq!((output.enable, state(&output)), (false, Some(State::Idle)));
+
+    let mut c = started_at(0);
+    c.order(Order::Trip(Fault::Tilt));
+    c.order(Order::Stop);
+    let output = tick(&mut c, 0);
+    assert_eq!((output.enable, state(&output)), (false, Some(State::Fault)));
+    c.order(Order::Start);
+    assert!(tick(&mut c, 0).enable, "only a start does");
+}
+
+#[test]
+fn the_first_of_two_faults_is_told() {
+    let mut c = started_at(0);
+    c.order(Order::Trip(Fault::Tilt));
+    c.order(Order::Trip(Fault::Overrun));
+    assert_eq!(tick(&mut c, 0).tripped, Some(Fault::Tilt));
+    assert_eq!(tick(&mut c, 0).tripped, None, "and once");
+}
+
+#[test]
+fn the_zero_is_where_the_needle_is_and_moves_only_while_torque_is_off() {
+    let mut c = controller();
+    tick(&mut c, 500);
+    c.order(Order::Zero);
+    assert_eq!(tick(&mut c, 510).sample.count, 10);
+    c.order(Order::Start);
+    tick(&mut c, 510);
+    c.order(Order::Zero);
+    assert_eq!(tick(&mut c, 512).sample.count, 12, "powered, it stays");
+}
+
+#[test]
+fn a_plan_is_taken_only_while_torque_is_off() {
+    let mut c = controller();
+    c.order(Order::Configure(other_plan()));
+    assert_eq!(c.plan().config().device.dac, DacWidth::Bits8);
+    let mut c = started_at(0);
+    c.order(Order::Configure(other_plan()));
+    assert_eq!(c.plan().config().device.dac, DacWidth::Bits12);
+}
+
+#[test]
+fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
+    let mut c = controller();
+    tick(&mut c, 400);
+    c.order(Order::Configure(other_plan()));
+    let output = tick(&mut c, 400);
+    assert_eq!(output.speed.0, I16F16::ZERO, "no jump from zero is taken for speed");
+    assert_eq!(output.transitions.contact, 0b111, "and the layers it is in are counted");
+}
+
+#[test]
+fn an_excitation_begins_where_the_motor_is_and_only_while_torque_is_off() {
+    let mut c = controller();
+    tick(&mut c, 1_000);
+    c.order(Order::Excite(ramps(2)));
+    let output = tick(&mut c, 1_000);
+    assert_eq!(
+        (output.tripped, state(&output)),
+        (None, Some(State::Excitation)),
+        "15.7 mm deep, 2 mm of travel"
+    );
+
+    let mut c = started_at(0);
+    c.order(Order::Excite(ramps(2)));
+    assert_eq!(state(&tick(&mut c, -100)), Some(State::Fault), "100 counts in a tick, running");
+    let mut c = started_at(-100);
+    c.order(Order::Excite(ramps(2)));
+    assert_eq!(state(&tick(&mut c, -100)), Some(State::Approach), "it runs on");
+}
+
+#[test]
+fn an_encoder_may_move_as_far_in_a_tick_as_the_limit_and_no_further() {
+    let most = i32::from(Config::default().limits.max_counts_per_tick);
+    for direction in [-1, 1] {
+        assert_eq!(tick(&mut started_at(0), direction * most).tripped, None);
+        let further = tick(&mut started_at(0), direction * (most + 1)).tripped;
+        assert_eq!(further, Some(Fault::EncoderJump));
+    }
+    let mut c = controller();
+    tick(&mut c, 0);
+    assert_eq!(tick(&mut c, 10_000).tripped, None, "with torque off a needle is moved as one likes");
+}
+
+#[test]
+fn a_needle_may_go_to_the_end_of_its_travel_and_no_further() {
+    // 60 mm at 15.708 µm a count, rounded up.
+    let end = 3_820;
+    for direction in [-1, 1] {
+        let mut c = started_at(direction * (end - 1));
+        assert_eq!(tick(&mut c, direction * end).tripped, None);
+        assert_eq!(tick(&mut c, direction * (end + 1)).tripped, Some(Fault::Travel));
+    }
+}
+
+#[test]
+fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
+    let silence = i32::from(Config::default().limits.heartbeat_ms) * 10;
+    let mut c = started_at(0);
+    c.order(Order::Heartbeat);
+    for silent in 1..=silence {
+        // A count to and fro: the encoder lives.
+        assert_eq!(tick(&mut c, silent % 2).tripped, None, "{silent} ticks");
+    }
+    assert_eq!(tick(&mut c, 0).tripped, Some(Fault::HostSilent));
+    let mut off = controller();
+    assert!(
+        (0..3 * silence).all(|_| tick(&mut off, 0).tripped.is_none()),
+        "with torque off nobody has to speak"
+    );
+}
+
+#[test]
+fn the_torque_limit_is_told_when_it_holds_torque_down() {
+    let mut config = Config::default();
+    // 1.005 N; the wall alone asks for 1.0 N, and damping at 50 mm/s for 0.025 N.
+    config.limits.torque = MillinewtonMetres(I16F16::from_num(10.05));
+    config.limits.travel = Millimetres(I16F16::from_num(40));
+    config.damping = Damping(I8F24::from_num(0.0005));
+    for (ticks_per_count, in_force) in [(3, true), (30, false)] {
+        let mut c = Controller::new(Plan::new(&config).expect("sound"));
+        tick(&mut c, 0);
+        c.order(Order::Start);
+        let mut told = Limits::default();
+        for at in 0..190 * ticks_per_count {
+            c.order(Order::Heartbeat);
+            told = told.with(tick(&mut c, at / ticks_per_count).limits);
+        }
+        assert_eq!(told.contains(Limits::TORQUE), in_force, "{ticks_per_count} ticks a count: {told:?}");
+        assert!(!told.contains(Limits::THERMAL), "the winding is cold: {told:?}");
+    }
+}
+
+#[test]
+fn torque_is_given_as_far_as_it_has_faded_in() {
+    let mut c = started_at(0);
+    let fade_ticks = i32::from(Config::default().limits.fade_in_ms) * 10;
+    for at in 1..=2 * fade_ticks {
+        c.order(Order::Heartbeat);
+        let in_force = tick(&mut c, -(at % 2)).limits.contains(Limits::FADE_IN);
+        // The start itself was the first tick of it; a share of a tick is rounded down.
+        assert_eq!(in_force, at <= fade_ticks, "tick {at} of {fade_ticks}");
+    }
+}

@@ -1,0 +1,131 @@
+//! `cargo xtask mutants`: changes the code a thousand times in small ways and sees that the tests notice. By hand, for it takes
+//! most of an hour; what may survive, and why, stands in `tests/mutants.md`.
+
+use crate::shell::{self, Failure, cargo};
+use std::fs;
+use std::path::Path;
+
+/// The crates, with the files of each that only the board can test.
+const CRATES: [(&str, &[&str]); 3] = [
+    ("control-core", &[]),
+    ("link", &[]),
+    (
+        "firmware",
+        &[
+            "firmware/src/main.rs",
+            "firmware/src/app.rs",
+            "firmware/src/board.rs",
+            "firmware/src/board/**",
+            "firmware/src/tasks.rs",
+            "firmware/src/tasks/**",
+        ],
+    ),
+];
+/// A mutant that runs longer hangs.
+const LIMIT_S: &str = "60";
+/// Of the mutants that build, in per cent.
+const CAUGHT_AT_LEAST: usize = 90;
+
+/// What became of the mutants of a crate.
+#[derive(Default)]
+struct Tally {
+    caught: usize,
+    unviable: usize,
+    survivors: Vec<String>,
+}
+
+/// Mutates the crates named, or all of them.
+pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
+    if let Some(unknown) = names.iter().find(|name| CRATES.iter().all(|(known, _)| known != name)) {
+        return Err(Failure::usage(format!(
+            "`{unknown}` is not mutated; these are: {}",
+            CRATES.map(|(name, _)| name).join(" ")
+        )));
+    }
+    if !shell::is_on_path("cargo-mutants") {
+        return Err(Failure::new(
+            "cargo-mutants is not on the PATH; install it with `cargo install cargo-mutants --locked`",
+        ));
+    }
+    let mut all = Tally::default();
+    for (name, board_only) in CRATES {
+        if names.is_empty() || names.iter().any(|asked| asked == name) {
+            let tally = mutate(name, board_only)?;
+            println!("{name:<13} {}", said(&tally));
+            all.caught += tally.caught;
+            all.unviable += tally.unviable;
+            all.survivors.extend(tally.survivors);
+        }
+    }
+    println!("{:<13} {}", "all", said(&all));
+    judge(&all)
+}
+
+fn said(tally: &Tally) -> String {
+    let Tally { caught, unviable, survivors } = tally;
+    let share = 100.0 * *caught as f64 / (caught + survivors.len()).max(1) as f64;
+    format!("{caught} caught, {} survived, {unviable} did not build: {share:.1} % caught", survivors.len())
+}
+
+fn mutate(name: &str, board_only: &[&str]) -> Result<Tally, Failure> {
+    let folder = shell::target().join("mutants").join(name);
+    let mut command = cargo();
+    command.args(["mutants", "--package", name, "--profile", "mutants", "--baseline", "skip"]);
+    command.args(["--timeout", LIMIT_S, "--no-shuffle", "--output"]).arg(&folder);
+    board_only.iter().for_each(|file| {
+        command.args(["--exclude", file]);
+    });
+    command.args(["--", "--lib", "--tests"]);
+    // Survivors are no failure of the run; the lists say what there was.
+    let _ = shell::run(&mut command);
+    let list = |what: &str| lines(&folder.join("mutants.out").join(what).with_extension("txt"));
+    let mut survivors = list("missed")?;
+    // A mutant that hangs has been noticed.
+    let caught = list("caught")?.len() + list("timeout")?.len();
+    survivors.iter_mut().for_each(|survivor| *survivor = without_place(survivor));
+    Ok(Tally { caught, unviable: list("unviable")?.len(), survivors })
+}
+
+fn lines(path: &Path) -> Result<Vec<String>, Failure> {
+    let text = fs::read_to_string(path)
+        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
+    Ok(text.lines().map(str::to_string).collect())
+}
+
+/// `file.rs:12:34: what` without its line and column, which any edit above moves.
+fn without_place(mutant: &str) -> String {
+    let mut parts = mutant.splitn(4, ':');
+    match (parts.next(), parts.nth(2)) {
+        (Some(file), Some(what)) => format!("{file}:{what}"),
+        _ => mutant.to_string(),
+    }
+}
+
+/// Enough are caught, and every survivor has its reason.
+fn judge(all: &Tally) -> Result<(), Failure> {
+    let reasons = lines(&shell::top().join("tests/mutants.md"))?.join("\n");
+    let unexplained: Vec<&String> =
+        all.survivors.iter().filter(|survivor| !reasons.contains(&format!("`{survivor}`"))).collect();
+    unexplained.iter().for_each(|survivor| println!("no reason given for: {survivor}"));
+    if 100 * all.caught < CAUGHT_AT_LEAST * (all.caught + all.survivors.len()) {
+        return Err(Failure::new(format!("fewer than {CAUGHT_AT_LEAST} % of the mutants were caught")));
+    }
+    if unexplained.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("{} survivors have no reason in tests/mutants.md", unexplained.len())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mutant_is_known_by_its_file_and_change() {
+        assert_eq!(
+            without_place("link/src/a.rs:1:2: replace A::b -> u8 with 0"),
+            "link/src/a.rs: replace A::b -> u8 with 0"
+        );
+    }
+}
