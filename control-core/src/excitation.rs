@@ -176,7 +176,6 @@ pub struct Target {
 pub struct Reference {
     signal: Signal,
     position: I32F32,
-    elapsed_ticks: u32,
     step: u8,
     leg: Leg,
     phases: [u32; MAX_LINES],
@@ -196,7 +195,6 @@ impl Reference {
         let mut reference = Self {
             signal: signal.clone(),
             position: I32F32::ZERO,
-            elapsed_ticks: 0,
             step: 0,
             leg: Leg { outwards: true, level: I16F16::ZERO, remaining_ticks: 0 },
             phases: [0; MAX_LINES],
@@ -218,7 +216,6 @@ impl Reference {
             self.next_leg();
         }
         self.leg.remaining_ticks = self.leg.remaining_ticks.saturating_sub(1);
-        self.elapsed_ticks = self.elapsed_ticks.wrapping_add(1);
         let mut target = Target::default();
         match &self.signal {
             Signal::Hold => {}

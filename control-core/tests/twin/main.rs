@@ -74,22 +74,26 @@ fn friction(stiffest: f64, strongest: f64) -> impl Strategy<Value = FrictionLaw>
 /// A wall that is likely to be valid: its slope and force are shares of what is allowed.
 fn wall(stiffest: f64, strongest: f64) -> impl Strategy<Value = Option<Wall>> {
     let parts = (0.1..0.5_f64, 0.05..0.8_f64, 0.2..5.0_f64, 0.0..1.0_f64, 0.05..0.4_f64);
-    let wall = parts.prop_map(move |(slope, force, beyond, relief, unload)| {
+    // How far before contact the rising parabola turns, and what stays of the relief for good; mostly neither.
+    let shapes = (prop_oneof![Just(0.0), 0.0..1.0_f64], prop_oneof![Just(0.0), 0.0..1.0_f64]);
+    let wall = (parts, shapes).prop_map(move |((slope, force, beyond, relief, unload), (before, stays))| {
         let (slope, force) = (slope * stiffest, force * strongest);
-        // f = T²/a and 2T/a at the puncture.
-        let puncture = (2.0 * force / slope).clamp(0.05, 20.0);
-        let compliance = (2.0 * puncture / slope).clamp(0.05, 1_000.0);
-        let peak = puncture * puncture / compliance;
-        let relief_compliance = (beyond * beyond / (relief * peak).max(0.002)).clamp(0.05, 1_000.0);
-        let parabola = |vertex: f64, compliance: f64| Parabola {
+        // f = ((T + k·T_p)² − (k·T_p)²)/a, of which the force and the slope at the puncture T_p are known.
+        let puncture = (2.0 * force * (1.0 + before) / (slope * (1.0 + 2.0 * before))).clamp(0.05, 20.0);
+        let compliance = (2.0 * puncture * (1.0 + before) / slope).clamp(0.05, 1_000.0);
+        let vertex = -before * puncture;
+        let peak = puncture * puncture * (1.0 + 2.0 * before) / compliance;
+        let base = stays * relief * peak;
+        let relief_compliance = (beyond * beyond / (relief * peak - base).max(0.002)).clamp(0.05, 1_000.0);
+        let parabola = |vertex: f64, compliance: f64, base: f64| Parabola {
             vertex: Millimetres(q(vertex)),
             compliance: JogCompliance(q(compliance)),
-            base: Newtons::default(),
+            base: Newtons(q(base)),
         };
         Wall {
-            elastic: parabola(0.0, compliance),
+            elastic: parabola(vertex, compliance, -vertex * vertex / compliance),
             puncture_travel: Millimetres(q(puncture)),
-            relief: parabola(puncture + beyond, relief_compliance),
+            relief: parabola(puncture + beyond, relief_compliance, base),
             unload: Stiffness(q((unload * stiffest).max(0.05))),
         }
     });
