@@ -30,6 +30,9 @@ fn field(change: impl FnOnce(&mut Config)) -> Option<Field> {
 /// A value, a step beyond the least and the most that it may be, and how it is set.
 type Range = (Field, [f64; 2], [f64; 2], fn(&mut Config, f64));
 
+/// A change of the law of friction.
+type ChangedLaw = fn(&mut FrictionLaw);
+
 /// A tissue that asks for next to nothing, so that what is tested is alone in being refused.
 fn weak(config: &mut Config) {
     config.limits.stiffness = Stiffness(q(2.0));
@@ -112,7 +115,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
             }
         }
     }
-    let papers: [(Field, fn(&mut FrictionLaw)); 6] = [
+    let papers: [(Field, ChangedLaw); 6] = [
         (Field::LevelLength, |l| {
             if let FrictionLaw::Paper { level_length, .. } = l {
                 level_length.0 = q(0.9)
