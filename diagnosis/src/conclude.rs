@@ -2,16 +2,17 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
-use crate::estimate::{Estimator, sensor_noise};
+use crate::estimate::Estimator;
 use crate::fit::Fit;
 use crate::judge;
 use crate::kalman::tolerant;
 use crate::locate::{self, Map};
 use crate::model::{Nominal, total};
 use crate::noise::Colour;
+use crate::null::command_scale;
 use crate::outcome::{Evidence, Outcome, Series};
 use crate::patch::{patch, place};
-use crate::pipeline::{Found, Rival, Search, command_scale, lay_all};
+use crate::pipeline::{Found, Rival, Search, lay_all};
 use crate::prescribe;
 use crate::report::{Both, FitTable, Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
 use crate::select::{Bench, Candidate};
@@ -150,8 +151,36 @@ const LEFT_MATTERS: f64 = 0.025;
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
-/// Part by which a refit must lower the held-out residual before values are called wrong.
-const REFIT_MATTERS: f64 = 0.05;
+/// Part of the refit's mean square that doubtful effects must leave at the most for the mismatch to be called repeatable.
+const REPEATS: f64 = 0.7;
+
+/// Whether at least one of the values that say how large an effect is cannot be zero.
+fn is_there(named: &Named) -> bool {
+    let drifts = matches!(named.name, EffectName::FrictionDrift | EffectName::GainDrift);
+    let size = |key: &str| !(drifts && key == "time_constant") && !key.starts_with("period");
+    named.parameters.is_empty()
+        || named.parameters.iter().any(|(key, p)| size(key) && p.ci95[0] * p.ci95[1] > 0.0)
+}
+
+/// Part of the force that a refit must take from the held-out residual before values are called wrong.
+const REFIT_MATTERS: f64 = 0.02;
+
+/// Whether other values explain held-out recordings better than the rig's own, each recording's bias left aside.
+fn refit_matters(estimator: &Estimator, tracks: &[Track], held: &Residuals, force: f64) -> bool {
+    let unbiased = |residuals: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let centred = |(x, track): (&Vec<f64>, &Track)| {
+            let moving = estimator.moving(track);
+            let (sum, n) =
+                x.iter().zip(&moving).filter(|(_, m)| **m).fold((0.0, 0.0), |a, (x, _)| (a.0 + x, a.1 + 1.0));
+            let mean = if n > 0.0 { sum / n } else { 0.0 };
+            x.iter().map(|x| x - mean).collect()
+        };
+        residuals.iter().zip(tracks).map(centred).collect()
+    };
+    let (before, after) = (unbiased(&held.nominal), unbiased(&held.refit));
+    let taken = estimator.rms(&before, tracks).powi(2) - estimator.rms(&after, tracks).powi(2);
+    taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after)[0] > 0.0
+}
 
 pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let scale = command_scale(&s.nominal, &s.fit_tracks);
@@ -172,7 +201,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         holdout: estimator.rms(b, &held_tracks),
     };
     let (inertia, _, _) = values::scale(&nominal, &patched);
-    let floor = sensor_noise(&fit_tracks, &patched.noise, estimator.bandwidth_hz) * inertia;
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    let floor = estimator.counting(&fit_tracks, &patched.noise, count) * inertia;
     let mut table = FitTable {
         metric: "force_rmse".into(),
         unit: nominal.rig.kind.force().into(),
@@ -193,8 +223,10 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let leftover = if explained > 0.0 { left / explained } else { 0.0 };
     let matters = left.sqrt() > LEFT_MATTERS * table.force_rms.fit;
     let doubt = if matters { 1.0 / (1.0 + (leftover / 0.6).powi(2)) } else { 1.0 };
-    // A model that leaves half of the force has not understood it, whatever it names.
-    let understood = table.patched.holdout < 0.5 * table.force_rms.holdout;
+    // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
+    let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
+    let understood =
+        part_of_force < 0.5 && (part_of_force < 0.12 || table.patched.holdout < 0.65 * table.refit.holdout);
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
@@ -228,7 +260,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         };
         effects.push((one.holdout.sum, named));
     }
-    effects.retain(|(_, e)| e.confidence >= 0.5 && understood);
+    effects.retain(|(_, e)| e.confidence >= 0.5 && understood && is_there(e));
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
     let above = |x: f64| (x * x - floor * floor).max(0.0);
@@ -237,8 +269,10 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         if before > 0.0 { (above(table.patched.holdout) / before).min(1.0) } else { 0.0 }
     };
     let carries = maps.iter().any(|m| m.significant && m.carries > 0.1);
+    // What was found and is too unsure to be named still says that the mismatch repeats, if it explains much of it.
+    let helps = !found.is_empty() && table.patched.holdout.powi(2) < REPEATS * table.refit.holdout.powi(2);
     let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
-    let refit_matters = table.refit.holdout < (1.0 - REFIT_MATTERS) * table.nominal.holdout;
+    let refit_matters = refit_matters(&estimator, &held_tracks, &on_held, table.force_rms.holdout);
     // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something.
     let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
     let foreign =
@@ -254,7 +288,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     }
     let verdict = if !effects.is_empty() {
         Verdict::MissingPhysics
-    } else if disturbed && (carries || (understood && !found.is_empty())) {
+    } else if disturbed && (carries || (understood && helps)) {
         Verdict::Unexplained
     } else if disturbed {
         Verdict::RandomDisturbance

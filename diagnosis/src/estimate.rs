@@ -43,7 +43,7 @@ impl Estimator {
 }
 
 /// What the sensor alone puts into an acceleration estimate of some bandwidth, root mean square.
-pub(crate) fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
+fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
     let mut sum = 0.0;
     let mut count = 0.0;
     for track in tracks {
@@ -79,6 +79,20 @@ impl Estimator {
             return track.rest.iter().map(|rest| !rest).collect();
         }
         out
+    }
+
+    /// What reading whole counts alone puts into the residual on rows that move, root mean square: the smoothed motion is
+    /// read anew and goes through the estimator. Slow motion makes of it a sawtooth that no formula for white noise has.
+    pub(crate) fn counting(&self, tracks: &[Track], noise: &Noise, count: f64) -> f64 {
+        let errors: Vec<Vec<f64>> = tracks
+            .iter()
+            .map(|track| {
+                let mut read = track.clone();
+                read.z = (0..track.blocks()).map(|j| track.counting_error(j, count)).collect();
+                self.residual(&read, &Total::zero(track.blocks()))
+            })
+            .collect();
+        self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
     }
 
     /// Root mean square of residuals over the rows that move.

@@ -169,13 +169,17 @@ impl Gains {
         match input {
             Input::Held(a) => {
                 for (j, a) in a.iter().enumerate() {
-                    let h = track.span[j];
+                    let (a, h) = (if track.stuck[j] { 0.0 } else { *a }, track.span[j]);
                     run(j, a * h, 0.5 * a * h * h, a * track.tau2[j]);
                 }
             }
             Input::Rows { dv, dq, dz } => {
                 for j in 0..n {
-                    run(j, dv[j], dq[j], dz[j]);
+                    if track.stuck[j] {
+                        run(j, 0.0, 0.0, 0.0);
+                    } else {
+                        run(j, dv[j], dq[j], dz[j]);
+                    }
                 }
             }
             Input::Sensor(a) => {

@@ -61,6 +61,16 @@ impl Span {
         }
     }
 
+    /// Widest gap worth looking for: one that the axis crosses within a moment at its fast speed.
+    fn widest_gap(&self) -> f64 {
+        (0.08 * self.speed).max(60.0 * self.count)
+    }
+
+    /// Least command at which a grip lets go: what slips under friction alone never held.
+    fn least_grip(&self, nominal: &Nominal) -> f64 {
+        (nominal.dry_deceleration() / nominal.gain().abs()).clamp(0.05 * self.command, 0.5 * self.command)
+    }
+
     pub(crate) fn travel(&self) -> f64 {
         self.high - self.low
     }
@@ -131,10 +141,9 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         ),
         N::RollerSlip => {
             let mut out = Vec::new();
-            for ratio in [0.6, 0.8] {
-                for i in 0..10 {
-                    let limit = span.command * (span.clip + (0.945 - span.clip) / 9.0 * f64::from(i));
-                    out.push(Effect::shaped(name, &[("limit", limit), ("ratio", ratio)]));
+            for time in [0.3e-3, 1.5e-3, 6e-3] {
+                for limit in logarithmic(span.least_grip(nominal), 0.945 * span.command, 12) {
+                    out.push(Effect::shaped(name, &[("limit", limit), ("creep_time", time)]));
                 }
             }
             out
@@ -150,7 +159,17 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             }
             out
         }
-        N::Backlash => one("gap", logarithmic(3.0 * span.count, 0.08 * span.travel(), 8)),
+        N::Backlash => {
+            let fixed = [("per_command", nominal.gain()), ("dry", nominal.dry_deceleration())];
+            let mut out = Vec::new();
+            for coast in [0.6, 1.5].map(|part| part * nominal.dry_deceleration()) {
+                for gap in logarithmic(2.0 * span.count, span.widest_gap(), 16) {
+                    let shape = [("gap", gap), ("coast", coast), ("contact_hz", 180.0), ("ratio", 1.0)];
+                    out.push(Effect::shaped(name, &[shape.as_slice(), &fixed].concat()));
+                }
+            }
+            out
+        }
         N::DriveCompliance => {
             let mut out = Vec::new();
             for damping in [0.02, 0.12] {
@@ -177,11 +196,19 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::FrictionDrift | N::GainDrift => vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)],
         N::CommandDeadband => vec![("half_width", 0.001 * span.command, 0.35 * span.command)],
         N::CommandSaturation => vec![("limit", 0.9 * span.clip * span.command, span.command)],
-        N::RollerSlip => vec![("limit", 0.9 * span.clip * span.command, span.command), ("ratio", 0.3, 0.92)],
+        N::RollerSlip => vec![("limit", 0.03 * span.command, span.command), ("creep_time", 5e-5, 0.05)],
         N::CommandDelay => vec![("delay", 1e-6, 0.06)],
         N::ElectricalLag => vec![("time_constant", 1e-6, 0.2)],
         N::PositionSpring if effect.shape_or("one_sided", 0.0) > 0.5 => Vec::new(),
-        N::Backlash => vec![("gap", span.count, 0.2 * span.travel())],
+        N::Backlash => {
+            let dry = effect.shape_or("dry", 1.0);
+            vec![
+                ("gap", span.count, 2.0 * span.widest_gap()),
+                ("coast", 0.2 * dry, 4.0 * dry),
+                ("ratio", 0.2, 5.0),
+                ("contact_hz", 30.0, 600.0),
+            ]
+        }
         N::DriveCompliance => vec![("resonance_hz", 4.0, 0.5 / span.block), ("damping", 0.003, 0.7)],
         _ => Vec::new(),
     }

@@ -45,6 +45,8 @@ pub(crate) struct Nominal {
 
 /// How many standard deviations a nominal value may move in a refit.
 const REACH: f64 = 3.0;
+/// How many standard deviations a nominal value may be below the truth.
+const FARTHEST: f64 = 2.5;
 
 impl Nominal {
     /// Gain over inertia as the rig states it.
@@ -85,10 +87,12 @@ impl Nominal {
         let relative = |value: f64, sd: f64| {
             let mean = value / j;
             let sd = (sd * sd + common * common).sqrt();
-            // Friction is known by its size rather than its value, and never vanishes where the rig declares it.
-            let reach = 2.0 * (1.0 + REACH * sd);
-            let (a, b) = (mean / reach, mean * reach);
-            Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
+            // A nominal value that is off by its deviation may be small against the truth: the reach upwards is longer.
+            // Friction never vanishes where the rig declares it.
+            let least = 1.0 - (FARTHEST * sd).min(0.98);
+            let (down, up) = (2.0 * (1.0 + REACH * sd), (2.0 * (1.0 + REACH * sd)).max(1.0 / least));
+            let (a, b) = (mean / down, mean * up);
+            Prior { mean, sd: sd / least.max(0.2) * mean.abs(), low: a.min(b), high: a.max(b) }
         };
         match key {
             Key::Gain => {
@@ -130,11 +134,21 @@ impl Nominal {
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
             EffectName::TorqueRipple => (-0.3 * gain.abs(), 0.3 * gain.abs()),
+            EffectName::Backlash | EffectName::RollerSlip => {
+                ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
+            }
             EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
             EffectName::MissedCounts => (0.5, 1.5),
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
+    }
+
+    /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.
+    pub(crate) fn dry_deceleration(&self) -> f64 {
+        let j =
+            self.anchor.map_or(self.rig.model.inertia, |(value, _)| (self.rig.actuator.gain / value).abs());
+        self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale()) / j
     }
 
     /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
@@ -161,9 +175,8 @@ pub(crate) fn effective_command(track: &Track, effects: &[Effect]) -> Option<Vec
 }
 
 /// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
-fn scales_drive(name: EffectName, term: usize) -> bool {
+fn scales_drive(name: EffectName) -> bool {
     matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
-        || (name == EffectName::Backlash && term == 1)
 }
 
 /// Whether each recording has its own phase, so that coefficients are not shared.
@@ -195,14 +208,17 @@ pub(crate) fn effect_inputs(
     let Some(mut law) = Law::new(effect) else { return Vec::new() };
     let count = law.names().len();
     let n = track.blocks();
-    if effect.name == EffectName::DriveCompliance {
-        // A resonance may be fast: row by row.
+    if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
+        // What a second mass does is faster than a block: row by row.
         let mut out = vec![0.0];
         let signal: Vec<f64> = command
             .iter()
             .zip(&track.row_hold)
-            .map(|(u, h)| {
-                law.terms(&State { drive: *u, dt: *h, ..State::default() }, &mut out);
+            .enumerate()
+            .map(|(i, (u, h))| {
+                let velocity = track.v[(i / track.rows_per_block).min(n - 1)];
+                let state = State { drive: *u, command: *u, velocity, dt: *h, ..State::default() };
+                law.terms(&state, &mut out);
                 out[0]
             })
             .collect();
@@ -215,6 +231,7 @@ pub(crate) fn effect_inputs(
             position: track.x[j],
             velocity: if track.rest[j] { 0.0 } else { track.v[j] },
             drive: 1.0,
+            command: 1.0,
             tilt: track.tilt.as_ref().map_or(0.0, |tilt| tilt[j]),
             external: track.force.as_ref().map_or(0.0, |force| force[j]),
             time: track.start[j] + 0.5 * track.span[j],
@@ -228,11 +245,10 @@ pub(crate) fn effect_inputs(
     let sensor = law.in_sensor();
     columns
         .into_iter()
-        .enumerate()
-        .map(|(term, column)| {
+        .map(|column| {
             if sensor {
                 Input::Sensor(column)
-            } else if scales_drive(effect.name, term) {
+            } else if scales_drive(effect.name) {
                 drive_input.scaled(&column)
             } else {
                 Input::Held(column)

@@ -48,6 +48,7 @@ fn excerpt(track: &Track, total: &Total, from: usize, to: usize) -> Excerpt {
         x: Vec::new(),
         v: Vec::new(),
         rest: track.rest[from..to].to_vec(),
+        stuck: track.stuck[from..to].to_vec(),
         segments: vec![0, to - from],
         lost: Vec::new(),
         speed_floor: track.speed_floor,

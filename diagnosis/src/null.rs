@@ -2,7 +2,7 @@
 
 use crate::fit::Fit;
 use crate::kalman::{Noise, smooth};
-use crate::model::{Model, Nominal};
+use crate::model::{Key, Model, Nominal};
 use crate::noise::{self, Colour};
 use crate::solve::{Prior, Square, bounded};
 use crate::track::{Total, Track};
@@ -10,8 +10,31 @@ use crate::track::{Total, Track};
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
 const MARGIN: usize = 1;
 
-/// Smooths the motion of every recording under a model's input and marks where the axis rests.
-pub(crate) fn resmooth(tracks: &mut [Track], totals: &[Total], noise: &Noise) {
+/// No count for this long is rest, s: the steadiest slow motion that is told from it makes fifty counts a second.
+const STILL_S: f64 = 0.02;
+
+/// Blocks before or after which the encoder gives no count for a while: by itself, whatever a filter makes of the speed.
+fn still(track: &Track, count: f64) -> Vec<bool> {
+    let n = track.blocks();
+    let reach = ((STILL_S * track.block_rate()).ceil() as usize).max(2);
+    let mut out = vec![false; n];
+    let mut from = 0;
+    for j in 0..n {
+        // The mean of a block within which a count falls is no whole count.
+        if (track.z[j] - track.z[from]).abs() > 1e-3 * count {
+            from = j;
+        }
+        if j - from >= reach {
+            let first = if j - from == reach { from } else { j };
+            out[first..=j].fill(true);
+        }
+    }
+    out
+}
+
+/// Smooths the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
+/// encoder's.
+pub(crate) fn resmooth(tracks: &mut [Track], totals: &[Total], noise: &Noise, count: f64) {
     for (track, total) in tracks.iter_mut().zip(totals) {
         let state = smooth(track, noise, total);
         let mut sd: Vec<f64> =
@@ -26,14 +49,17 @@ pub(crate) fn resmooth(tracks: &mut [Track], totals: &[Total], noise: &Noise) {
         // A quarter of the fast speed is moving, whatever the noise estimate says.
         let fast = speeds[speeds.len() * 95 / 100];
         let floor = (2.5 * typical).min(0.25 * fast).max(1e-6 * fast);
-        let slow: Vec<bool> = state.v.iter().map(|v| v.abs() < floor).collect();
-        let n = slow.len();
+        let still = still(track, count);
+        let n = still.len();
+        let slow: Vec<bool> =
+            state.v.iter().zip(&still).map(|(v, still)| *still || v.abs() < floor).collect();
         track.rest = (0..n)
             .map(|j| {
                 let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
                 slow[a..=b].iter().any(|slow| *slow) || state.v[a] * state.v[b] <= 0.0
             })
             .collect();
+        track.stuck = still;
         track.speed_floor = floor;
         track.x = state.x;
         track.v = state.v;
@@ -85,15 +111,27 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
     }
 }
 
-/// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
-pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
+/// The sign with which the measured load acts, where it is seen to act as a load does.
+fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
+    let seen = fit.value(Key::External)? * nominal.rig.model.inertia;
+    (seen.abs() > 0.5 && seen.abs() < 2.0).then(|| seen.signum())
+}
+
+/// Scale of acceleration that the command makes.
+pub(crate) fn command_scale(nominal: &Nominal, tracks: &[Track]) -> f64 {
     let (mut square, mut rows) = (0.0, 0.0);
-    for track in &*tracks {
+    for track in tracks {
         square += track.command.iter().map(|u| u * u).sum::<f64>();
         rows += track.command.len() as f64;
     }
-    let scale = nominal.gain().abs() * (square / rows).sqrt().max(1e-12);
+    nominal.gain().abs() * (square / rows).sqrt().max(1e-12)
+}
+
+/// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
+pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
+    let scale = command_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let totals: Vec<Total> = tracks
         .iter()
         .map(|track| {
@@ -103,7 +141,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit
         })
         .collect();
     noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
-    resmooth(tracks, &totals, &noise);
+    resmooth(tracks, &totals, &noise, count);
     let model = Model::default();
     let mut fit = Fit::new(&model, nominal, tracks, &noise);
     for round in 0..2 {
@@ -114,7 +152,11 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit
         }
         let totals = fit.totals(tracks);
         noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
-        resmooth(tracks, &totals, &noise);
+        resmooth(tracks, &totals, &noise, count);
+        fit = Fit::new(&model, nominal, tracks, &noise);
+    }
+    if let Some(sign) = load_sign(nominal, &fit) {
+        nominal.external = sign;
         fit = Fit::new(&model, nominal, tracks, &noise);
     }
     (noise, fit)

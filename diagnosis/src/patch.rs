@@ -50,7 +50,7 @@ pub(crate) fn patch(s: &Search, last: &Candidate) -> Rig {
                 let drive = matches!(
                     effect.name,
                     EffectName::TorqueRipple | EffectName::GainDrift | EffectName::DriveCompliance
-                ) || (effect.name == EffectName::Backlash && term == 1);
+                );
                 let unit = if law.in_sensor() {
                     1.0
                 } else if drive {

@@ -2,7 +2,7 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
-use crate::estimate::{Estimator, sensor_noise};
+use crate::estimate::Estimator;
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::Noise;
 use crate::library::Span;
@@ -27,7 +27,7 @@ pub(crate) struct Found {
     pub(crate) holdout: Gain,
     /// The same on the fitted recordings.
     pub(crate) fit: Gain,
-    /// Part of the held-out residual above the sensor's noise that it explains.
+    /// Part of the refit's held-out residual above the sensor's noise that it explains.
     pub(crate) share: f64,
     /// Whether one of its values stands at the end of what is possible.
     pub(crate) at_bound: bool,
@@ -36,10 +36,18 @@ pub(crate) struct Found {
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
 
-/// Part of the residual above the noise that an effect must explain on held-out recordings to be named.
+/// Part of the refit's residual above the noise that an effect must explain on held-out recordings to be named.
 const SHARE: f64 = 0.05;
+/// The same where its gain is this many standard errors on fitted and on held-out recordings.
+const LEAST_SHARE: f64 = 0.01;
+const CERTAIN: f64 = 6.0;
 
 impl Found {
+    /// Whether it stands out of every stretch of every recording, however little it explains beside larger effects.
+    fn is_small_but_certain(&self) -> bool {
+        self.share >= LEAST_SHARE && self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
+    }
+
     /// Why an effect may not be named, if it may not.
     fn weakness(&self) -> Option<String> {
         if self.holdout.low <= 0.0 || self.holdout.z.max(self.holdout.steady) < 2.0 {
@@ -48,7 +56,7 @@ impl Found {
         if self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0 {
             return Some("its gain rests on few moments of the fitted recordings".into());
         }
-        if self.share < SHARE {
+        if self.share < SHARE && !self.is_small_but_certain() {
             return Some(format!(
                 "it explains {:.1} % of what the noise leaves, less than 5 %",
                 100.0 * self.share
@@ -83,39 +91,49 @@ pub(crate) struct Search {
     pub(crate) lost: Vec<(EffectName, f64, String)>,
 }
 
-/// Scale of acceleration that the command makes.
-pub(crate) fn command_scale(nominal: &Nominal, tracks: &[Track]) -> f64 {
-    let (mut square, mut rows) = (0.0, 0.0);
-    for track in tracks {
-        square += track.command.iter().map(|u| u * u).sum::<f64>();
-        rows += track.command.len() as f64;
-    }
-    nominal.gain().abs() * (square / rows).sqrt().max(1e-12)
-}
-
 /// Lays a model on every held-out recording.
 pub(crate) fn lay_all(c: &Candidate, nominal: &Nominal, tracks: &[Track], noise: &Noise) -> Vec<Laid> {
     tracks.iter().map(|track| judge::lay(c, nominal, track, noise)).collect()
 }
 
-/// Smooths held-out recordings with a fitted model.
-fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track]) {
-    for _ in 0..2 {
+/// Smooths held-out recordings with a fitted model; `scale` is the acceleration that the command makes.
+fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], scale: f64) {
+    // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
+    let drives: Vec<Total> = tracks
+        .iter()
+        .map(|track| {
+            let mut total = Total::zero(track.blocks());
+            track.rows_input(&track.command).add_to(&mut total, track, nominal.gain());
+            total
+        })
+        .collect();
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    null::resmooth(tracks, &drives, &crate::noise::guess(tracks, scale), count);
+    for _ in 0..3 {
         let totals: Vec<Total> = tracks
             .iter()
             .map(|track| judge::lay(candidate, nominal, track, &candidate.noise).total)
             .collect();
-        null::resmooth(tracks, &totals, &candidate.noise);
+        null::resmooth(tracks, &totals, &candidate.noise, count);
     }
 }
 
-/// Looks for lost counts in every recording under the null.
-fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise) {
-    for track in tracks.iter_mut() {
-        let alone = std::slice::from_ref(&*track);
-        let fit = crate::fit::Fit::new(&Model::default(), nominal, alone, noise);
-        let residual = fit.residual(0);
-        track.lost = crate::steps::find(track, &fit, 0, &residual, span.count);
+/// Looks for lost counts in every recording under the null, and again with the noise that is left without them.
+fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise, scale: f64) {
+    let mut noise = *noise;
+    for _ in 0..2 {
+        for track in tracks.iter_mut() {
+            let alone = std::slice::from_ref(&*track);
+            let fit = crate::fit::Fit::new(&Model::default(), nominal, alone, &noise);
+            let residual = fit.residual(0);
+            track.lost = crate::steps::find(track, &fit, 0, &residual, span.count);
+        }
+        if tracks.iter().all(|track| track.lost.iter().all(|lost| *lost == 0.0)) {
+            return;
+        }
+        let model = Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])] };
+        let totals = crate::fit::Fit::new(&model, nominal, tracks, &noise).totals(tracks);
+        noise = crate::noise::estimate(tracks, &totals, &noise, scale, Colour::White);
     }
 }
 
@@ -130,16 +148,16 @@ pub(crate) fn search(
     let mut nominal = Nominal { rig: rig.clone(), external: 0.0, anchor: None };
     progress("refitting the nominal model", 0.1);
     let (noise, _) = null::settle(&mut nominal, &mut tracks);
-    let scale = command_scale(&nominal, &tracks);
+    let scale = null::command_scale(&nominal, &tracks);
     let span = Span::of(&tracks, &nominal);
-    find_steps(&nominal, &span, &mut tracks, &noise);
+    find_steps(&nominal, &span, &mut tracks, &noise, scale);
     let first = crate::fit::Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
-    smooth_held(&first, &nominal, &mut held);
-    find_steps(&nominal, &span, &mut held, &noise);
+    smooth_held(&first, &nominal, &mut held, scale);
+    find_steps(&nominal, &span, &mut held, &noise, scale);
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
-    let null_slow = bench.fit(Model::default(), &noise, Colour::Slow);
     let mut white = bench.fit(Model::default(), &noise, Colour::White);
+    let null_slow = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut slow_merit = null_slow.merit;
     let mut slow_noise = null_slow.noise;
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
@@ -156,7 +174,7 @@ pub(crate) fn search(
                 break;
             }
             tried += 1;
-            let slow = bench.fit(finalist.model.clone(), &slow_noise, Colour::Slow);
+            let slow = bench.fit_slow(finalist.model.clone(), &[&slow_noise, &finalist.noise]);
             let gain = slow.merit - slow_merit;
             if gain < WORTH {
                 lost.push((name, gain, "what it explains is no more than a slow disturbance would".into()));
@@ -178,7 +196,7 @@ pub(crate) fn search(
     }
     progress("judging on held-out recordings", 0.8);
     let mut model = white.model.clone();
-    let mut last = bench.fit(model.clone(), &slow_noise, Colour::Slow);
+    let mut last = bench.fit_slow(model.clone(), &[&slow_noise, &white.noise]);
     let mut found;
     // Whatever does not carry to the held-out recordings goes, the weakest first, until all that is left does.
     loop {
@@ -192,10 +210,10 @@ pub(crate) fn search(
         let Some((i, _, reason)) = weakest else { break };
         lost.push((model.effects[i].name, found[i].holdout.sum, reason));
         model.effects.remove(i);
-        last = bench.fit(model.clone(), &null_slow.noise, Colour::Slow);
+        last = bench.fit_slow(model.clone(), &[&null_slow.noise, &white.noise]);
     }
     if !model.effects.is_empty() {
-        smooth_held(&last, &nominal, &mut held);
+        smooth_held(&last, &nominal, &mut held, scale);
     }
     Ok(Search {
         nominal: nominal.clone(),
@@ -225,6 +243,14 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     let with = lay_all(last, bench.nominal, held, &last.noise);
     let with_fit = fit_costs(bench, last);
     let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
+    let square = |c: &Candidate, laid: &[Laid]| {
+        let totals: Vec<Total> = laid.iter().map(|l| l.total.clone()).collect();
+        let inertia = crate::values::scale(bench.nominal, c).0;
+        estimator.rms(&residuals(&estimator, held, &totals, inertia), held).powi(2)
+    };
+    let null = crate::fit::Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
+    let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+    let whole = square(&null, &lay_all(&null, bench.nominal, held, &last.noise));
     (0..last.model.effects.len())
         .map(|i| {
             let mut less = last.model.clone();
@@ -235,15 +261,11 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
             let laid = lay_all(&without, bench.nominal, held, &last.noise);
             let holdout = judge::compare(&with, &laid);
-            let square = |c: &Candidate, laid: &[Laid]| {
-                let totals: Vec<Total> = laid.iter().map(|l| l.total.clone()).collect();
-                let inertia = crate::values::scale(bench.nominal, c).0;
-                estimator.rms(&residuals(&estimator, held, &totals, inertia), held).powi(2)
-            };
             let (before, after) = (square(&without, &laid), square(last, &with));
             let inertia = crate::values::scale(bench.nominal, last).0;
-            let floor = (sensor_noise(held, &last.noise, estimator.bandwidth_hz) * inertia).powi(2);
-            let share = (before - after) / (before - floor).max(0.02 * before).max(1e-300);
+            let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
+            let floor = (estimator.counting(held, &last.noise, count) * inertia).powi(2);
+            let share = (before - after) / (whole - floor).max(0.02 * whole).max(1e-300);
             let at_bound =
                 last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
                     *bound && matches!(key, Key::Term { effect, .. } if *effect == i)

@@ -7,7 +7,7 @@ use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
 use rayon::prelude::*;
 
-/// A command effect may change this part of the command's mean size at the most: a drive that ignores its command explains
+/// All command effects together may change this part of the command's mean size at the most: a drive that ignores its command explains
 /// any balance of forces, and so explains nothing.
 const EXPLAINED_AWAY: f64 = 0.35;
 
@@ -30,8 +30,8 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
         with.push(effect.clone());
         let after = effective_command(track, &with).expect("the effect acts on the command");
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
-        let size = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
-        if size(&change) > EXPLAINED_AWAY * size(command) {
+        let taken: f64 = after.iter().zip(&track.command).map(|(a, b)| (a - b).abs()).sum();
+        if taken > EXPLAINED_AWAY * track.command.iter().map(|u| u.abs()).sum::<f64>() {
             return vec![Input::Held(vec![0.0; track.blocks()])];
         }
         return vec![track.rows_input(&change)];

@@ -47,8 +47,8 @@ fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
     let coefficients = match effect.name {
         N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
         N::PositionDependentFriction | N::PositionDependentDamping => 3,
-        N::FrictionDrift | N::AsymmetricFriction | N::Backlash => 2,
-        N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag | N::RollerSlip => 0,
+        N::FrictionDrift | N::AsymmetricFriction => 2,
+        N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag => 0,
         _ => 1,
     };
     PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
@@ -76,6 +76,14 @@ impl Bench<'_> {
         let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
         let merit = fit.log_likelihood - spent;
         Candidate { model, noise, fit, merit }
+    }
+
+    /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
+    /// what a disturbance explains are two optima.
+    pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> Candidate {
+        let fits =
+            starts.par_iter().map(|from| self.fit(model.clone(), from, Colour::Slow)).collect::<Vec<_>>();
+        fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
     }
 
     /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.

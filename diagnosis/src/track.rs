@@ -48,6 +48,8 @@ pub(crate) struct Track {
     pub(crate) v: Vec<f64>,
     /// Blocks where the axis rests or the sign of its speed is not known.
     pub(crate) rest: Vec<bool>,
+    /// Blocks in the middle of a rest: friction is a reaction there and cancels every input.
+    pub(crate) stuck: Vec<bool>,
     /// Bounds of the segments that gains are counted in, as block indices; one more than segments.
     pub(crate) segments: Vec<usize>,
     /// Travel that the encoder seems to have lost so far, where steps were found.
@@ -93,6 +95,7 @@ impl Track {
             x: Vec::new(),
             v: vec![0.0; n],
             rest: vec![false; n],
+            stuck: vec![false; n],
             segments: Vec::new(),
             lost: vec![0.0; n],
             speed_floor: 0.0,
@@ -191,6 +194,20 @@ impl Track {
             .collect()
     }
 
+    /// Mean error over a block's rows of reading whole counts where the smoothed motion is.
+    pub(crate) fn counting_error(&self, block: usize, count: f64) -> f64 {
+        let m = self.rows_per_block;
+        let first = block * m;
+        let middle = self.start[block] + 0.5 * self.span[block];
+        let sum: f64 = (first..first + m)
+            .map(|row| {
+                let x = (self.x[block] + self.v[block] * (self.row_time[row] - middle)) / count;
+                0.5 - (x - x.floor())
+            })
+            .sum();
+        sum / m as f64 * count
+    }
+
     /// The segment of a block.
     pub(crate) fn segment_count(&self) -> usize {
         self.segments.len() - 1
@@ -212,7 +229,7 @@ impl Input {
     pub(crate) fn add_to(&self, total: &mut Total, track: &Track, factor: f64) {
         match self {
             Self::Held(a) => {
-                for (j, a) in a.iter().enumerate() {
+                for (j, a) in a.iter().enumerate().filter(|(j, _)| !track.stuck[*j]) {
                     let (a, h) = (a * factor, track.span[j]);
                     total.dv[j] += a * h;
                     total.dq[j] += 0.5 * a * h * h;
@@ -220,7 +237,7 @@ impl Input {
                 }
             }
             Self::Rows { dv, dq, dz } => {
-                for j in 0..dv.len() {
+                for j in (0..dv.len()).filter(|j| !track.stuck[*j]) {
                     total.dv[j] += factor * dv[j];
                     total.dq[j] += factor * dq[j];
                     total.dz[j] += factor * dz[j];

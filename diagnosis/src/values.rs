@@ -8,6 +8,9 @@ use crate::select::{Bench, Candidate};
 use crate::solve::Square;
 use std::collections::BTreeMap;
 
+/// Part of the dry friction that is the load's, and its standard deviation: nothing in the motor's motion tells it.
+const LOAD_FRICTION: (f64, f64) = (0.5, 0.2);
+
 /// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and the relative standard
 /// deviation of their common scale, which no recording of motion can narrow.
 pub(crate) fn scale(nominal: &Nominal, candidate: &Candidate) -> (f64, f64, f64) {
@@ -273,9 +276,21 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             put("limit", v, s, command);
         }
         N::RollerSlip => {
-            let (v, s) = shape("limit");
-            let gain = inertia * ratio.abs();
-            put("ceiling", v * gain, gain * (s * s + (v * common).powi(2)).sqrt(), force.into());
+            // The grip carries the load's part of what the drive has left above friction, and the load's own friction:
+            // half of the whole, give or take, for all that motion tells.
+            let (limit, s) = shape("limit");
+            let ratio_of_load = (term(0).0 / ratio).abs();
+            let part = ratio_of_load / (1.0 + ratio_of_load);
+            let part_sd = (term(0).1 / ratio).abs() / (1.0 + ratio_of_load).powi(2);
+            let drive = limit * inertia * ratio.abs();
+            let dry = fit.value(Key::Coulomb).map_or(0.0, |x| x.abs() * inertia);
+            let value = part * drive + (LOAD_FRICTION.0 - part) * dry;
+            let sd = ((part * s / limit * drive).powi(2)
+                + (part_sd * (drive - dry)).powi(2)
+                + (LOAD_FRICTION.1 * dry).powi(2)
+                + (value * common).powi(2))
+            .sqrt();
+            put("ceiling", value, sd, force.into());
         }
         N::CommandDelay => {
             let (v, s) = shape("delay");

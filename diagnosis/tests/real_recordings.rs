@@ -2,6 +2,8 @@
 //! absent these tests say so and check nothing.
 
 use diagnosis::effects::EffectName;
+use diagnosis::recording::Recording;
+use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request, Verdict, diagnose};
 use std::path::PathBuf;
 
@@ -50,9 +52,16 @@ fn emps_names_dry_friction_then_direction_or_did_not_run() {
 }
 
 #[test]
-fn emps_ripple_of_2_5_mm_is_found_or_did_not_run() {
+fn emps_ripple_of_2_5_mm_is_found_where_friction_is_known_or_did_not_run() {
     let Some(dir) = shared("emps") else { return };
-    let outcome = run(&dir, &["train.csv"], &["pulses.csv"]);
+    let mut rig = Rig::read(&dir.join("rig.toml")).expect("the rig is usable");
+    rig.model.coulomb = Some(20.39);
+    rig.uncertainty.coulomb = Some(0.2);
+    let read = |name: &str| Recording::read(&dir.join(name)).expect("the recording is usable");
+    let outcome =
+        diagnosis::diagnose_recordings(&rig, &[read("train.csv")], &[read("pulses.csv")], &|_, _| ())
+            .expect("the recordings are usable");
+    println!("{}", outcome.summary());
     let cogging = outcome.report.effects.iter().find(|e| e.name == EffectName::Cogging);
     let cogging = cogging.expect("the ripple is named");
     let period = cogging.parameters["period"].value;

@@ -45,3 +45,9 @@ fn a_hidden_cogging_is_found_through_the_link() {
     let truth = 5.0_f64.sqrt() * 1.0e-4;
     assert!((found / truth - 1.0).abs() < 0.1, "{found} N·m for {truth} N·m");
 }
+
+#[test]
+fn a_device_that_is_as_its_rig_says_lacks_nothing() {
+    let outcome = find(None, "hidden-nothing");
+    assert_eq!(outcome.report.verdict, Verdict::NoMismatch, "{}", outcome.summary());
+}

@@ -9,9 +9,9 @@ pub enum CommandLaw {
     /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass whole.
     #[allow(missing_docs)]
     Deadband { half_width: f64, shift: bool },
-    /// Commands beyond the limit are held at `limit · ratio`.
+    /// Commands beyond the limit are held at it.
     #[allow(missing_docs)]
-    Clip { limit: f64, ratio: f64 },
+    Clip { limit: f64 },
     /// A transport delay, s; the queue holds (length, command) of what is under way.
     #[allow(missing_docs)]
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },
@@ -28,10 +28,7 @@ impl CommandLaw {
             EffectName::CommandDeadband => {
                 Self::Deadband { half_width: get("half_width"), shift: get("shift") > 0.5 }
             }
-            EffectName::CommandSaturation => Self::Clip { limit: get("limit"), ratio: 1.0 },
-            EffectName::RollerSlip => {
-                Self::Clip { limit: get("limit"), ratio: effect.shape_or("ratio", 1.0) }
-            }
+            EffectName::CommandSaturation => Self::Clip { limit: get("limit") },
             EffectName::CommandDelay => {
                 Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 }
             }
@@ -52,13 +49,7 @@ impl CommandLaw {
                     command
                 }
             }
-            Self::Clip { limit, ratio } => {
-                if command.abs() > *limit {
-                    command.signum() * *limit * *ratio
-                } else {
-                    command
-                }
-            }
+            Self::Clip { limit } => command.clamp(-*limit, *limit),
             Self::Delay { delay, queue, waiting } => {
                 if queue.is_empty() {
                     // Before the first row the command is taken to have stood still.

@@ -1,5 +1,6 @@
 //! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
 
+use super::load::Load;
 use super::{Effect, EffectName};
 use std::f64::consts::TAU;
 
@@ -12,6 +13,8 @@ pub struct State {
     pub velocity: f64,
     /// Force that the command asks for: gain · effective command, N·m or N.
     pub drive: f64,
+    /// Effective command, in the rig's unit.
+    pub command: f64,
     /// Inclination below the horizontal, rad.
     pub tilt: f64,
     /// External load on the coordinate, N·m or N.
@@ -37,8 +40,10 @@ pub struct Law {
     times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
     names: Vec<String>,
-    /// Internal state: bristle deflection, play, resonator.
+    /// Internal state: bristle deflection, load, resonator.
     state: [f64; 3],
+    /// What hangs on the motor by a gap or a grip.
+    load: Load,
     /// Transition of the resonator for a step of `dt`: kept because steps repeat.
     resonator: Option<(f64, [f64; 6])>,
 }
@@ -93,10 +98,7 @@ impl Law {
                 (a, b) = (get("from", 0.0), get("one_sided", 0.0));
                 vec!["stiffness".into()]
             }
-            N::Backlash => {
-                a = get("gap", 1.0);
-                vec!["release".into(), "drive".into()]
-            }
+            N::Backlash | N::RollerSlip => vec!["inertia_ratio".into()],
             N::DriveCompliance => {
                 (a, b) = (TAU * get("resonance_hz", 1.0), get("damping", 0.05));
                 vec!["inertia_ratio".into()]
@@ -113,14 +115,11 @@ impl Law {
                     .filter_map(|key| key.strip_prefix("time_").map(|n| format!("step_{n}")))
                     .collect()
             }
-            N::CommandDeadband
-            | N::CommandSaturation
-            | N::CommandDelay
-            | N::ElectricalLag
-            | N::RollerSlip => return None,
+            N::CommandDeadband | N::CommandSaturation | N::CommandDelay | N::ElectricalLag => return None,
         };
         let state = [0.0; 3];
-        Some(Self { name: effect.name, a, b, waves, times, names, state, resonator: None })
+        let load = Load::new(effect);
+        Some(Self { name: effect.name, a, b, waves, times, names, state, load, resonator: None })
     }
 
     /// Names of the terms, in order.
@@ -185,15 +184,8 @@ impl Law {
                 let x = s.position - self.a;
                 out[0] = if self.b > 0.5 { -x.max(0.0) } else { -x };
             }
-            N::Backlash => {
-                // The play follows the position within the gap; the load is free while the play moves through it.
-                let slack = s.position - self.state[0];
-                let half = 0.5 * self.a;
-                let free = slack.abs() < half;
-                self.state[0] = s.position - slack.clamp(-half, half);
-                out[0] = if free { way } else { 0.0 };
-                out[1] = if free { s.drive } else { 0.0 };
-            }
+            N::Backlash => out[0] = self.load.through_gap(s),
+            N::RollerSlip => out[0] = self.load.by_grip(s.command, s.dt),
             N::DriveCompliance => out[0] = self.resonate(s.drive, s.dt),
             N::MissedCounts => {
                 for (term, time) in out.iter_mut().zip(&self.times) {

@@ -5,6 +5,7 @@
 
 mod command;
 mod law;
+mod load;
 mod name;
 mod plant;
 
@@ -75,8 +76,8 @@ impl Effect {
                 &["time_constant"]
             }
             EffectName::CommandSaturation => &["limit"],
-            EffectName::RollerSlip => &["limit"],
-            EffectName::Backlash => &["gap"],
+            EffectName::RollerSlip => &["limit", "creep_time"],
+            EffectName::Backlash => &["gap", "coast", "contact_hz", "ratio"],
             EffectName::DriveCompliance => &["resonance_hz", "damping"],
             EffectName::CommandDelay => &["delay"],
             _ => &[],
@@ -87,7 +88,7 @@ impl Effect {
             }
         }
         for (key, value) in &self.shape {
-            if (key.starts_with("period_") || key == "turn") && *value == 0.0 {
+            if (key.starts_with("period_") || key == "turn" || key == "per_command") && *value == 0.0 {
                 return Err(format!("shape.{key} must not be zero"));
             }
         }

@@ -68,6 +68,7 @@ impl Plant {
             position: self.position,
             velocity,
             drive,
+            command: effective,
             tilt: around.tilt,
             external: around.external,
             time: self.time,
