@@ -3,6 +3,7 @@
 
 use control_core::config::Tissue;
 use control_core::controller::Sample;
+use control_core::event::State;
 use link::frames::{Event, Hello, Pose, Timing};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -14,6 +15,8 @@ const WAITING_SAMPLES: usize = 20_000;
 const WAITING_POSES: usize = 2_000;
 /// Events that wait for a slow subscriber, and that a new one is told of.
 const WAITING_EVENTS: usize = 256;
+/// An older pose says nothing of where the needle was at an event: 100 ms.
+const NEAR_TICKS: u64 = control_core::TICK_HZ as u64 / 10;
 
 /// What a picture needs to know before anything moves. Lengths along the needle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -84,6 +87,40 @@ pub fn tissue_name(tissue: Tissue) -> &'static str {
     }
 }
 
+/// What people call a state of the device.
+pub fn state_name(code: u8) -> &'static str {
+    match State::from_code(code) {
+        Some(State::Idle) => "idle",
+        Some(State::Approach) => "approach",
+        Some(State::Elastic) => "elastic",
+        Some(State::Puncture) => "puncture",
+        Some(State::Friction) => "friction",
+        Some(State::Withdrawal) => "withdrawal",
+        Some(State::Excitation) => "excitation",
+        Some(State::Fault) => "fault",
+        None => "unknown",
+    }
+}
+
+/// Something that happened, and where the needle was just before: after a puncture the force has already dropped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Happening {
+    /// What happened.
+    pub event: Event,
+    /// The last pose before its tick, where there was one lately.
+    pub before: Option<Pose>,
+}
+
+impl Happening {
+    /// Takes a pose that is nearer before it than the one it has.
+    fn learn(&mut self, pose: &Pose) {
+        let is_near = pose.tick < self.event.tick && self.event.tick - pose.tick <= NEAR_TICKS;
+        if is_near && self.before.is_none_or(|known| known.tick < pose.tick) {
+            self.before = Some(*pose);
+        }
+    }
+}
+
 /// How the link is doing, in totals since the session began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatus {
@@ -124,7 +161,7 @@ pub struct Batch {
     /// Poses, 1 kHz.
     pub poses: Vec<Pose>,
     /// Events (a subscriber's first batch repeats the last 256).
-    pub events: Vec<Event>,
+    pub events: Vec<Happening>,
     /// The latest times of the stages, where there were any.
     pub timing: Option<Timing>,
     /// How the link is doing now.
@@ -187,7 +224,8 @@ struct HubState {
     subscribers: Vec<Weak<Mutex<Buffer>>>,
     hello: Option<Hello>,
     timing: Option<Timing>,
-    events: VecDeque<Event>,
+    last_pose: Option<Pose>,
+    events: VecDeque<Happening>,
     link: LinkStatus,
 }
 
@@ -196,7 +234,7 @@ struct Buffer {
     hello: Option<Hello>,
     samples: VecDeque<(u64, Sample)>,
     poses: VecDeque<Pose>,
-    events: VecDeque<Event>,
+    events: VecDeque<Happening>,
     timing: Option<Timing>,
     skipped_samples: u64,
 }
@@ -219,6 +257,11 @@ fn append<T: Clone>(queue: &mut VecDeque<T>, new: &[T], limit: usize) -> u64 {
     let excess = queue.len().saturating_sub(limit);
     queue.drain(..excess);
     excess as u64
+}
+
+/// Tells the events after `pose` of it.
+fn teach(events: &mut VecDeque<Happening>, pose: &Pose) {
+    events.iter_mut().rev().take_while(|h| h.event.tick > pose.tick).for_each(|h| h.learn(pose));
 }
 
 impl Session {
@@ -277,18 +320,29 @@ impl Publisher {
         });
     }
 
-    /// A pose.
+    /// A pose. An event overtakes the poses of its own millisecond: the last ones may still learn from it.
     pub fn pose(&self, pose: Pose) {
+        {
+            let mut state = lock(&self.hub.state);
+            state.last_pose = Some(pose);
+            teach(&mut state.events, &pose);
+        }
         self.each(|buffer| {
             append(&mut buffer.poses, &[pose], WAITING_POSES);
+            teach(&mut buffer.events, &pose);
         });
     }
 
     /// An event.
     pub fn event(&self, event: Event) {
-        append(&mut lock(&self.hub.state).events, &[event], WAITING_EVENTS);
+        let mut happening = Happening { event, before: None };
+        {
+            let mut state = lock(&self.hub.state);
+            state.last_pose.iter().for_each(|pose| happening.learn(pose));
+            append(&mut state.events, &[happening], WAITING_EVENTS);
+        }
         self.each(|buffer| {
-            append(&mut buffer.events, &[event], WAITING_EVENTS);
+            append(&mut buffer.events, &[happening], WAITING_EVENTS);
         });
     }
 
@@ -356,16 +410,38 @@ mod tests {
     }
 
     #[test]
-    fn a_late_looker_is_told_what_happened_and_a_dropped_one_is_forgotten() {
+    fn a_late_looker_is_told_the_same_as_an_early_one_and_a_dropped_one_is_forgotten() {
         let (session, publisher) = open(scene());
-        let early = session.subscribe();
-        publisher.event(Event { tick: 7, kind: EventKind::Puncture { layer: 0 } });
+        let mut early = session.subscribe();
+        let pose = |tick| publisher.pose(Pose { tick, ..Pose::default() });
+        let event = |tick| publisher.event(Event { tick, kind: EventKind::Puncture { layer: 0 } });
+        pose(10);
+        // It overtakes the pose of its millisecond, and the pose of its own tick is from after the drop.
+        event(30);
+        pose(20);
+        pose(30);
+        event(90_000);
+        let told = |batch: &Batch| -> Vec<_> {
+            batch.events.iter().map(|h| (h.event.tick, h.before.map(|pose| pose.tick))).collect()
+        };
+        let seen = told(&early.drain());
+        assert_eq!(seen, [(30, Some(20)), (90_000, None)]);
         drop(early);
-        publisher.pose(Pose::default());
+        pose(40);
         assert!(lock(&session.hub.state).subscribers.is_empty());
         let batch = session.subscribe().drain();
-        assert_eq!(batch.events.len(), 1);
+        assert_eq!(told(&batch), seen);
         assert!(batch.poses.is_empty());
+    }
+
+    #[test]
+    fn poses_of_a_device_that_starts_anew_do_not_rewrite_what_happened_before() {
+        let (session, publisher) = open(scene());
+        publisher.pose(Pose { tick: 490, ..Pose::default() });
+        publisher.event(Event { tick: 500, kind: EventKind::Stopped });
+        publisher.pose(Pose::default());
+        let events = session.subscribe().drain().events;
+        assert_eq!(events[0].before.map(|pose| pose.tick), Some(490));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use control_core::config::DacWidth;
 use control_core::controller::Sample;
-use control_core::event::{Fault, Limits, State};
+use control_core::event::{Fault, Limits};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
 use fixed::types::{I2F30, I16F16};
 use link::frames;
@@ -263,20 +263,5 @@ impl From<link::host::Counts> for Link {
             lost_samples: counts.lost_samples,
             garbage: counts.garbage,
         }
-    }
-}
-
-/// What people call a state of the device.
-pub fn state_name(code: u8) -> &'static str {
-    match State::from_code(code) {
-        Some(State::Idle) => "idle",
-        Some(State::Approach) => "approach",
-        Some(State::Elastic) => "elastic",
-        Some(State::Puncture) => "puncture",
-        Some(State::Friction) => "friction",
-        Some(State::Withdrawal) => "withdrawal",
-        Some(State::Excitation) => "excitation",
-        Some(State::Fault) => "fault",
-        None => "unknown",
     }
 }

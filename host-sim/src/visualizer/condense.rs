@@ -1,9 +1,9 @@
 //! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure: no clock, no socket.
 
 use super::messages::{self, Bucket, Device, Range, Timing};
-use crate::session::Batch;
+use crate::session::{Batch, Happening, state_name};
 use control_core::config::DacWidth;
-use control_core::event::{Fault, State};
+use control_core::event::Fault;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
 
@@ -17,7 +17,6 @@ const DEFAULT_TICK_HZ: u32 = control_core::TICK_HZ;
 pub struct Condenser {
     hello: Option<Hello>,
     open: BTreeMap<u64, Ranges>,
-    last_pose: Option<Pose>,
     last_tick: u64,
     last_motor_n: f64,
     last_torque_mnm: f64,
@@ -40,14 +39,13 @@ impl Condenser {
         for (tick, sample) in &batch.samples {
             self.sample(*tick, sample.count, sample.dac);
         }
-        let events = self.events(&batch);
+        let events = batch.events.iter().map(|happening| self.event(happening)).collect();
         for pose in &batch.poses {
             let ranges = self.open.entry(pose.tick / BUCKET_TICKS).or_default();
             ranges.law.take(fine(pose.force.0.to_num()));
             ranges.depth.take(fine(pose.depth.0.to_num()));
             self.last_tick = self.last_tick.max(pose.tick);
         }
-        self.last_pose = batch.poses.last().copied().or(self.last_pose);
         self.skipped_samples += batch.skipped_samples;
         let frame = messages::Frame {
             pose: batch.poses.last().map(|pose| self.pose(pose)),
@@ -73,7 +71,6 @@ impl Condenser {
             batch.poses.first().map(|p| p.tick).into_iter().chain(batch.samples.first().map(|s| s.0)).min();
         if first.is_some_and(|first| first + u64::from(DEFAULT_TICK_HZ) < self.last_tick) {
             self.open.clear();
-            self.last_pose = None;
             self.last_tick = 0;
         }
     }
@@ -117,17 +114,7 @@ impl Condenser {
         }
     }
 
-    /// Events with the depth and the force of the last pose before them: after a puncture the force has already dropped.
-    fn events(&self, batch: &Batch) -> Vec<messages::Event> {
-        let before = |tick: u64| {
-            let earlier =
-                |pose: &&Pose| pose.tick < tick && tick - pose.tick <= u64::from(DEFAULT_TICK_HZ) / 10;
-            batch.poses.iter().rev().find(earlier).or(self.last_pose.as_ref().filter(earlier))
-        };
-        batch.events.iter().map(|event| self.event(event, before(event.tick))).collect()
-    }
-
-    fn event(&self, event: &frames::Event, before: Option<&Pose>) -> messages::Event {
+    fn event(&self, Happening { event, before }: &Happening) -> messages::Event {
         let (kind, layer, cause, limits) = match event.kind {
             EventKind::Contact { layer } => ("contact", Some(layer), None, None),
             EventKind::Puncture { layer } => ("puncture", Some(layer), None, None),
@@ -212,26 +199,12 @@ fn timing(timing: frames::Timing) -> Timing {
     }
 }
 
-fn state_name(code: u8) -> &'static str {
-    match State::from_code(code) {
-        Some(State::Idle) => "idle",
-        Some(State::Approach) => "approach",
-        Some(State::Elastic) => "elastic",
-        Some(State::Puncture) => "puncture",
-        Some(State::Friction) => "friction",
-        Some(State::Withdrawal) => "withdrawal",
-        Some(State::Excitation) => "excitation",
-        Some(State::Fault) => "fault",
-        None => "unknown",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use control_core::config::Config;
     use control_core::controller::Sample;
-    use control_core::event::Limits;
+    use control_core::event::{Limits, State};
     use control_core::units::{Millimetres, MillimetresPerSecond, Milliradians, Newtons};
     use fixed::types::{I2F30, I16F16};
 
@@ -309,19 +282,16 @@ mod tests {
 
     #[test]
     fn a_puncture_is_told_with_the_force_before_the_drop() {
-        let mut condenser = Condenser::default();
-        let poses = vec![pose(0, 2.98, 0.99), pose(10, 3.0, 1.0), pose(20, 3.01, 0.4)];
-        // The pose of the same tick is from after the drop.
-        let events = vec![frames::Event { tick: 20, kind: EventKind::Puncture { layer: 0 } }];
-        let frame = condenser.take(Batch { poses, events, ..Batch::default() }).1;
-        assert_eq!(frame.events[0].force_n, Some(1.0));
-        assert_eq!(frame.events[0].layer, Some(0));
-        let first_of_next = vec![frames::Event { tick: 24, kind: EventKind::Stopped }];
-        let frame = condenser.take(Batch { events: first_of_next, ..Batch::default() }).1;
-        assert_eq!((frame.events[0].kind, frame.events[0].force_n), ("stopped", Some(0.4)));
-        let long_ago = vec![frames::Event { tick: 90_000, kind: EventKind::Started }];
-        let frame = condenser.take(Batch { events: long_ago, ..Batch::default() }).1;
-        assert_eq!(frame.events[0].force_n, None);
+        let event = |kind, before| Happening { event: frames::Event { tick: 20, kind }, before };
+        let events = vec![
+            event(EventKind::Puncture { layer: 0 }, Some(pose(10, 3.0, 1.0))),
+            event(EventKind::Stopped, None),
+        ];
+        let poses = vec![pose(20, 3.01, 0.4)];
+        let told = Condenser::default().take(Batch { poses, events, ..Batch::default() }).1.events;
+        assert_eq!((told[0].kind, told[0].layer), ("puncture", Some(0)));
+        assert_eq!((told[0].depth_mm, told[0].force_n), (Some(3.0), Some(1.0)));
+        assert_eq!((told[1].kind, told[1].force_n), ("stopped", None));
     }
 
     #[test]
