@@ -171,9 +171,9 @@ impl Driver {
         self.waiting.iter().chain(pending).any(|command| matches!(command, Command::Start))
     }
 
-    /// Something a person should know, once.
-    pub fn take_notice(&mut self) -> Option<String> {
-        self.notice.take()
+    /// What a person should know: why the last thing asked for was refused.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
     }
 
     /// Why this device will never do with this configuration, where it said so.
@@ -215,7 +215,11 @@ impl Driver {
         let Some(pending) = self.pending.take() else { return };
         match (ack.result, &pending.command) {
             (Ok(()), Command::Configure(_)) => self.ready = true,
-            (Ok(()), Command::Start) => self.has_started = true,
+            (Ok(()), Command::Start) => {
+                self.has_started = true;
+                self.notice = None;
+            }
+            (Ok(()), Command::Stop | Command::Zero | Command::Excite(_)) => self.notice = None,
             (Ok(()), _) => {}
             // The same bytes again, soon.
             (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),

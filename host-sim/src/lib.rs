@@ -8,6 +8,7 @@ pub mod device;
 pub mod driver;
 pub mod failure;
 pub mod library;
+pub mod pace;
 pub mod plant;
 pub mod procedure;
 pub mod profile;

@@ -5,9 +5,10 @@ use crate::device::virtual_device::VirtualDevice;
 use crate::device::{Port, Wire};
 use crate::driver::{Driver, Request};
 use crate::failure::Failure;
+use crate::pace::Pace;
 use crate::recording::messages::Hello;
 use crate::recording::write::Recorder;
-use crate::session::{Control, Publisher, RecordingStatus};
+use crate::session::{Control, LinkStatus, Publisher, RecordingStatus};
 use crate::tally::Tally;
 use link::codec::MAX_FRAME;
 use link::frames::DeviceFrame;
@@ -82,26 +83,23 @@ impl Outlets {
         }
     }
 
-    fn status(&self, driver: &mut Driver, now: Duration) {
+    fn status(&self, driver: &Driver, now: Duration) {
         let counts = driver.counts();
-        let notice = driver.take_notice();
         let recording =
             self.recorder.as_ref().map(|r| RecordingStatus { file: r.file().to_owned(), bytes: r.bytes() });
         let connected = driver.is_ready(now);
+        let notice = driver.notice().or((!connected).then_some(WAITING)).map(str::to_owned);
         self.publisher.link(|status| {
-            status.connected = connected;
-            status.frames = counts.frames;
-            status.lost_frames = counts.lost_frames;
-            status.samples = counts.samples;
-            status.lost_samples = counts.lost_samples;
-            status.garbage = counts.garbage;
-            status.recording = recording;
-            if connected && notice.is_none() && status.notice.as_deref() == Some(WAITING) {
-                status.notice = None;
-            }
-            if notice.is_some() {
-                status.notice = notice;
-            }
+            *status = LinkStatus {
+                connected,
+                frames: counts.frames,
+                lost_frames: counts.lost_frames,
+                samples: counts.samples,
+                lost_samples: counts.lost_samples,
+                garbage: counts.garbage,
+                recording,
+                notice,
+            };
         });
     }
 }
@@ -116,8 +114,8 @@ pub struct Station<'a> {
     /// Set from outside (Ctrl-C) to end the run in good order.
     stop: &'a AtomicBool,
     was_ready: bool,
-    /// A person has stopped the device: only a person starts it from now on.
-    was_stopped: bool,
+    /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
+    person_starts: bool,
 }
 
 /// What a run came to.
@@ -133,14 +131,21 @@ pub struct Outcome {
 impl<'a> Station<'a> {
     /// Not connected yet.
     pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
-        Self { driver, outlets, stop, was_ready: false, was_stopped: false }
+        Self { driver, outlets, stop, was_ready: false, person_starts: false }
     }
 
-    /// Runs a simulated device as fast as it goes, in step with it: the clock is the device's. `progress` sees the samples so
-    /// far, now and then.
+    /// The torque stays off until a person asks for it in the page.
+    pub fn wait_for_a_person(mut self) -> Self {
+        self.person_starts = true;
+        self
+    }
+
+    /// Runs a simulated device in step with it, `pace` saying how fast: the clock of both ends is the device's, so that a
+    /// busy computer slows both and neither finds the other silent. `progress` sees the samples so far, now and then.
     pub fn run_in_step(
         mut self,
         mut device: VirtualDevice,
+        mut pace: Pace,
         mut progress: impl FnMut(u64),
     ) -> Result<Outcome, Failure> {
         let mut bytes = [0; MAX_FRAME];
@@ -162,20 +167,21 @@ impl<'a> Station<'a> {
                 }
             }
             if device.ticks().is_multiple_of(1_000) {
-                self.outlets.status(&mut self.driver, now);
+                self.outlets.status(&self.driver, now);
                 progress(self.outlets.tally.samples);
+            }
+            if pace.wait(Duration::from_micros(device.ticks() * 100)).is_err() {
+                device.note_late();
             }
         }
         self.finish()
     }
 
-    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes and goes. `hand` takes what
-    /// only a simulated device understands.
+    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes and goes.
     pub fn run_in_real_time(
         mut self,
         port: &mut dyn Port,
         seconds: Option<f64>,
-        mut hand: impl FnMut(Control),
         mut progress: impl FnMut(u64),
     ) -> Result<Outcome, Failure> {
         let begin = Instant::now();
@@ -205,15 +211,11 @@ impl<'a> Station<'a> {
                 return Err(self.never_ready());
             }
             while let Some(control) = self.outlets.publisher.next_control() {
-                self.control(control, &mut hand);
+                // The hand on a real needle is nobody's to move.
+                self.control(control, |_| {});
             }
             self.start_once(now);
-            self.outlets.status(&mut self.driver, now);
-            if wire.is_none() || !self.driver.is_ready(now) {
-                self.outlets.publisher.link(|status| {
-                    status.notice.get_or_insert_with(|| WAITING.to_owned());
-                });
-            }
+            self.outlets.status(&self.driver, now);
             progress(self.outlets.tally.samples);
         }
         if let Some(mut open) = wire {
@@ -255,7 +257,7 @@ impl<'a> Station<'a> {
             return;
         }
         self.was_ready = true;
-        if !self.was_stopped && !self.driver.has_started() && !self.driver.is_starting() {
+        if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
             self.driver.request(Request::Start);
         }
     }
@@ -264,7 +266,7 @@ impl<'a> Station<'a> {
         match control {
             Control::Start => self.driver.request(Request::Start),
             Control::Stop => {
-                self.was_stopped = true;
+                self.person_starts = true;
                 self.driver.request(Request::Stop);
             }
             Control::Zero => self.driver.request(Request::Zero),

@@ -184,6 +184,26 @@ fn a_killed_recording_can_be_read_and_an_interrupted_one_is_whole() {
     }
 }
 
+/// A computer that is too busy for the program slows the virtual device and its PC alike: nobody went silent.
+#[cfg(unix)]
+#[test]
+fn a_program_that_stands_still_for_a_while_goes_on_where_it_was() {
+    let child = host_sim(&["run", "--headless", "--seconds", "4"]).stdout(Stdio::piped()).spawn();
+    let child = child.expect("the program starts");
+    for _ in 0..3 {
+        for (signal, ms) in [("STOP", 400), ("CONT", 300)] {
+            std::thread::sleep(Duration::from_millis(ms));
+            let kill = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+            assert!(kill.expect("there is a kill").success());
+        }
+    }
+    let output = child.wait_with_output().expect("it ends");
+    let stdout = String::from_utf8(output.stdout).expect("text");
+    assert_eq!((figure(&stdout, "samples"), figure(&stdout, "lost_samples")), (40_000.0, 0.0), "{stdout}");
+    // Torque stayed on: the needle got as far as it does undisturbed.
+    assert_eq!((figure(&stdout, "faults"), figure(&stdout, "punctures")), (0.0, 2.0), "{stdout}");
+}
+
 #[test]
 fn a_recording_plays_at_its_pace_and_gives_every_sample() {
     let dir = folder("replay");

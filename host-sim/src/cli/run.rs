@@ -4,9 +4,10 @@ use super::progress::Progress;
 use clap::{Args, ValueEnum};
 use control_core::TICK_HZ;
 use host_sim::device::serial::SerialPort;
-use host_sim::device::virtual_device::{VirtualDevice, VirtualPort};
+use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::driver::Driver;
 use host_sim::failure::Failure;
+use host_sim::pace::Pace;
 use host_sim::procedure::Procedure;
 use host_sim::profile::Profile;
 use host_sim::recording::messages::Setup;
@@ -95,14 +96,24 @@ impl Run {
 
         let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
         let station = Station::new(Driver::new(profile.config.clone()), outlets, &stop);
+        let station = if is_virtual || self.headless {
+            station
+        } else {
+            // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
+            say!("the torque is off: press Start in the page");
+            station.wait_for_a_person()
+        };
         let mut bar = Progress::new("running");
         let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
         let outcome = match &mut serial {
-            Some(port) => station.run_in_real_time(port, seconds, |_| {}, progress)?,
-            None if self.fast => station.run_in_step(VirtualDevice::new(&profile, procedure), progress)?,
+            Some(port) => station.run_in_real_time(port, seconds, progress)?,
             None => {
-                let (mut port, hand) = VirtualPort::start(VirtualDevice::new(&profile, procedure))?;
-                station.run_in_real_time(&mut port, seconds, |c| hand.control(c), progress)?
+                let mut device = VirtualDevice::new(&profile, procedure);
+                if !self.fast {
+                    device.take_times();
+                }
+                let pace = if self.fast { Pace::Free } else { Pace::real_time() };
+                station.run_in_step(device, pace, progress)?
             }
         };
         drop(bar);

@@ -1,6 +1,5 @@
 //! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial port.
 
-pub mod pipe;
 pub mod serial;
 pub mod virtual_device;
 

@@ -1,9 +1,6 @@
 //! The device without the hardware: the control core, tick by tick, against the plant, behind the same end of the link that
 //! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
 
-use super::pipe::{self, End};
-use super::{Port, Wire};
-use crate::failure::Failure;
 use crate::plant::{Plant, PlantConfig};
 use crate::procedure::Procedure;
 use crate::profile::Profile;
@@ -14,8 +11,6 @@ use control_core::{Config, Controller, Order, Plan, TICK_HZ, TickInput};
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use link::frames::{Stage, StageTime, Timing};
-use std::io;
-use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// One tick in s.
@@ -24,10 +19,6 @@ const TICK_S: f64 = 1.0 / TICK_HZ as f64;
 const DRAG_MM_PER_S: f64 = 250.0;
 /// A dragged hand closes in on the mouse with this time constant, s.
 const DRAG_LAG_S: f64 = 0.02;
-/// Ticks done between two looks at the cable, in real time: 1 ms.
-const BURST: u32 = 10;
-/// Further behind than this (a suspended computer) the clock is set anew rather than caught up with.
-const LARGEST_LAG: Duration = Duration::from_millis(200);
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
 
@@ -120,6 +111,17 @@ impl VirtualDevice {
     pub fn tick_alone(&mut self) {
         self.controller.order(Order::Heartbeat);
         self.tick();
+    }
+
+    /// Notes the time of ticks from now on, for the timing frames.
+    pub fn take_times(&mut self) {
+        self.timed = true;
+    }
+
+    /// The clock on the wall ran away from the device's: ticks came late.
+    pub fn note_late(&mut self) {
+        self.timing.missed_ticks = self.timing.missed_ticks.saturating_add(1);
+        self.endpoint.set_timing(self.timing);
     }
 
     /// One tick of the control law, then 100 µs of physics.
@@ -231,97 +233,4 @@ impl VirtualDevice {
         *stage = StageTime { last: taken, longest: stage.longest.max(taken) };
         self.endpoint.set_timing(self.timing);
     }
-}
-
-/// A virtual device that lives in a thread of its own, in real time, with a cable to be plugged in.
-pub struct VirtualPort {
-    cables: mpsc::Sender<End>,
-}
-
-/// Moves the hand of a virtual device that lives in a thread of its own.
-pub struct HandHandle {
-    controls: mpsc::Sender<Control>,
-}
-
-impl VirtualPort {
-    /// Powers the device up; it goes on until both of what is returned are dropped.
-    pub fn start(device: VirtualDevice) -> Result<(Self, HandHandle), Failure> {
-        let (cables, plugged) = mpsc::channel();
-        let (controls, asked) = mpsc::channel();
-        std::thread::Builder::new()
-            .name("virtual device".into())
-            .spawn(move || device.run_in_real_time(&plugged, &asked))
-            .map_err(|cause| Failure::failed(format_args!("the virtual device cannot start ({cause})")))?;
-        Ok((Self { cables }, HandHandle { controls }))
-    }
-}
-
-impl Port for VirtualPort {
-    fn open(&mut self) -> io::Result<Box<dyn Wire>> {
-        let (near, far) = pipe::cable();
-        self.cables.send(far).map_err(|_| io::Error::from(io::ErrorKind::NotConnected))?;
-        Ok(Box::new(near))
-    }
-}
-
-impl HandHandle {
-    /// Moves the hand; never blocks.
-    pub fn control(&self, control: Control) {
-        // A device that is gone has no hand.
-        let _ = self.controls.send(control);
-    }
-}
-
-impl VirtualDevice {
-    /// Ticks in real time at the far end of whatever cable is plugged in, until nobody can plug in another.
-    pub fn run_in_real_time(mut self, cables: &mpsc::Receiver<End>, controls: &mpsc::Receiver<Control>) {
-        self.timed = true;
-        let mut cable: Option<End> = None;
-        let mut due = Instant::now();
-        let burst = Duration::from_secs(u64::from(BURST)) / TICK_HZ;
-        loop {
-            match cables.try_recv() {
-                Ok(end) => cable = Some(end),
-                Err(mpsc::TryRecvError::Disconnected) if cable.is_none() => return,
-                Err(_) => {}
-            }
-            while let Ok(control) = controls.try_recv() {
-                self.control(control);
-            }
-            if let Some(end) = &mut cable
-                && exchange(&mut self, end).is_err()
-            {
-                self.disconnect();
-                cable = None;
-            }
-            for _ in 0..BURST {
-                self.tick();
-            }
-            due += burst;
-            let now = Instant::now();
-            if now > due + LARGEST_LAG {
-                self.timing.missed_ticks += 1;
-                due = now;
-            }
-            std::thread::sleep(due.saturating_duration_since(now));
-        }
-    }
-}
-
-/// Takes what has arrived and sends what fits.
-fn exchange(device: &mut VirtualDevice, cable: &mut End) -> io::Result<()> {
-    let mut bytes = [0; MAX_FRAME];
-    loop {
-        match cable.read(&mut bytes, Duration::ZERO)? {
-            0 => break,
-            count => device.receive(&bytes[..count]),
-        }
-    }
-    while cable.room() >= MAX_FRAME {
-        match device.transmit(&mut bytes) {
-            0 => break,
-            count => cable.write(&bytes[..count])?,
-        }
-    }
-    Ok(())
 }

@@ -1,10 +1,14 @@
 //! A serial device, over a pseudo-terminal pair: the virtual device's bytes behind the far end, unplugged and plugged in again.
 #![cfg(unix)]
 
+mod board;
+#[path = "../common/mod.rs"]
 mod common;
+mod pipe;
 
+use board::Board;
 use common::{figure, folder, host_sim, text};
-use host_sim::device::virtual_device::{VirtualDevice, VirtualPort};
+use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::device::{Port, Wire};
 use host_sim::driver::Driver;
 use host_sim::procedure::Procedure;
@@ -79,7 +83,7 @@ impl Drop for Plugged {
     }
 }
 
-fn board() -> VirtualDevice {
+fn device() -> VirtualDevice {
     let profile = Profile::find("adult").expect("it is built in");
     let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
     VirtualDevice::new(&profile, procedure)
@@ -89,8 +93,8 @@ fn board() -> VirtualDevice {
 fn the_same_bytes_over_a_terminal_lose_nothing() {
     let dir = folder("serial");
     let path = dir.join("ttyBoard");
-    let (mut port, _hand) = VirtualPort::start(board()).expect("it starts");
-    let _plugged = Plugged::new(&path, port.open().expect("it is there"));
+    let mut board = Board::start(device());
+    let _plugged = Plugged::new(&path, board.plug_in());
     let output = host_sim(&["run", "--headless", "--seconds", "6", "--device", text(&path)]).output();
     let output = output.expect("the program starts");
     let stdout = String::from_utf8(output.stdout).expect("text");
@@ -100,10 +104,22 @@ fn the_same_bytes_over_a_terminal_lose_nothing() {
 }
 
 #[test]
+fn with_a_page_the_torque_waits_for_a_person() {
+    let dir = folder("page");
+    let path = dir.join("ttyBoard");
+    let mut board = Board::start(device());
+    let _plugged = Plugged::new(&path, board.plug_in());
+    let stdout = common::run_well(&["run", "--port", "0", "--seconds", "4", "--device", text(&path)]);
+    assert!(stdout.contains("press Start"), "{stdout}");
+    assert_eq!((figure(&stdout, "samples"), figure(&stdout, "punctures")), (40_000.0, 0.0), "{stdout}");
+    assert_eq!(figure(&stdout, "peak_force_n"), 0.0, "{stdout}");
+}
+
+#[test]
 fn a_port_where_nobody_answers_is_one_line_and_status_one() {
     let dir = folder("mute");
     let path = dir.join("ttyMute");
-    let (near, _far) = host_sim::device::pipe::cable();
+    let (near, _far) = pipe::cable();
     let _plugged = Plugged::new(&path, Box::new(near));
     let output =
         host_sim(&["run", "--headless", "--device", text(&path)]).output().expect("the program starts");
@@ -114,8 +130,8 @@ fn a_port_where_nobody_answers_is_one_line_and_status_one() {
 fn unplugged_and_plugged_in_again_it_goes_on_with_torque_off() {
     let dir = folder("replug");
     let (path, mcap) = (dir.join("ttyBoard"), dir.join("a.mcap"));
-    let (mut port, _hand) = VirtualPort::start(board()).expect("it starts");
-    let plugged = Plugged::new(&path, port.open().expect("it is there"));
+    let mut board = Board::start(device());
+    let plugged = Plugged::new(&path, board.plug_in());
     let child =
         host_sim(&["run", "--headless", "--seconds", "5", "--device", text(&path), "--record", text(&mcap)])
             .stdout(Stdio::piped())
@@ -124,7 +140,7 @@ fn unplugged_and_plugged_in_again_it_goes_on_with_torque_off() {
     std::thread::sleep(Duration::from_millis(2_000));
     drop(plugged);
     std::thread::sleep(Duration::from_millis(700));
-    let _again = Plugged::new(&path, port.open().expect("it is there"));
+    let _again = Plugged::new(&path, board.plug_in());
     let output = child.wait_with_output().expect("it ends");
     assert!(output.status.success());
     let stdout = String::from_utf8(output.stdout).expect("text");
@@ -147,8 +163,8 @@ fn unplugged_and_plugged_in_again_it_goes_on_with_torque_off() {
 fn a_killed_program_leaves_a_device_without_torque() {
     let dir = folder("killed-host");
     let path = dir.join("ttyBoard");
-    let (mut port, _hand) = VirtualPort::start(board()).expect("it starts");
-    let _plugged = Plugged::new(&path, port.open().expect("it is there"));
+    let mut board = Board::start(device());
+    let _plugged = Plugged::new(&path, board.plug_in());
     let mut child = host_sim(&["run", "--headless", "--device", text(&path)])
         .stdout(Stdio::null())
         .spawn()

@@ -1,6 +1,6 @@
-//! Two byte queues in memory: the virtual device's cable.
+//! Two byte queues in memory: the cable of a board that is none.
 
-use super::Wire;
+use host_sim::device::Wire;
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -28,20 +28,20 @@ impl Direction {
 }
 
 /// One end of a cable; dropped, the other end sees it pulled.
-pub struct End {
+pub(crate) struct End {
     incoming: Arc<Direction>,
     outgoing: Arc<Direction>,
 }
 
 /// A cable's two ends.
-pub fn cable() -> (End, End) {
+pub(crate) fn cable() -> (End, End) {
     let (there, back) = (Arc::<Direction>::default(), Arc::<Direction>::default());
     (End { incoming: back.clone(), outgoing: there.clone() }, End { incoming: there, outgoing: back })
 }
 
 impl End {
     /// Bytes that still fit on the way to the other end.
-    pub fn room(&self) -> usize {
+    pub(crate) fn room(&self) -> usize {
         CAPACITY - self.outgoing.lock().bytes.len().min(CAPACITY)
     }
 }

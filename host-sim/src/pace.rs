@@ -1,0 +1,59 @@
+//! How fast a simulated device runs: with the clock on the wall, or as fast as it goes.
+
+use std::time::{Duration, Instant};
+
+/// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught up with.
+const LARGEST_LAG: Duration = Duration::from_millis(200);
+
+/// How fast a simulated device runs.
+#[derive(Clone, Copy, Debug)]
+pub enum Pace {
+    /// As fast as it goes.
+    Free,
+    /// With the clock on the wall.
+    RealTime {
+        /// Where the device's own time began.
+        zero: Instant,
+    },
+}
+
+/// The clock on the wall has run away and was set anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Late;
+
+impl Pace {
+    /// With the clock on the wall, from now on.
+    pub fn real_time() -> Self {
+        Self::RealTime { zero: Instant::now() }
+    }
+
+    /// Waits until it is `elapsed` on the device's own clock.
+    pub fn wait(&mut self, elapsed: Duration) -> Result<(), Late> {
+        let Self::RealTime { zero } = self else { return Ok(()) };
+        let now = Instant::now();
+        let due = *zero + elapsed;
+        if now > due + LARGEST_LAG {
+            *zero += now - due;
+            return Err(Late);
+        }
+        std::thread::sleep(due.saturating_duration_since(now));
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_computer_that_slept_is_late_once_and_goes_on_from_there() {
+        let begin = Instant::now();
+        let mut pace = Pace::real_time();
+        assert_eq!(pace.wait(Duration::from_millis(20)), Ok(()));
+        assert!(begin.elapsed() >= Duration::from_millis(20));
+        std::thread::sleep(Duration::from_millis(250));
+        assert_eq!(pace.wait(Duration::from_millis(21)), Err(Late));
+        assert_eq!(pace.wait(Duration::from_millis(22)), Ok(()));
+        assert!(Pace::Free.wait(Duration::from_secs(1_000)).is_ok());
+    }
+}
