@@ -1,4 +1,4 @@
-// What a person does: takes the needle by mouse, finger or arrow keys, starts, stops, gives it back to the demo.
+// What a person does: takes the needle by mouse, finger or arrow keys, starts, stops, gives it back to the demo, sets its zero, turns it.
 
 /** Arrow keys move the hand so far, with Shift ten times. */
 const KEY_STEP_MM = 0.2;
@@ -30,14 +30,21 @@ export class Hand {
     document.addEventListener("keydown", (event) => this.key(event));
     document.getElementById("stop").addEventListener("click", () => this.stop());
     document.getElementById("start").addEventListener("click", () => link.send({ do: "start" }));
+    this.zero = document.getElementById("zero");
+    this.zero.addEventListener("click", () => this.setZero());
+    this.angle = document.getElementById("angle");
+    this.angle.addEventListener("input", () => this.turn());
+    this.turnedAt = -Infinity;
     this.demo = document.getElementById("demo");
     this.demo.addEventListener("click", () => link.send({ do: "demo" }));
     this.note = document.getElementById("hand-note");
   }
 
-  /** Whether there is a simulated hand at all. */
-  allow(movable, travel) {
+  /** Whether there is a simulated hand at all, and a device that has a zero. */
+  allow(movable, isDevice, travel) {
     this.movable = movable;
+    document.getElementById("turn").hidden = !movable;
+    this.zero.hidden = !isDevice;
     this.canvas.dataset.fixed = String(!movable);
     this.canvas.setAttribute("aria-valuemax", travel.toFixed(0));
     this.demo.hidden = !movable;
@@ -45,8 +52,10 @@ export class Hand {
   }
 
   /** What the server says of who moves the needle, and where it is. */
-  follow(hand, depth) {
+  follow(hand, depth, tilt) {
     this.actual = depth;
+    const degrees = ((tilt * 180) / Math.PI).toFixed(0);
+    if (this.angle.value !== degrees && performance.now() - this.turnedAt > NEWS_MS) this.angle.value = degrees;
     const person = this.movable && hand === "person";
     if (person === this.person || this.pointer !== null) return;
     if (this.person && performance.now() - this.takenAt < NEWS_MS) return;
@@ -104,6 +113,16 @@ export class Hand {
     this.pointer = null;
     this.canvas.dataset.held = "false";
     this.link.send({ do: "release" });
+  }
+
+  /** The tip is at depth 0 from now on; the hand stays where it is. */
+  setZero() {
+    if (this.link.send({ do: "zero" })) this.depth -= this.actual;
+  }
+
+  turn() {
+    this.turnedAt = performance.now();
+    this.link.send({ do: "tilt", rad: (Number(this.angle.value) * Math.PI) / 180 });
   }
 
   stop() {

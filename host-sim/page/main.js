@@ -41,7 +41,7 @@ const receive = {
     trace.clear();
     timePlot.clear();
     events.clear();
-    hand.allow(scene.hand, scene.travel_mm);
+    hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm);
     panel.scene(scene);
   },
   device(message) {
@@ -64,7 +64,7 @@ const receive = {
     view.tilt = pose.tilt_rad;
     view.state = pose.state;
     panel.limits(pose.limits, performance.now());
-    hand.follow(message.hand, pose.depth_mm);
+    hand.follow(message.hand, pose.depth_mm, pose.tilt_rad);
   },
 };
 

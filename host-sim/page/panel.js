@@ -99,7 +99,7 @@ export class Panel {
     const [state, tone] = condition === "live" && known ? STATES[view.state] ?? STATES.unknown : ["No data", "warn"];
     chip("state", state, tone);
     const powered = condition === "live" && view.state !== "idle" && view.state !== "fault";
-    byId("start").disabled = condition !== "live" || powered;
+    byId("start").disabled = byId("zero").disabled = condition !== "live" || powered;
     if (link) this.link(link, condition);
   }
 

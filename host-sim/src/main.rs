@@ -9,6 +9,13 @@ macro_rules! say {
     }};
 }
 
+/// Examples at the end of a help, and how to type them where nothing is installed.
+macro_rules! examples {
+    ($text:literal) => {
+        concat!($text, "\n\nIn the source folder `cargo run --release --` stands for `host-sim`.")
+    };
+}
+
 mod cli;
 
 use clap::Parser;

@@ -33,6 +33,10 @@ const TILT_RAD: f64 = std::f64::consts::FRAC_PI_6;
 /// Tremor of the hand between two readings, and the converter's step.
 const FORCE_TOLERANCE_N: f64 = 0.03;
 
+/// The oldest puncture in the list.
+const FIRST_PUNCTURE: &str =
+    "[...document.querySelectorAll('#events [data-kind=puncture]')].at(-1)?.textContent ?? 'none'";
+
 #[test]
 fn a_person_watches_takes_the_needle_stops_and_comes_back() {
     if let Err(failure) = visit() {
@@ -50,14 +54,17 @@ fn visit() -> Result<(), Failure> {
     let mut program = Program::start(&places.program, 0, Some(&recording))?;
     let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
     let mut rows = watch(&mut page)?;
+    photographs(&mut page, &scratch)?;
     drag(&mut page)?;
     rows.extend(latency(&mut page)?);
     stop(&mut page)?;
+    zero_and_turn(&mut page)?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)?;
     come_back(&mut page, &mut program, &places.program)?;
+    let told = page.text(FIRST_PUNCTURE)?;
     drop(page);
-    phone(&browser, &program.url)?;
+    phone(&browser, &program.url, &told, &scratch)?;
     let report = json!({ "rows": rows });
     let file = places.target.join("page.json");
     fs::write(&file, format!("{report:#}\n")).map_err(|e| format!("cannot write {}: {e}", file.display()))?;
@@ -117,6 +124,19 @@ fn watch(page: &mut Page) -> Result<Vec<Value>, Failure> {
         row("page_mb", megabytes, "MB", "lower"),
         row("page_fps", rates.iter().copied().fold(0.0, f64::max), "1/s", "higher"),
     ])
+}
+
+/// The page as it is, to be looked at: light and dark.
+fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+    photograph(page, &scratch.join("desktop.png"))?;
+    page.dark(true)?;
+    std::thread::sleep(Duration::from_millis(300));
+    photograph(page, &scratch.join("desktop-dark.png"))?;
+    page.dark(false)
+}
+
+fn photograph(page: &mut Page, file: &Path) -> Result<(), Failure> {
+    fs::write(file, page.screenshot()?).map_err(|e| format!("cannot write {}: {e}", file.display()))
 }
 
 /// A person takes the needle with the mouse and presses the skin: the force answers as the control core computes it.
@@ -276,6 +296,24 @@ fn stop(page: &mut Page) -> Result<(), Failure> {
     page.click("demo")
 }
 
+/// The zero waits for torque off and then makes the tip's place depth 0; the slider turns the simulated needle.
+fn zero_and_turn(page: &mut Page) -> Result<(), Failure> {
+    let locked = "document.getElementById('zero').disabled";
+    page.wait("no zero while torque is on", SOON, locked)?;
+    page.click("stop")?;
+    page.wait("a zero to be had", SOON, &format!("!{locked}"))?;
+    page.wait("the needle at rest, not at 0", SOON, "__stats.depthMm < -3")?;
+    page.click("zero")?;
+    page.wait("the tip at depth 0", SOON, "Math.abs(__stats.depthMm) < 0.3")?;
+    page.evaluate("document.getElementById('angle').focus()")?;
+    for _ in 0..3 {
+        page.press("ArrowRight", "ArrowRight", 39)?;
+    }
+    page.wait("the needle turned", SOON, "document.getElementById('tilt').textContent === '33'")?;
+    page.click("start")?;
+    page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
+}
+
 /// The program ends and is started again: the page says so, shows old data as old, and is back by itself.
 fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), Failure> {
     program.end();
@@ -298,9 +336,11 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
 }
 
 /// A phone: nothing sticks out, the stop is in reach, a finger drags.
-fn phone(browser: &Chromium, url: &str) -> Result<(), Failure> {
+fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<(), Failure> {
     let mut page = Page::open(browser, url, PHONE.0, PHONE.1, true)?;
     page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
+    let told_later = page.text(FIRST_PUNCTURE)?;
+    check("what happened before it was opened, in the same words", told == told_later, (told, &told_later))?;
     let width = page.number("document.documentElement.scrollWidth")?;
     check("nothing wider than the screen", width <= f64::from(PHONE.0), width)?;
     let stop = "document.getElementById('stop').getBoundingClientRect()";
@@ -317,6 +357,7 @@ fn phone(browser: &Chromium, url: &str) -> Result<(), Failure> {
     }
     page.wait("the needle to follow the finger", SOON, &format!("__stats.depthMm > {before} + 1"))?;
     page.touch("touchEnd", at)?;
+    photograph(&mut page, &scratch.join("phone.png"))?;
     page.click("demo")?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)

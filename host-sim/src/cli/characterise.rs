@@ -16,11 +16,11 @@ use std::sync::atomic::AtomicBool;
 ///
 /// Writes rig.toml (the nominal simulation), fit.csv, fit2.csv and holdout.csv, which `diagnose` reads.
 #[derive(Args)]
-#[command(after_help = "Examples:
+#[command(after_help = examples!("Examples:
   host-sim characterise --out /tmp/bench3
   host-sim characterise --device /dev/ttyACM0 --out /tmp/bench3
   host-sim diagnose --rig /tmp/bench3/rig.toml --fit /tmp/bench3/fit.csv --fit /tmp/bench3/fit2.csv \\
-    --holdout /tmp/bench3/holdout.csv --out /tmp/report")]
+    --holdout /tmp/bench3/holdout.csv --out /tmp/report"))]
 pub(crate) struct Characterise {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]

@@ -11,8 +11,8 @@ use std::sync::Mutex;
 ///
 /// Writes diagnosis.json, report.html, patched-rig.toml and residuals.csv, and prints the same in ten lines.
 #[derive(Args)]
-#[command(after_help = "Example:
-  host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report")]
+#[command(after_help = examples!("Example:
+  host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report"))]
 pub(crate) struct Diagnose {
     /// The simulation as its author believes it
     #[arg(long, value_name = "RIG.toml")]

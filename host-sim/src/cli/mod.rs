@@ -13,7 +13,7 @@ use host_sim::failure::Failure;
 ///
 /// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
 #[derive(Parser)]
-#[command(version, after_help = "Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap")]
+#[command(version, after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -15,12 +15,12 @@ use std::sync::atomic::AtomicBool;
 
 /// Show a recording in the visualizer, again and again; Stop and Start in the page pause it.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim replay session.mcap --port 8711")]
+#[command(after_help = examples!("Example: host-sim replay session.mcap --port 8711"))]
 pub(crate) struct Replay {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
-    /// Port of the page on this computer
+    /// Port of the page on this computer; 0 takes any free one
     #[arg(long, default_value_t = 8710, value_name = "N")]
     port: u16,
     /// Play it once and end
@@ -28,21 +28,24 @@ pub(crate) struct Replay {
     once: bool,
 }
 
-/// Write rig.toml and CSV files, which `diagnose` reads, from a recording. A CSV file for every stretch without a gap.
+/// Write rig.toml and CSV files, which `diagnose` reads, from a recording.
+///
+/// One CSV file (recording.csv), or one for every stretch without a gap (recording-1.csv and so on). Older files of these
+/// names are replaced.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim export session.mcap --out exported")]
+#[command(after_help = examples!("Example: host-sim export session.mcap --out exported"))]
 pub(crate) struct Export {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
-    /// Folder to write to
+    /// Folder to write to; made where there is none
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
-/// A trainee's figures: time, path, force, punctures, vessel hit, angle, for every insertion and in all.
+/// Print a trainee's figures: time, path, force, punctures, vessel hit, angle, for every insertion and in all.
 #[derive(Args)]
-#[command(after_help = "Example: host-sim score session.mcap --profile adult")]
+#[command(after_help = examples!("Example: host-sim score session.mcap --profile adult"))]
 pub(crate) struct Score {
     /// The recording
     #[arg(value_name = "FILE.mcap")]

@@ -22,39 +22,40 @@ use std::sync::atomic::AtomicBool;
 
 /// Run a device, virtual or real: show it, record it.
 ///
-/// A scripted hand performs the procedure on a virtual device until a person takes the needle in the page.
+/// A scripted hand performs the procedure on a virtual device until a person takes the needle in the page; the torque of a
+/// real one stays off until a person presses Start there.
 /// The last line on standard output sums the run up.
 #[derive(Args)]
-#[command(after_help = "Examples:
+#[command(after_help = examples!("Examples:
   host-sim run --profile firm-skin
   host-sim run --device /dev/ttyACM0 --record session.mcap
-  host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap")]
+  host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Run {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// What the scripted hand does: venepuncture, slow, or a TOML file
+    /// What the scripted hand does: venepuncture, slow, or a TOML file like those in host-sim/procedures
     #[arg(long, default_value = "venepuncture", value_name = "NAME|FILE")]
     procedure: String,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, or a TOML file
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, or a TOML file like those in host-sim/profiles
     #[arg(long, default_value = "adult", value_name = "NAME|FILE")]
     profile: String,
     /// The force model
     #[arg(long, value_enum, default_value_t = Model::Jog)]
     model: Model,
-    /// Serve no page
+    /// Serve no page; a real device is then powered up at once
     #[arg(long)]
     headless: bool,
-    /// Stop after this many seconds of samples
+    /// End after this many seconds of samples; without it, Ctrl-C ends the run in good order
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
     /// Run a virtual device as fast as it goes
     #[arg(long)]
     fast: bool,
-    /// Record to this MCAP file
+    /// Record to this MCAP file; an older one of this name is replaced
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
-    /// Port of the page on this computer
+    /// Port of the page on this computer; 0 takes any free one
     #[arg(long, default_value_t = 8710, value_name = "N")]
     port: u16,
 }
@@ -63,9 +64,9 @@ pub(crate) struct Run {
 enum Model {
     /// The jog effect and friction cone of the venepuncture device.
     Jog,
-    /// Cutting and LuGre friction of the joint injection simulator.
+    /// Not built yet: cutting and LuGre friction of the joint injection simulator.
     Sparte,
-    /// The fitted force table of the layered-tissue simulator.
+    /// Not built yet: the fitted force table of the layered-tissue simulator.
     Xr,
 }
 

@@ -27,6 +27,8 @@ const TIMED_TICKS: u64 = 16;
 enum Hand {
     /// The procedure, since this tick.
     Script { since: u64 },
+    /// The procedure, as soon as the device is started; until then it stays where it is.
+    Rest,
     /// A person, to this depth in mm.
     Drag { wanted_mm: f64 },
 }
@@ -140,8 +142,8 @@ impl VirtualDevice {
         self.set_value = self.share(output.dac);
         self.enable = output.enable;
         self.endpoint.record(self.tick, &output);
-        if self.enable && !self.powered_before {
-            // The scripted hand waits for a person to start the device.
+        if self.enable && !self.powered_before && !matches!(self.hand, Hand::Drag { .. }) {
+            // The scripted hand waits for a person to start the device; a person who holds the needle goes on holding it.
             self.restart_script();
         }
         self.powered_before = self.enable;
@@ -187,6 +189,9 @@ impl VirtualDevice {
     fn order(&mut self, order: Order) {
         if matches!(order, Order::Zero) && !self.enable {
             self.zero_mm = self.plant.tip() * 1e3;
+            if matches!(self.hand, Hand::Script { .. }) {
+                self.hand = Hand::Rest;
+            }
         }
         self.controller.order(order);
     }
@@ -209,6 +214,7 @@ impl VirtualDevice {
                 let (depth, speed) = self.procedure.target(into);
                 (depth + self.zero_mm, speed)
             }
+            Hand::Rest => (self.hand_mm, 0.0),
             Hand::Drag { wanted_mm } => (wanted_mm, 0.0),
         };
         // A hand neither jumps to the mouse nor back to the procedure's beginning.
