@@ -4,6 +4,8 @@
 const KEY_STEP_MM = 0.2;
 /** How far the hand may be moved from the entry point. */
 const REACH_MM = { low: -30, high: 60 };
+/** A phone has none. */
+const KEYS = matchMedia("(any-pointer: fine)").matches ? ", or arrow keys" : "";
 /** The server hears of a new hand a little later; until then what it says of the old one does not count. */
 const NEWS_MS = 500;
 
@@ -67,7 +69,7 @@ export class Hand {
   say() {
     this.demo.disabled = !this.person;
     let text = "Moved by hand, on the device";
-    if (this.movable) text = this.person ? "You hold the needle: drag, or arrow keys" : "Demo hand: drag to take the needle";
+    if (this.movable) text = this.person ? `You hold the needle: drag${KEYS}` : "Demo hand: drag to take the needle";
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 
