@@ -86,3 +86,81 @@ fn reduced(damping: BounceDamping, moved: I16F16, wanted: Newtons) -> Newtons {
     let left = wanted.0.saturating_abs().saturating_sub(I16F16::from_bits(surplus)).max(I16F16::ZERO);
     Newtons(if wanted.0 < I16F16::ZERO { -left } else { left })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn n(newtons: f64) -> Newtons {
+        Newtons(I16F16::from_num(newtons))
+    }
+
+    fn mm(millimetres: f64) -> Millimetres {
+        Millimetres(I16F16::from_num(millimetres))
+    }
+
+    /// 0.02 N·s/mm: 25 N for a millimetre in a bounce.
+    fn damping() -> BounceDamping {
+        BounceDamping::new(Damping(I8F24::from_num(0.02)))
+    }
+
+    #[test]
+    fn damping_takes_its_share_and_never_turns_the_force_round() {
+        for sign in [-1.0, 1.0] {
+            let moved = I16F16::from_num(-0.04 * sign);
+            let Newtons(left) = reduced(damping(), moved, n(3.0 * sign));
+            assert!((left.to_num::<f64>() - 2.0 * sign).abs() < 1e-3, "{left}");
+            assert_eq!(reduced(damping(), moved, n(0.5 * sign)), n(0.0));
+        }
+    }
+
+    /// A force that pushes the needle before it from the first tick on gives energy that nobody put in.
+    fn pushed(force: f64, from: f64, step: f64, ticks: i32) -> (Observer, usize) {
+        let mut observer = Observer::new(mm(from));
+        let reduced = (1..=ticks).filter(|&tick| {
+            let depth = mm(from + step * f64::from(tick));
+            observer.tick(damping(), depth, n(force)).1
+        });
+        let reduced = reduced.count();
+        (observer, reduced)
+    }
+
+    #[test]
+    fn only_a_force_that_gives_more_than_it_got_is_reduced() {
+        // In the first tick no force has done anything yet.
+        assert_eq!(pushed(1.0, 5.0, -0.01, 20).1, 19, "pushed out");
+        assert_eq!(pushed(-1.0, 5.0, 0.01, 20).1, 19, "pulled in");
+        assert_eq!(pushed(1.0, 5.0, 0.01, 20).1, 0, "pressed in");
+        assert_eq!(pushed(1.0, 5.0, 0.0, 20).1, 0, "held");
+    }
+
+    #[test]
+    fn without_damping_nothing_is_reduced() {
+        let mut observer = Observer::new(mm(5.0));
+        let off = BounceDamping::new(Damping::default());
+        for tick in 1..20 {
+            let depth = mm(5.0 - 0.01 * f64::from(tick));
+            assert_eq!(observer.tick(off, depth, n(1.0)), (n(1.0), false));
+        }
+    }
+
+    #[test]
+    fn what_was_put_in_may_come_out_again() {
+        let (mut observer, _) = pushed(1.0, 5.0, 0.01, 20);
+        let back = (0..18).filter(|&tick| {
+            let depth = mm(5.2 - 0.01 * f64::from(tick));
+            observer.tick(damping(), depth, n(1.0)).1
+        });
+        assert_eq!(back.count(), 0);
+    }
+
+    #[test]
+    fn a_force_next_to_nothing_begins_a_new_count() {
+        let (mut observer, _) = pushed(1.0, 5.0, -0.01, 20);
+        assert!(observer.energy < I32F32::ZERO);
+        observer.tick(damping(), mm(4.8), n(0.006));
+        assert!(observer.energy < I32F32::ZERO, "6 mN are something");
+        observer.tick(damping(), mm(4.8), n(0.004));
+        assert_eq!(observer.energy, I32F32::ZERO);
+    }
+}

@@ -84,3 +84,45 @@ impl DacScale {
         DacCode(self.width.mid_scale())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mnm(torque: f64) -> MillinewtonMetres {
+        MillinewtonMetres(I16F16::from_num(torque))
+    }
+
+    #[test]
+    fn the_code_is_the_nearest_and_stays_within_the_span() {
+        // A step a mN·m.
+        let scale = DacScale::new(DacWidth::Bits8, mnm(127.0));
+        let codes = [0.0, 0.49, 0.51, -0.49, -0.51, 126.4, 127.0, 200.0, -127.0, -200.0];
+        let wanted = [128, 128, 129, 128, 127, 254, 255, 255, 1, 1];
+        assert_eq!(codes.map(|torque| scale.code(mnm(torque)).0), wanted);
+        assert_eq!(scale.zero(), DacCode(128));
+        assert_eq!(DacScale::new(DacWidth::Bits12, mnm(20.47)).code(mnm(-20.47)), DacCode(1));
+    }
+
+    #[test]
+    fn torque_fades_in_and_then_changes_as_fast_as_it_may() {
+        let limits = TorqueLimits {
+            torque: I16F16::from_num(30),
+            slew_per_tick: I16F16::from_num(4),
+            fade_per_tick: I2F30::ONE / 4,
+        };
+        let mut limiter = Limiter::default();
+        let mut given = |wanted: f64| {
+            let (torque, in_force) = limiter.tick(&limits, mnm(wanted));
+            (torque.0.to_num::<f64>(), in_force)
+        };
+        let (fading, slewing) = (Limits::FADE_IN, Limits::SLEW);
+        assert_eq!([given(8.0), given(8.0), given(8.0)], [(2.0, fading), (4.0, fading), (6.0, fading)]);
+        assert_eq!(given(8.0), (8.0, fading), "the tick in which it is done");
+        assert_eq!([given(12.0), given(12.5)], [(12.0, Limits::default()), (12.5, Limits::default())]);
+        assert_eq!([given(20.0), given(20.0)], [(16.5, slewing), (20.0, Limits::default())]);
+        assert_eq!([given(-9.0), given(-9.0)], [(16.0, slewing), (12.0, slewing)]);
+        limiter.restart();
+        assert_eq!(limiter.tick(&limits, mnm(8.0)), (mnm(2.0), fading), "anew after a start");
+    }
+}
