@@ -115,6 +115,7 @@ mod tests {
     }
 
     /// A force that pushes the needle before it from the first tick on gives energy that nobody put in.
+    #[expect(clippy::float_arithmetic, reason = "a test")]
     fn pushed(force: f64, from: f64, step: f64, ticks: i32) -> (Observer, usize) {
         let mut observer = Observer::new(mm(from));
         let reduced = (1..=ticks).filter(|&tick| {
