@@ -25,6 +25,14 @@ const RIVALS: usize = 4;
 /// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
 const BEHIND_Z: f64 = 2.0;
 const BEHIND: f64 = 3.0;
+/// The same as a part of what the effect explains: less is the form of a law rather than its name.
+const BEHIND_PART: f64 = 0.015;
+/// A rival this far behind in log-likelihood under a slow disturbance, and by half of what the winner gains there, is
+/// behind, and counts as by this many standard errors.
+const BEHIND_SLOW: f64 = 30.0;
+const BEHIND_SLOW_Z: f64 = 4.0;
+/// Standard errors behind within which a rival's shape is worth polishing.
+const WITHIN_REACH: f64 = 8.0;
 
 /// Costs per segment on fitted and held-out recordings under one noise.
 fn costs(candidate: &Candidate, nominal: &Nominal, held: &[Track]) -> Vec<f64> {
@@ -48,7 +56,7 @@ fn is_periodic(name: EffectName) -> bool {
 }
 
 /// Fits the rivals of each effect in its place and says how far behind they are.
-pub(crate) fn rivals(bench: &Bench, last: &Candidate, held: &[Track], found: &mut [Found]) {
+pub(crate) fn rivals(bench: &Bench, last: &Candidate, slow: &Candidate, held: &[Track], found: &mut [Found]) {
     let best = bench.fit(last.model.clone(), &last.noise, Colour::White);
     let own = costs(&best, bench.nominal, held);
     for i in 0..found.len() {
@@ -70,10 +78,33 @@ pub(crate) fn rivals(bench: &Bench, last: &Candidate, held: &[Track], found: &mu
             model.effects.push(effect.clone());
             let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
             let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
-            let theirs = costs(&rival, bench.nominal, held);
-            let lead: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
-            let gain = judge::bootstrap(&lead);
-            out.push(Rival { name: effect.name, z: gain.z, lead: gain.sum });
+            let lead = |rival: &Candidate| {
+                let theirs = costs(rival, bench.nominal, held);
+                judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
+            };
+            let mut gain = lead(&rival);
+            if gain.z < WITHIN_REACH {
+                // A rival that may be near is fitted as well as the winner was.
+                let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
+                let again = lead(&polished);
+                if again.sum < gain.sum {
+                    gain = again;
+                }
+            }
+            let mut rival = Rival { name: effect.name, z: gain.z, lead: gain.sum };
+            if rival.z < BEHIND_Z {
+                // What only a white noise takes for as good is behind.
+                let mut model = base.model.clone();
+                model.effects.push(effect.clone());
+                let theirs = bench.fit_slow(model, &[&slow.noise]).merit;
+                let without = bench.fit_slow(base.model.clone(), &[&slow.noise]).merit;
+                let behind = slow.merit - theirs;
+                if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
+                    rival.z = BEHIND_SLOW_Z;
+                    rival.lead = rival.lead.max(behind);
+                }
+            }
+            out.push(rival);
         }
         found[i].rivals = out;
     }
@@ -157,9 +188,9 @@ const REPEATS: f64 = 0.7;
 /// Whether at least one of the values that say how large an effect is cannot be zero.
 fn is_there(named: &Named) -> bool {
     let drifts = matches!(named.name, EffectName::FrictionDrift | EffectName::GainDrift);
-    let size = |key: &str| !(drifts && key == "time_constant") && !key.starts_with("period");
+    let where_or_when = |key: &str| key.starts_with("period") || (drifts && key == "time_constant");
     named.parameters.is_empty()
-        || named.parameters.iter().any(|(key, p)| size(key) && p.ci95[0] * p.ci95[1] > 0.0)
+        || named.parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
 }
 
 /// Part of the force that a refit must take from the held-out residual before values are called wrong.
@@ -192,7 +223,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let mut found = std::mem::take(&mut s.found);
     let refit = bench.fit(crate::model::Model::default(), &s.null.noise, Colour::White);
     let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
-    rivals(&bench, &patched, &held_tracks, &mut found);
+    rivals(&bench, &patched, &s.last, &held_tracks, &mut found);
     let estimator = Estimator::new(&fit_tracks, &patched.noise, scale);
     let on_fit = residuals(&s, &estimator, &fit_tracks, false, &refit, &patched);
     let on_held = residuals(&s, &estimator, &held_tracks, true, &refit, &patched);
@@ -225,13 +256,14 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let doubt = if matters { 1.0 / (1.0 + (leftover / 0.6).powi(2)) } else { 1.0 };
     // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
-    let understood =
-        part_of_force < 0.5 && (part_of_force < 0.12 || table.patched.holdout < 0.65 * table.refit.holdout);
+    let halves = table.patched.holdout < 0.65 * table.refit.holdout;
+    let understood = part_of_force < 0.12 || (halves && part_of_force < 0.5);
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
         let mut class = vec![name];
-        let mut near: Vec<&Rival> = one.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < BEHIND).collect();
+        let least = BEHIND.max(BEHIND_PART * (one.fit.sum + one.holdout.sum));
+        let mut near: Vec<&Rival> = one.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < least).collect();
         near.sort_by(|a, b| a.z.total_cmp(&b.z));
         // What no recording of motion tells apart: a drive that clips and a roller that slips at a constant force.
         if name == EffectName::CommandSaturation {
@@ -260,7 +292,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         };
         effects.push((one.holdout.sum, named));
     }
-    effects.retain(|(_, e)| e.confidence >= 0.5 && understood && is_there(e));
+    effects.retain(|(_, e)| understood && e.confidence >= 0.5 && is_there(e));
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
     let above = |x: f64| (x * x - floor * floor).max(0.0);

@@ -221,6 +221,8 @@ pub(crate) struct Gain {
 const RESAMPLED: usize = 400;
 /// Largest gain that one block counts with, in log-likelihood.
 const WITNESS: f64 = 10.0;
+/// Standard errors that stand for a gain without any spread.
+const SUREST: f64 = 100.0;
 /// Neighbouring segments that are taken together.
 const TOGETHER: usize = 3;
 
@@ -236,7 +238,8 @@ pub(crate) fn bootstrap(gains: &[f64]) -> Gain {
         let mean = x.iter().sum::<f64>() / n as f64;
         let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n.max(2) - 1) as f64;
         let error = (variance / n as f64).sqrt();
-        if error > 0.0 { mean / error } else { 0.0 }
+        // Every stretch at the limit is as sure as it gets.
+        if error > 0.0 { mean / error } else { SUREST * mean.signum() * f64::from(mean != 0.0) }
     };
     let z = over_error(&blocks);
     // One stretch with a huge gain is one witness: each counts up to a limit.

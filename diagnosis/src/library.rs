@@ -10,6 +10,8 @@ pub(crate) struct Span {
     /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown.
     pub(crate) speed: f64,
     pub(crate) speed_floor: f64,
+    /// Speed that a quarter of the moving blocks stay below.
+    pub(crate) slow: f64,
     /// Travel relative to the start of each recording.
     pub(crate) low: f64,
     pub(crate) high: f64,
@@ -45,8 +47,15 @@ impl Span {
         let rows: f64 = tracks.iter().map(|t| t.row_hold.len() as f64).sum();
         let blocks: f64 = tracks.iter().map(|t| t.blocks() as f64).sum();
         let seconds: f64 = tracks.iter().map(|t| t.row_time.last().copied().unwrap_or(0.0)).sum();
+        let mut moving: Vec<f64> = tracks
+            .iter()
+            .flat_map(|t| t.v.iter().zip(&t.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()))
+            .collect();
+        moving.sort_by(f64::total_cmp);
+        let fast = speeds[speeds.len() * 99 / 100];
         Self {
-            speed: speeds[speeds.len() * 99 / 100],
+            slow: moving.get(moving.len() / 4).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
+            speed: fast,
             speed_floor: fold(&|t| t.speed_floor),
             low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),
             high: fold(&|t| t.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
@@ -148,7 +157,7 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             }
             out
         }
-        N::CommandDelay => one("delay", logarithmic((0.2 * span.row).max(1e-5), 0.03, 9)),
+        N::CommandDelay => one("delay", logarithmic((0.2 * span.row).max(1e-5), 0.03, 16)),
         N::ElectricalLag => one("time_constant", logarithmic((0.2 * span.row).max(1e-5), 0.05, 9)),
         N::TiltGravity if span.tilt => vec![Effect::shaped(name, &[])],
         N::PositionSpring => {
@@ -212,6 +221,11 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::DriveCompliance => vec![("resonance_hz", 4.0, 0.5 / span.block), ("damping", 0.003, 0.7)],
         _ => Vec::new(),
     }
+}
+
+/// Whether the likelihood of an effect's first shape value has several optima.
+pub(crate) fn has_optima_apart(name: N) -> bool {
+    matches!(name, N::CommandDelay | N::ElectricalLag | N::Backlash | N::RollerSlip | N::DriveCompliance)
 }
 
 /// Whether a single coefficient must be positive for the effect to be what its name says.

@@ -1,6 +1,6 @@
 //! Periodic effects: which orders of a turn, or which period along the travel, stand out of the residual.
 
-use crate::effects::{Effect, EffectName as N};
+use crate::effects::{Effect, EffectName as N, wave_mean};
 use crate::fit::{Fit, dot};
 use crate::library::Span;
 use crate::model::{Model, Nominal, effective_command};
@@ -19,8 +19,8 @@ const PER_ORDER: f64 = 8.0;
 /// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of cycles over the travel.
 fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     let travel = span.travel();
-    // A wave must be resolved by the encoder and stay in the band of the filter at ordinary speed.
-    let shortest = (6.0 * span.count).max(span.speed * 0.3 * 4.0 * span.block);
+    // A wave must be resolved by the encoder and stay in the band of the filter at slow speed.
+    let shortest = (6.0 * span.count).max(span.slow * 4.0 * span.block);
     if let Some(turn) = nominal.rig.turn().filter(|turn| travel > 0.6 * turn) {
         let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
         return Some((turn, (1..=highest).map(|n| n as f64).collect()));
@@ -32,13 +32,8 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
 }
 
 fn wave_inputs(track: &Track, wave: f64, drive: Option<&Input>) -> [Input; 2] {
-    let (cos, sin): (Vec<f64>, Vec<f64>) = track
-        .x
-        .iter()
-        .map(|x| {
-            let (sin, cos) = (wave * x).sin_cos();
-            (cos, sin)
-        })
+    let (cos, sin): (Vec<f64>, Vec<f64>) = (0..track.blocks())
+        .map(|j| wave_mean(wave, track.x[j], if track.rest[j] { 0.0 } else { track.v[j] * track.span[j] }))
         .unzip();
     match drive {
         Some(drive) => [drive.scaled(&cos), drive.scaled(&sin)],

@@ -98,6 +98,7 @@ pub(crate) fn lay_all(c: &Candidate, nominal: &Nominal, tracks: &[Track], noise:
 
 /// Smooths held-out recordings with a fitted model; `scale` is the acceleration that the command makes.
 fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], scale: f64) {
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
     let drives: Vec<Total> = tracks
         .iter()
@@ -107,7 +108,6 @@ fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], s
             total
         })
         .collect();
-    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     null::resmooth(tracks, &drives, &crate::noise::guess(tracks, scale), count);
     for _ in 0..3 {
         let totals: Vec<Total> = tracks
@@ -167,6 +167,7 @@ pub(crate) fn search(
         let candidates = bench.screen(&white, &|_| true);
         let mut finalists = bench.finalists(&white, &candidates);
         bench.polish(&mut finalists);
+        order_near_ties(&bench, white.merit, &mut finalists);
         let mut taken = None;
         for finalist in finalists {
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
@@ -225,6 +226,26 @@ pub(crate) fn search(
         found,
         lost,
     })
+}
+
+/// Candidates whose gain is this part of the best one's are near ties.
+const NEAR_TIE: f64 = 0.9;
+
+/// Puts near ties in the order of the force that they leave on the fitted recordings: what they gain on the noise of a
+/// null that explains little says less.
+fn order_near_ties(bench: &Bench, before: f64, finalists: &mut [Candidate]) {
+    let Some(best) = finalists.first().map(|c| c.merit - before) else { return };
+    let near = finalists.iter().take_while(|c| c.merit - before >= NEAR_TIE * best).count();
+    if near < 2 {
+        return;
+    }
+    let estimator = Estimator::new(bench.tracks, &finalists[0].noise, bench.scale);
+    let left = |c: &Candidate| {
+        let inertia = crate::values::scale(bench.nominal, c).0;
+        let totals = c.fit.totals(bench.tracks);
+        estimator.rms(&residuals(&estimator, bench.tracks, &totals, inertia), bench.tracks)
+    };
+    finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
 }
 
 /// Costs per segment of a model on the recordings it was fitted to, under some noise.

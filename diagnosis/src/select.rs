@@ -37,6 +37,8 @@ const PER_SHAPE: f64 = 4.0;
 const FINALISTS: usize = 8;
 /// How many of them have their shapes moved in full fits.
 const POLISHED: usize = 3;
+/// Factors at which optima are looked for that lie apart.
+const APART: [f64; 8] = [0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.4];
 /// Most effects that are named together.
 pub(crate) const MOST: usize = 3;
 
@@ -187,7 +189,7 @@ impl Bench<'_> {
         full
     }
 
-    /// Moves the shape of the last effect of the best few candidates to the largest likelihood of the whole fit.
+    /// Polishes the best few candidates and puts them in order again.
     pub(crate) fn polish(&self, candidates: &mut [Candidate]) {
         let polished: Vec<Candidate> =
             candidates.par_iter().take(POLISHED).map(|c| self.polish_one(c)).collect();
@@ -199,14 +201,31 @@ impl Bench<'_> {
         candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     }
 
-    fn polish_one(&self, candidate: &Candidate) -> Candidate {
+    /// Moves the shape of the last effect to the largest likelihood of the whole fit.
+    pub(crate) fn polish_one(&self, candidate: &Candidate) -> Candidate {
         let last = candidate.model.effects.len() - 1;
         let mut model = candidate.model.clone();
         let merit =
             |model: &Model| Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood;
         let mut best = candidate.fit.log_likelihood;
+        let movable = library::movable(&candidate.model.effects[last], self.span);
+        // The score test holds the gain and looks near by: delays and events have optima that lie apart.
+        if let (true, Some((key, low, high))) =
+            (library::has_optima_apart(candidate.model.effects[last].name), movable.first().copied())
+        {
+            let at = model.effects[last].shape[key];
+            for factor in APART {
+                let mut trial = candidate.model.clone();
+                trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
+                let value = merit(&trial);
+                if value > best {
+                    best = value;
+                    model = trial;
+                }
+            }
+        }
         for round in 0..2 {
-            for (key, low, high) in library::movable(&candidate.model.effects[last], self.span) {
+            for (key, low, high) in movable.iter().copied() {
                 let at = model.effects[last].shape[key];
                 let reach = if round == 0 { 1.6_f64 } else { 1.15 };
                 let (a, b) = ((at / reach).max(low).ln(), (at * reach).min(high).ln());

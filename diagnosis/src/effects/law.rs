@@ -177,8 +177,8 @@ impl Law {
                 out[1] = -s.velocity * settled;
             }
             N::GainDrift => out[0] = s.drive * (1.0 - (-s.time / self.a).exp()),
-            N::Cogging | N::MassImbalance | N::EncoderEccentricity => self.harmonics(s.position, 1.0, out),
-            N::TorqueRipple => self.harmonics(s.position, s.drive, out),
+            N::Cogging | N::MassImbalance | N::EncoderEccentricity => self.harmonics(s, 1.0, out),
+            N::TorqueRipple => self.harmonics(s, s.drive, out),
             N::TiltGravity => out[0] = s.tilt.sin(),
             N::PositionSpring => {
                 let x = s.position - self.a;
@@ -202,9 +202,10 @@ impl Law {
         if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
-    fn harmonics(&self, position: f64, times: f64, out: &mut [f64]) {
+    /// Means over the step: a wave that is passed within it averages out.
+    fn harmonics(&self, s: &State, times: f64, out: &mut [f64]) {
         for (pair, wave) in out.chunks_exact_mut(2).zip(&self.waves) {
-            let (sin, cos) = (wave * position).sin_cos();
+            let (cos, sin) = wave_mean(*wave, s.position, s.velocity * s.dt);
             pair[0] = times * cos;
             pair[1] = times * sin;
         }
@@ -234,6 +235,14 @@ impl Law {
         self.state[1] = next;
         (next - v) / dt
     }
+}
+
+/// Mean cosine and sine of a wave, rad per unit of travel, over `passed` travel about `position`.
+pub(crate) fn wave_mean(wave: f64, position: f64, passed: f64) -> (f64, f64) {
+    let (sin, cos) = (wave * position).sin_cos();
+    let half = 0.5 * wave * passed;
+    let part = if half.abs() > 1e-4 { half.sin() / half } else { 1.0 };
+    (part * cos, part * sin)
 }
 
 /// Exact transition of x″ + 2ζωx′ + ω²x = f over `dt` with `f` held: [a11 a12 a21 a22 b1 b2].

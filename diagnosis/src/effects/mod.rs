@@ -10,6 +10,7 @@ mod name;
 mod plant;
 
 pub use command::CommandLaw;
+pub(crate) use law::wave_mean;
 pub use law::{Law, State};
 pub use name::{EffectName, Subsystem};
 pub use plant::{Plant, Surroundings};
