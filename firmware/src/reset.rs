@@ -142,6 +142,32 @@ mod tests {
         assert_eq!(words.take(), (None, false));
     }
 
+    #[test]
+    fn every_kind_of_crash_survives_whole_or_not_at_all() {
+        let kinds = [CrashKind::Panic, CrashKind::HardFault, CrashKind::StrayInterrupt, CrashKind::HungTask];
+        for crash in kinds.map(|kind| Crash { kind, detail: 0x0800_1235 }) {
+            let words = LastWords::new();
+            words.crash(crash);
+            assert_eq!(words.take(), (Some(crash), false));
+            for word in 0..3 {
+                for bit in 0..32 {
+                    words.crash(crash);
+                    words.crash[word].fetch_xor(1 << bit, Relaxed);
+                    assert_eq!(words.take().0, None, "{crash:?}, bit {bit} of word {word}");
+                }
+            }
+        }
+        let words = LastWords::new();
+        words.torque(true);
+        words.torque(false);
+        assert_eq!(words.take(), (None, false));
+        for word in 0..2 {
+            words.torque(true);
+            words.torque[word].fetch_xor(1 << 9, Relaxed);
+            assert_eq!(words.take(), (None, false));
+        }
+    }
+
     /// RAM after a power-up holds anything.
     #[test]
     fn noise_in_ram_is_no_crash() {

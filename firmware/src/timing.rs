@@ -105,6 +105,15 @@ mod tests {
         assert_eq!(TICK_CYCLES * TICK_HZ, CORE_HZ);
     }
 
+    /// What the comments above say, in numbers.
+    #[test]
+    fn the_derived_constants_are_what_their_reasons_say() {
+        assert_eq!((TICK_TIMER_HZ, TICK_CYCLES, TICK_TIMER_COUNTS), (84_000_000, 16_800, 8_400));
+        assert_eq!(1_000_000 * u64::from(OUTPUT_CYCLES) / u64::from(CORE_HZ), 20, "µs");
+        assert_eq!(2 * TICK_MISSED_CYCLES, 3 * TICK_CYCLES);
+        assert_eq!(TILT_SILENCE_MS, 11);
+    }
+
     /// The slowest way to notice that a task hangs leaves time for the tick that takes torque away.
     #[test]
     fn a_hung_task_is_noticed_within_twenty_milliseconds() {
