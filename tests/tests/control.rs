@@ -84,5 +84,6 @@ fn the_board_writes_the_codes_that_control_core_computes() {
     }
     let punctures = pc.heard.events.iter().filter(|event| matches!(event.kind, EventKind::Puncture { .. }));
     assert_eq!(punctures.count(), 2, "skin and vessel");
-    println!("{} ticks equal; by state {states:?}; {:?}", ticks.len(), pc.counts());
+    println!("| codes equal to control-core's | {} ticks |", ticks.len());
+    println!("by state {states:?}; {:?}", pc.counts());
 }

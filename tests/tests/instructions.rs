@@ -57,14 +57,14 @@ impl Profile {
     }
 
     /// Prints median and longest of each state, and answers the longest of all.
-    fn longest(&self) -> u32 {
+    fn longest(&self, what: &str) -> u32 {
         for (&state, instructions) in &self.by_state {
             let name =
                 State::from_code(state).map_or_else(|| state.to_string(), |state| format!("{state:?}"));
             let (median, longest) =
                 (instructions[instructions.len() / 2], instructions[instructions.len() - 1]);
             println!(
-                "{name:<12} {:>6} ticks, median {median:>4}, longest {longest:>4} instructions",
+                "| {what}, {name} | {} ticks, median {median}, longest {longest} instructions |",
                 instructions.len()
             );
         }
@@ -115,9 +115,9 @@ fn heaviest() -> Config {
 #[test]
 fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::of(Config::default());
-    let longest = profile.longest();
+    let longest = profile.longest("default");
     let (used, size) = profile.board.stack_use().expect("the image says where its stack is");
-    println!("stack: {used} of {size} bytes");
+    println!("| stack | {used} of {size} bytes |");
     println!("tick_instructions_longest={longest}");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
     assert!(2 * used <= size, "less than half of the stack is left: {used} of {size} bytes");
@@ -125,7 +125,6 @@ fn a_tick_takes_at_most_840_instructions() {
 
 #[test]
 fn a_tick_of_the_heaviest_configuration_takes_at_most_seven_per_cent_of_its_period() {
-    let longest = Profile::of(heaviest()).longest();
-    println!("the heaviest configuration: {longest} instructions");
+    let longest = Profile::of(heaviest()).longest("heaviest");
     assert!(longest <= 7 * CYCLES_PER_TICK / 100, "a tick of {longest} instructions");
 }

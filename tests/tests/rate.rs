@@ -90,6 +90,13 @@ fn a_minute_of_flood_costs_no_tick_no_sample_and_no_time() {
         commands,
         pc.heard.acks.len(),
     );
+    println!(
+        "| a minute of flood | {} ticks, {} samples, {} lost |",
+        log.encoder.len(),
+        samples,
+        counts.lost_samples
+    );
+    println!("| tick to DAC at its pin | {} to {} ns |", put_out.0, put_out.1);
     println!("tick_to_dac_spread_us={}", (put_out.1 - put_out.0) as f64 / 1e3);
     assert!(put_out.1 - put_out.0 <= 1_000, "tick to DAC spreads over {put_out:?} ns");
     let (overruns, excess) = board.at_stop(|stopped| stopped.usb().core.misuse());

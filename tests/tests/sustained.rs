@@ -106,14 +106,17 @@ fn hottest(torques: &[f64]) -> f64 {
 fn torque_falls_before_the_continuous_one_is_exceeded_and_the_limit_is_told() {
     let (torques, told) = hold_strong(CONTINUOUS_MNM);
     let (peak, last) = (torques.iter().fold(0.0_f64, |a, b| a.max(*b)), torques[torques.len() - 1]);
-    println!("peak {peak:.1}, in the end {last:.1}, over the time constant {:.2} mN·m", hottest(&torques));
+    println!(
+        "| sustained torque | peak {peak:.1}, in the end {last:.1}, over the time constant {:.2} mN·m |",
+        hottest(&torques)
+    );
     assert!(peak > 1.4 * CONTINUOUS_MNM, "more than the continuous torque is there for a while");
     assert!(hottest(&torques) <= 1.001 * CONTINUOUS_MNM, "{} mN·m", hottest(&torques));
     assert!((last - CONTINUOUS_MNM).abs() < 0.5, "{last} mN·m in the end");
     assert!(told, "the limit is told");
 
     let (torques, told) = hold_strong(60.0);
-    println!("without the limit {:.2} mN·m over the time constant", hottest(&torques));
+    println!("| sustained torque without the limit | {:.2} mN·m |", hottest(&torques));
     assert!(hottest(&torques) > 1.3 * CONTINUOUS_MNM && !told, "without the limit it gets too hot");
 }
 
@@ -184,9 +187,7 @@ fn ringing(config: Config) -> (f64, Option<u64>) {
 fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
     let (quiet, told) = ringing(stiff_wall());
     let (loud, never) = ringing(Config { passivity_damping: Damping::default(), ..stiff_wall() });
-    println!(
-        "deviation without the observer {loud:.1} µm, with it {quiet:.1} µm; first told in tick {told:?}"
-    );
+    println!("| ringing wall | {loud:.1} µm, with the observer {quiet:.1} µm |");
     assert!(loud > 50.0, "it should ring without the observer: {loud} µm");
     assert!(quiet < 8.0, "it should be quiet with the observer: {quiet} µm, one count is 15.7 µm");
     assert!(told.is_some() && never.is_none(), "the observer is a limit in force: {told:?}, {never:?}");

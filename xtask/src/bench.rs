@@ -1,6 +1,7 @@
 //! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one table. A program gives a
 //! row by printing `name=value`, with a name of [`crate::rows`], or as JSON, `"row": "name", … "value": …`; a peer beside it
 //! by `name.peer=who name.peer_value=…`. A row that nothing measures is left out: no number here was written by hand.
+//! Lines that a test of the emulated board begins with a bar are printed below the table as they are.
 
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
@@ -28,6 +29,9 @@ const ANY_RUST: &str = "--ignore-rust-version";
 /// A minute of the device, as fast as it goes.
 const STREAM_SECONDS: &str = "60";
 
+/// What a line of the board's own table begins with.
+const BOARD_LINE: &str = "| ";
+
 /// What was measured, by name.
 type Values = BTreeMap<String, String>;
 
@@ -49,9 +53,10 @@ pub(crate) fn run() -> Result<(), Failure> {
     }
     measure("stream", stream());
     measure("diagnosis", diagnosis());
+    let mut board_lines = vec![];
     for name in test::test_programs()? {
         if measures(&name) {
-            measure(&name, test_program(&name));
+            measure(&name, test_program(&name, &mut board_lines));
         }
     }
     let rows: Vec<(Row, f64, Option<Peer>)> = ROWS
@@ -59,6 +64,8 @@ pub(crate) fn run() -> Result<(), Failure> {
         .filter_map(|row| Some((row, values.get(row.name)?.parse().ok()?, peer(&values, row.name))))
         .collect();
     print(&rows);
+    println!("\nThe flash image on the emulated board:");
+    board_lines.iter().for_each(|line| println!("{line}"));
     let path = shell::target().join("bench.json");
     fs::write(&path, json(&commit(), &rows))
         .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
@@ -66,14 +73,20 @@ pub(crate) fn run() -> Result<(), Failure> {
     if troubles.is_empty() { Ok(()) } else { Err(Failure::new(troubles.join("; "))) }
 }
 
-/// Tests that print rows: their text names one, as a word or in JSON.
+/// Tests that print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
 fn measures(name: &str) -> bool {
     let path = shell::top().join("tests/tests").join(name).with_extension("rs");
     fs::read_to_string(path).is_ok_and(|text| {
-        ROWS.iter().any(|row| {
-            text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
-        })
+        text.contains(&format!("\"{BOARD_LINE}"))
+            || ROWS.iter().any(|row| {
+                text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
+            })
     })
+}
+
+/// The lines of the board's own table; whatever the test runner wrote before a line is not part of it.
+fn board_lines_in(text: &str) -> impl Iterator<Item = String> {
+    text.lines().filter_map(|line| Some(line.get(line.find(BOARD_LINE)?..)?.to_string()))
 }
 
 /// `name=value` among the words of `text`, and rows in JSON, where the table knows the name.
@@ -105,7 +118,7 @@ fn example(package: &str, name: &str) -> Result<Values, Failure> {
     shell::output(&mut run).map(|text| values_in(&text))
 }
 
-fn test_program(name: &str) -> Result<Values, Failure> {
+fn test_program(name: &str, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
     let mut run = cargo();
     run.env("FIRMWARE_ELF", firmware::path());
     run.args(["test", "--release", "--quiet", ANY_RUST, "-p", "tests", "--test", name, "--", "--nocapture"]);
@@ -114,7 +127,9 @@ fn test_program(name: &str) -> Result<Values, Failure> {
         .stderr(Stdio::inherit())
         .output()
         .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
-    Ok(values_in(&String::from_utf8_lossy(&output.stdout)))
+    let text = String::from_utf8_lossy(&output.stdout);
+    board_lines.extend(board_lines_in(&text));
+    Ok(values_in(&text))
 }
 
 /// Time of the main crate's build from nothing, in a folder of its own.
@@ -319,6 +334,12 @@ mod tests {
             values,
             Values::from([("page_mb", "0.25"), ("build_s", "61")].map(|(n, v)| (n.into(), v.into())))
         );
+    }
+
+    #[test]
+    fn the_lines_of_the_board_are_found_behind_the_runners_dots() {
+        let lines: Vec<String> = board_lines_in("..| jump | 0.1 ms |\nnothing\n| stack | 1 of 2 |").collect();
+        assert_eq!(lines, ["| jump | 0.1 ms |", "| stack | 1 of 2 |"]);
     }
 
     #[test]
