@@ -112,6 +112,7 @@ mod tests {
         Twelve(u16),
         Eight(u8),
         Enable(bool),
+        Hurry,
     }
 
     struct Twelve<'a>(&'a RefCell<Vec<Write>>);
@@ -119,6 +120,10 @@ mod tests {
         const WIDTH: DacWidth = DacWidth::Bits12;
         fn put(&mut self, code: DacCode) {
             self.0.borrow_mut().push(Write::Twelve(code.0));
+        }
+
+        fn hurry(&mut self) {
+            self.0.borrow_mut().push(Write::Hurry);
         }
     }
 
@@ -168,6 +173,15 @@ mod tests {
         drive.apply(DacWidth::Bits12, &output(false, 2060));
         assert_eq!(writes.take(), off);
         assert!(!drive.is_enabled());
+    }
+
+    #[test]
+    fn a_late_code_is_hurried_out_by_the_converter_that_waits() {
+        let writes = RefCell::new(vec![]);
+        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
+        writes.take();
+        drive.hurry();
+        assert_eq!(writes.take(), [Write::Hurry]);
     }
 
     #[test]
