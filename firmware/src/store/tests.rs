@@ -198,3 +198,19 @@ fn a_damaged_configuration_is_replaced_by_the_next_one() {
     assert_eq!(store.save(&config(40)), Ok(()));
     assert_eq!(load(&mut flash), Stored::Config(config(40)));
 }
+
+/// What is in a device's flash must still be read by the next firmware: the layout is a promise.
+#[test]
+fn a_cell_is_laid_out_as_it_always_was() {
+    assert_eq!(PAYLOAD_BYTES, 1024 - 4 * (HEADER_WORDS + 1), "all but header and the word that commits it");
+    let mut flash = Flash::new();
+    let (mut store, _) = Store::open(&mut flash);
+    let config = Config::default();
+    store.save(&config).unwrap();
+    let mut bytes = [0; PAYLOAD_BYTES];
+    let length = postcard::to_slice(&config, &mut bytes).unwrap().len();
+    let words = &flash.words[Slot::A as usize];
+    assert_eq!(words[0], 0xC0F1_1000 + length as u32);
+    assert_eq!((words[1], words[255]), (0, COMMITTED));
+    assert_eq!(words[3].to_le_bytes(), bytes[..4]);
+}
