@@ -5,7 +5,7 @@ use control_core::units::Millimetres;
 use std::vec;
 use std::vec::Vec;
 
-const CELLS: usize = 4;
+const CELLS: usize = 5;
 const SLOT_WORDS: usize = CELLS * CELL_WORDS;
 
 /// Flash that loses its power after a number of operations, in the middle of the next one.
@@ -213,4 +213,45 @@ fn a_cell_is_laid_out_as_it_always_was() {
     assert_eq!(words[0], 0xC0F1_1000 + length as u32);
     assert_eq!((words[1], words[255]), (0, COMMITTED));
     assert_eq!(words[3].to_le_bytes(), bytes[..4]);
+}
+
+/// A cell of slot A of one flash and one of another, as the two slots of a third.
+fn composed(a: &Flash, b: &Flash) -> Flash {
+    let mut flash = Flash::new();
+    flash.words = [a.words[0].clone(), b.words[0].clone()];
+    flash
+}
+
+#[test]
+fn of_two_slots_the_one_with_the_later_number_counts() {
+    let (earlier, later) = (saved([20]), saved([20, 30]));
+    assert_eq!(load(&mut composed(&earlier, &later)), Stored::Config(config(30)));
+    assert_eq!(load(&mut composed(&later, &earlier)), Stored::Config(config(30)));
+    assert_eq!(load(&mut composed(&Flash::new(), &later)), Stored::Config(config(30)));
+}
+
+#[test]
+fn damage_is_told_whichever_slot_has_it() {
+    let mut damaged = saved([20]);
+    damaged.words[0][5] ^= 4;
+    let blank = Flash::new();
+    assert_eq!(load(&mut composed(&damaged, &blank)), Stored::Damaged);
+    assert_eq!(load(&mut composed(&blank, &damaged)), Stored::Damaged);
+    assert_eq!(load(&mut composed(&damaged, &damaged)), Stored::Damaged);
+    assert_eq!(load(&mut composed(&damaged, &saved([30]))), Stored::Config(config(30)));
+}
+
+/// Two blank cells are kept in reserve, no more: erasing wears flash out.
+#[test]
+fn a_start_that_finds_room_leaves_flash_alone() {
+    for fill in 0..=CELLS - RESERVE_CELLS {
+        let mut flash = saved(10..10 + fill as i16);
+        flash.operations_left = 1_000;
+        load(&mut flash);
+        assert_eq!(flash.operations_left, 1_000, "{fill} cells used");
+    }
+    let mut flash = saved(10..11 + (CELLS - RESERVE_CELLS) as i16);
+    flash.operations_left = 1_000;
+    load(&mut flash);
+    assert!(flash.operations_left < 1_000, "it moves over");
 }
