@@ -155,6 +155,11 @@ mod tests {
     }
 
     #[test]
+    fn each_task_may_be_silent_for_its_own_time() {
+        assert_eq!(Task::ALL.map(Task::allowance_ms), [2, 5, 5, 11]);
+    }
+
+    #[test]
     fn every_fault_arrives_as_itself() {
         for fault in FAULTS {
             let trips = Trips::new();

@@ -249,6 +249,18 @@ mod tests {
     }
 
     #[test]
+    fn half_a_g_to_one_and_a_half_is_plausible_whichever_way_it_points() {
+        for axis in 0..3 {
+            for (mg, plausible) in [(499, false), (500, true), (1_500, true), (1_501, false)] {
+                let along = |other: i32| if other == axis { -mg } else { 0 };
+                let acceleration = Acceleration { x_mg: along(0), y_mg: along(1), z_mg: along(2) };
+                assert_eq!(is_plausible(acceleration), plausible, "{acceleration:?}");
+            }
+        }
+        assert!(is_plausible(Acceleration { x_mg: 300, y_mg: 300, z_mg: 300 }), "together 520 mg");
+    }
+
+    #[test]
     fn no_new_data_is_no_measurement() {
         let mut sensor = Sensor::lis302dl(0, 0, 55);
         sensor.registers[0x27] = 0;
