@@ -178,6 +178,8 @@ fn residuals(
 
 /// Part of the force below which what hangs together over time casts no doubt.
 const LEFT_MATTERS: f64 = 0.025;
+/// What is left over what is explained at which a name is half as sure.
+const DOUBTED: f64 = 1.2;
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
@@ -253,7 +255,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = if explained > 0.0 { left / explained } else { 0.0 };
     let matters = left.sqrt() > LEFT_MATTERS * table.force_rms.fit;
-    let doubt = if matters { 1.0 / (1.0 + (leftover / 0.6).powi(2)) } else { 1.0 };
+    let doubt = if matters { 1.0 / (1.0 + (leftover / DOUBTED).powi(2)) } else { 1.0 };
     // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
     let halves = table.patched.holdout < 0.65 * table.refit.holdout;

@@ -133,7 +133,7 @@ impl Nominal {
                 (-0.9 * dry, 3.0 * dry)
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
-            EffectName::TorqueRipple => (-0.3 * gain.abs(), 0.3 * gain.abs()),
+            EffectName::TorqueRipple => (-0.45 * gain.abs(), 0.45 * gain.abs()),
             EffectName::Backlash | EffectName::RollerSlip => {
                 ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
             }

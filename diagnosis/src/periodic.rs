@@ -13,6 +13,8 @@ use std::f64::consts::TAU;
 /// Highest order of a turn that is looked for, and how many orders one effect may have.
 const HIGHEST: usize = 100;
 const MOST: usize = 14;
+/// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
+const FEWEST: usize = 6;
 /// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
 const PER_ORDER: f64 = 8.0;
 
@@ -28,7 +30,7 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     let most = (travel / shortest).min(160.0);
     // One over the travel is the reference; cycles over the travel play the part of orders.
     let count = (most * 2.0) as usize;
-    (count >= 8).then(|| (travel, (4..=count).map(|i| 0.5 * i as f64).collect()))
+    (count >= 8).then(|| (travel, (FEWEST..=count).map(|i| 0.5 * i as f64).collect()))
 }
 
 fn wave_inputs(track: &Track, wave: f64, drive: Option<&Input>) -> [Input; 2] {
