@@ -466,5 +466,6 @@ fn relative_gain(
         }
     }
     let gain = judge::bootstrap(&gains);
-    if whole > 0.0 { [gain.low / whole, gain.high / whole] } else { [0.0, 0.0] }
+    // Nothing can take more than there is; some resamplings of few segments would.
+    if whole > 0.0 { [gain.low, gain.high].map(|x| (x / whole).min(1.0)) } else { [0.0, 0.0] }
 }

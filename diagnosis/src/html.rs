@@ -95,7 +95,7 @@ fn one(out: &mut String, effect: &Named) {
     );
     if !effect.parameters.is_empty() {
         out.push_str(
-            "<div class=scroll><table><tr><th>value</th><th></th><th>95 % interval</th><th>unit</th></tr>",
+            "<div class=scroll><table><tr><th></th><th class=n>value</th><th class=n>95 % interval</th><th>unit</th></tr>",
         );
         for (name, p) in &effect.parameters {
             let _ = write!(
@@ -131,8 +131,9 @@ fn one(out: &mut String, effect: &Named) {
 
 const WIDE: f64 = 900.0;
 const HIGH: f64 = 190.0;
-const LEFT: f64 = 64.0;
-const BOTTOM: f64 = 24.0;
+const LEFT: f64 = 92.0;
+const TOP: f64 = 16.0;
+const BOTTOM: f64 = 32.0;
 
 /// A frame with its scales; returns the mapping of values to places.
 fn frame(
@@ -142,7 +143,7 @@ fn frame(
     x_label: &str,
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
-    let _ = write!(out, "<svg viewBox=\"0 0 {WIDE} {}\" role=img>", HIGH + BOTTOM);
+    let _ = write!(out, "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img>", TOP + HIGH + BOTTOM);
     let at = move |a: f64, b: f64| {
         let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - 6.0);
         let py = 6.0 + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 12.0);
@@ -163,7 +164,7 @@ fn frame(
         let value = x.0 + (x.1 - x.0) * f64::from(i) / 5.0;
         let (px, _) = at(value, y.0);
         let anchor = if i == 5 { "end" } else { "middle" };
-        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{}</text>", HIGH + 14.0, short(value));
+        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{}</text>", HIGH + 24.0, short(value));
     }
     let _ = write!(out, "<title>{} over {}</title>", safe(y_label), safe(x_label));
     at
@@ -293,7 +294,7 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
         return;
     }
     out.push_str(
-        "<section><h2>What was considered</h2><div class=scroll><table><tr><th>hypothesis</th><th>held-out gain</th><th>outcome</th></tr>",
+        "<section><h2>What was considered</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
     );
     let mut sorted: Vec<_> = r.hypotheses.iter().collect();
     sorted.sort_by(|a, b| b.holdout_gain.total_cmp(&a.holdout_gain));
