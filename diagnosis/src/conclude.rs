@@ -148,14 +148,7 @@ fn residuals(
             total(track, &columns, &theta)
         })
         .collect();
-    let drive: Vec<Total> = tracks
-        .iter()
-        .map(|track| {
-            let mut total = Total::zero(track.blocks());
-            track.rows_input(&track.command).add_to(&mut total, track, nominal.gain());
-            total
-        })
-        .collect();
+    let drive: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
     let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
     let lay = |c: &Candidate| -> Vec<Total> {
         if held {

@@ -132,14 +132,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit
     let scale = command_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    let totals: Vec<Total> = tracks
-        .iter()
-        .map(|track| {
-            let mut total = Total::zero(track.blocks());
-            track.rows_input(&track.command).add_to(&mut total, track, nominal.gain());
-            total
-        })
-        .collect();
+    let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
     noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
     resmooth(tracks, &totals, &noise, count);
     let model = Model::default();

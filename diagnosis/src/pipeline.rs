@@ -100,14 +100,7 @@ pub(crate) fn lay_all(c: &Candidate, nominal: &Nominal, tracks: &[Track], noise:
 fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], scale: f64) {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
-    let drives: Vec<Total> = tracks
-        .iter()
-        .map(|track| {
-            let mut total = Total::zero(track.blocks());
-            track.rows_input(&track.command).add_to(&mut total, track, nominal.gain());
-            total
-        })
-        .collect();
+    let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
     null::resmooth(tracks, &drives, &crate::noise::guess(tracks, scale), count);
     for _ in 0..3 {
         let totals: Vec<Total> = tracks

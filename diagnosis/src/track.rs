@@ -264,4 +264,11 @@ impl Total {
     pub(crate) fn zero(n: usize) -> Self {
         Self { dv: vec![0.0; n], dq: vec![0.0; n], dz: vec![0.0; n] }
     }
+
+    /// What the command alone does, with `gain` the acceleration per unit of it.
+    pub(crate) fn of_command(track: &Track, gain: f64) -> Self {
+        let mut total = Self::zero(track.blocks());
+        track.rows_input(&track.command).add_to(&mut total, track, gain);
+        total
+    }
 }
