@@ -73,6 +73,8 @@ pub(crate) fn rivals(bench: &Bench, last: &Candidate, slow: &Candidate, held: &[
             .into_iter()
             .take(RIVALS)
             .collect();
+        // Needed only where a rival comes near, and the same for all of them.
+        let mut without = None;
         for (effect, _) in others {
             let mut model = base.model.clone();
             model.effects.push(effect.clone());
@@ -97,7 +99,8 @@ pub(crate) fn rivals(bench: &Bench, last: &Candidate, slow: &Candidate, held: &[
                 let mut model = base.model.clone();
                 model.effects.push(effect.clone());
                 let theirs = bench.fit_slow(model, &[&slow.noise]).merit;
-                let without = bench.fit_slow(base.model.clone(), &[&slow.noise]).merit;
+                let without =
+                    *without.get_or_insert_with(|| bench.fit_slow(base.model.clone(), &[&slow.noise]).merit);
                 let behind = slow.merit - theirs;
                 if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
                     rival.z = BEHIND_SLOW_Z;
@@ -171,6 +174,11 @@ fn residuals(
 
 /// Part of the force below which what hangs together over time casts no doubt.
 const LEFT_MATTERS: f64 = 0.025;
+/// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
+/// two it must leave less than this part of what the refit left.
+const LITTLE_FORCE: f64 = 0.12;
+const MUCH_FORCE: f64 = 0.5;
+const MUCH_OF_REFIT: f64 = 0.65;
 /// What is left over what is explained at which a name is half as sure.
 const DOUBTED: f64 = 1.2;
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
@@ -251,8 +259,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let doubt = if matters { 1.0 / (1.0 + (leftover / DOUBTED).powi(2)) } else { 1.0 };
     // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
-    let halves = table.patched.holdout < 0.65 * table.refit.holdout;
-    let understood = part_of_force < 0.12 || (halves && part_of_force < 0.5);
+    let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
+    let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
