@@ -4,7 +4,7 @@ use crate::TICK_HZ;
 use crate::config::SpeedMethod;
 use crate::math::{product, saturate};
 use crate::units::{Counts, Millimetres, MillimetresPerSecond};
-use fixed::types::{I2F30, I8F24, I14F18, I16F16};
+use fixed::types::{I2F30, I8F24, I16F16, U14F18};
 
 /// Length of the speed window: 12.8 ms, so that one count is 1.2 mm/s at a 10 mm roller.
 pub const WINDOW_TICKS: u32 = 128;
@@ -22,7 +22,7 @@ pub(crate) struct Scale {
     /// Speed of one count in a window: below 48 mm/s.
     window_speed_per_count: I8F24,
     /// Speed of one count in a tick: below 6,200 mm/s.
-    tick_speed_per_count: I14F18,
+    tick_speed_per_count: U14F18,
 }
 
 impl Scale {
@@ -33,7 +33,7 @@ impl Scale {
         Self {
             mm_per_count,
             window_speed_per_count: I8F24::from_bits(saturate(per_window_q30 >> 6)),
-            tick_speed_per_count: I14F18::from_bits(saturate(per_tick_q30 >> 12)),
+            tick_speed_per_count: U14F18::from_bits(u32::try_from(per_tick_q30 >> 12).unwrap_or(u32::MAX)),
         }
     }
 
@@ -49,8 +49,7 @@ impl Scale {
 
     /// Speed of `counts` in `ticks`.
     fn speed(&self, counts: i32, ticks: u32) -> MillimetresPerSecond {
-        let in_a_tick_q18 =
-            u64::from(counts.unsigned_abs()) * u64::from(self.tick_speed_per_count.to_bits().unsigned_abs());
+        let in_a_tick_q18 = u64::from(counts.unsigned_abs()) * u64::from(self.tick_speed_per_count.to_bits());
         let magnitude = quotient(in_a_tick_q18 >> 2, ticks);
         MillimetresPerSecond(I16F16::from_bits(if counts < 0 { -magnitude } else { magnitude }))
     }
@@ -59,9 +58,11 @@ impl Scale {
 /// `dividend / divisor` to 20 bits or more for a divisor below 2^11, saturating: the board divides 32 bits in one
 /// instruction and 64 in a hundred.
 fn quotient(dividend: u64, divisor: u32) -> i32 {
-    let excess = 32 - ((dividend >> 32) as u32).leading_zeros();
-    let quotient = (dividend >> excess) as u32 / divisor.max(1);
-    i32::try_from(u64::from(quotient) << excess).unwrap_or(i32::MAX)
+    let (high, low) = ((dividend >> 32) as u32, dividend as u32);
+    let excess = 32 - high.leading_zeros();
+    let leading = high.unbounded_shl(32 - excess) | low.unbounded_shr(excess);
+    let quotient = leading / divisor.max(1);
+    if quotient.leading_zeros() > excess { (quotient << excess).cast_signed() } else { i32::MAX }
 }
 
 /// Speed from counts. Memory for either method; a tick costs the same however fast the needle is.
@@ -69,11 +70,17 @@ fn quotient(dividend: u64, divisor: u32) -> i32 {
 pub(crate) struct SpeedEstimator {
     method: SpeedMethod,
     window: [i32; WINDOW_TICKS as usize],
+    /// A ring: the edge with number n is at n modulo [`EDGES`].
     edges: [Edge; EDGES],
     latest: Edge,
-    /// Where the span that ends at `latest` begins.
-    first: Edge,
+    /// Ticks and counts from where the window begins to `latest`.
+    span: Edge,
+    /// When the latest of them was stored.
+    stored_tick: u32,
+    /// Number of the next edge that is stored.
     next_edge: usize,
+    /// Number of the oldest stored edge within the window, else of the last one before it.
+    oldest_edge: usize,
     now: u32,
 }
 
@@ -91,8 +98,10 @@ impl SpeedEstimator {
             window: [count.0; WINDOW_TICKS as usize],
             edges: [edge; EDGES],
             latest: edge,
-            first: edge,
-            next_edge: 0,
+            span: Edge { tick: 0, count: 0 },
+            stored_tick: 0,
+            next_edge: 1,
+            oldest_edge: 0,
             now: 0,
         }
     }
@@ -115,40 +124,53 @@ impl SpeedEstimator {
     }
 
     fn between_edges(&mut self, scale: &Scale, count: i32) -> MillimetresPerSecond {
+        self.forget_edge();
         if count != self.latest.count {
             self.latest = Edge { tick: self.now, count };
-            let stored = self.edges.get((self.next_edge + EDGES - 1) % EDGES).map_or(0, |e| e.tick);
-            if self.now.wrapping_sub(stored) >= EDGE_SPACING_TICKS
-                && let Some(slot) = self.edges.get_mut(self.next_edge)
-            {
-                *slot = self.latest;
-                self.next_edge = (self.next_edge + 1) % EDGES;
+            if self.now.wrapping_sub(self.stored_tick) >= EDGE_SPACING_TICKS {
+                self.store_edge();
             }
-            self.first = self.oldest_in_window();
+            let oldest = self.edge(self.oldest_edge);
+            let ticks = self.now.wrapping_sub(oldest.tick);
+            let is_recent = ticks <= REST_TICKS;
+            self.span = if is_recent {
+                Edge { tick: ticks, count: count.wrapping_sub(oldest.count) }
+            } else {
+                Edge { tick: 0, count: 0 }
+            };
         }
         let silent = self.now.wrapping_sub(self.latest.tick);
         if silent > REST_TICKS {
             return MillimetresPerSecond::default();
         }
-        let first = self.first;
-        let span = self.latest.tick.wrapping_sub(first.tick);
         // Waiting for the next edge bounds the speed from above: it cannot have been less than `silent` away.
-        scale.speed(self.latest.count.wrapping_sub(first.count), span.max(silent).max(1))
+        scale.speed(self.span.count, self.span.tick.max(silent))
     }
 
-    /// The oldest stored edge within the window before the latest one, else the last one before it.
-    fn oldest_in_window(&self) -> Edge {
-        let mut before = self.latest;
-        // The slot that is overwritten next holds the oldest.
-        for slot in 0..EDGES {
-            let Some(&edge) = self.edges.get((self.next_edge + slot) % EDGES) else { break };
-            match self.latest.tick.wrapping_sub(edge.tick) {
-                1..=WINDOW_TICKS => return edge,
-                age if age > WINDOW_TICKS && age <= REST_TICKS => before = edge,
-                _ => {}
-            }
+    fn edge(&self, number: usize) -> Edge {
+        self.edges.get(number % EDGES).copied().unwrap_or(self.latest)
+    }
+
+    /// Stores the latest edge; the ring may lose its oldest.
+    fn store_edge(&mut self) {
+        if let Some(slot) = self.edges.get_mut(self.next_edge % EDGES) {
+            *slot = self.latest;
         }
-        before
+        self.stored_tick = self.now;
+        self.next_edge = self.next_edge.wrapping_add(1);
+        if self.next_edge.wrapping_sub(self.oldest_edge) > EDGES {
+            self.oldest_edge = self.oldest_edge.wrapping_add(1);
+        }
+    }
+
+    /// Lets go of the oldest edge once it has left the window; never of the last one. Stored edges are more than a tick
+    /// apart: one a tick is enough.
+    fn forget_edge(&mut self) {
+        let age = self.now.wrapping_sub(self.edge(self.oldest_edge).tick);
+        let next = self.oldest_edge.wrapping_add(1);
+        if age > WINDOW_TICKS && next != self.next_edge {
+            self.oldest_edge = next;
+        }
     }
 }
 
@@ -172,4 +194,58 @@ pub(crate) fn mm_per_count(roller_radius: Millimetres, counts_per_turn: u16) -> 
     let circumference_q45 = TWO_PI_Q29 * i64::from(roller_radius.0.to_bits());
     let bits = (circumference_q45 / i64::from(counts_per_turn.max(1))) >> 15;
     I2F30::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use heapless::Vec;
+
+    #[test]
+    fn a_quotient_is_precise_to_twenty_bits_and_the_nearest_there_is() {
+        let dividends = (0..44).flat_map(|shift| [1_u64 << shift, (3 << shift) + 1, (1 << (shift + 1)) - 1]);
+        for (dividend, divisor) in dividends.flat_map(|dividend| [1, 2, 3, 999, 1_000].map(|n| (dividend, n)))
+        {
+            let exact = (dividend / u64::from(divisor)).min(i32::MAX as u64) as f64;
+            let got = f64::from(quotient(dividend, divisor));
+            assert!(
+                got <= exact && exact - got <= exact / f64::from(1 << 20),
+                "{dividend} / {divisor} = {got}"
+            );
+        }
+        assert_eq!(quotient(7, 0), 7, "no divisor counts as one");
+        assert_eq!(quotient(u64::MAX, 1), i32::MAX);
+    }
+
+    /// Speed from edges, tick by tick, of a needle at `counts`.
+    fn speeds(counts: impl IntoIterator<Item = i32>) -> impl Iterator<Item = f64> {
+        let scale = Scale::new(I2F30::ONE / 64);
+        let mut estimator = SpeedEstimator::new(SpeedMethod::EdgeTiming, Counts(0));
+        counts.into_iter().map(move |count| estimator.tick(&scale, Counts(count)).0.to_num())
+    }
+
+    #[test]
+    fn edges_that_have_left_the_window_do_not_count() {
+        // A count every 4 ticks is 39.06 mm/s, then one every 100 ticks; the window holds 128.
+        let fast = (1..=400).map(|tick| tick / 4);
+        let slow = (1..=1_000).map(|tick| 100 + tick / 100);
+        let speeds: Vec<f64, 1_400> = speeds(fast.chain(slow)).collect();
+        let near = |tick: usize, wanted: f64| {
+            let got = speeds.get(tick).copied().unwrap_or_default();
+            assert!((got - wanted).abs() < 0.01 * wanted, "{got} mm/s in tick {tick}, not {wanted}");
+        };
+        near(399, 156.25 / 4.0);
+        near(1_399, 156.25 / 100.0);
+        near(899, 156.25 / 100.0);
+    }
+
+    #[test]
+    fn after_a_rest_speed_begins_anew() {
+        let rest = core::iter::repeat_n(10, 1_200);
+        let speeds: Vec<f64, 2_000> = speeds((1..=10).chain(rest).chain(11..=40)).collect();
+        assert_eq!(speeds.get(1_209), Some(&0.0), "at rest");
+        assert_eq!(speeds.get(1_210), Some(&0.0), "one edge alone says nothing");
+        let speed = speeds.get(1_230).copied().unwrap_or_default();
+        assert!((speed - 156.25).abs() < 1.0, "{speed} mm/s, a count a tick");
+    }
 }
