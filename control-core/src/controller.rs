@@ -4,7 +4,7 @@
 use crate::event::{Fault, Limits, State, Transitions};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
-use crate::math::{multiply, times};
+use crate::math::scaled;
 use crate::passivity::Observer;
 use crate::plan::Plan;
 use crate::safety::Limiter;
@@ -89,6 +89,8 @@ pub enum Order {
 pub struct Controller {
     plan: Plan,
     mode: Mode,
+    /// What plays while exciting.
+    player: Option<Player>,
     origin: Counts,
     previous: Option<Counts>,
     speed: SpeedEstimator,
@@ -101,17 +103,18 @@ pub struct Controller {
     tripped: Option<Fault>,
 }
 
-#[derive(Clone, Debug)]
+/// Those with power last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Mode {
     Idle,
-    Running,
-    Exciting(Player),
     Faulted,
+    Running,
+    Exciting,
 }
 
 impl Mode {
-    fn is_powered(&self) -> bool {
-        matches!(self, Mode::Running | Mode::Exciting(_))
+    fn is_powered(self) -> bool {
+        self >= Mode::Running
     }
 }
 
@@ -122,6 +125,7 @@ impl Controller {
             speed: SpeedEstimator::new(plan.config.speed, Counts(0)),
             plan,
             mode: Mode::Idle,
+            player: None,
             origin: Counts(0),
             previous: None,
             tissue: Tissue::default(),
@@ -145,7 +149,8 @@ impl Controller {
             Order::Start if !self.mode.is_powered() => self.power_up(Mode::Running),
             Order::Excite(excitation) if !self.mode.is_powered() => {
                 let depth = self.plan.scale.depth(self.latest_count());
-                self.power_up(Mode::Exciting(Player::new(&excitation, depth)));
+                self.player = Some(Player::new(&excitation, depth));
+                self.power_up(Mode::Exciting);
             }
             Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
             Order::Zero if !self.mode.is_powered() => {
@@ -153,7 +158,7 @@ impl Controller {
                 self.tissue = Tissue::default();
                 self.speed = SpeedEstimator::new(self.plan.config.speed, Counts(0));
             }
-            Order::Heartbeat => self.silent_ticks = 0,
+            Order::Heartbeat => self.heartbeat(),
             Order::Configure(plan) if !self.mode.is_powered() => {
                 self.speed = SpeedEstimator::new(plan.config.speed, self.latest_count());
                 self.tissue = Tissue::default();
@@ -162,6 +167,11 @@ impl Controller {
             Order::Trip(fault) => self.trip(fault),
             Order::Start | Order::Stop | Order::Zero | Order::Configure(_) | Order::Excite(_) => {}
         }
+    }
+
+    /// [`Order::Heartbeat`], the one that comes while the needle moves.
+    pub fn heartbeat(&mut self) {
+        self.silent_ticks = 0;
     }
 
     fn power_up(&mut self, mode: Mode) {
@@ -187,7 +197,7 @@ impl Controller {
         let dac = self.plan.dac.code(torque);
         let state = match self.mode {
             Mode::Running => tissue.state,
-            Mode::Exciting(_) => State::Excitation,
+            Mode::Exciting => State::Excitation,
             Mode::Idle => State::Idle,
             Mode::Faulted => State::Fault,
         };
@@ -214,9 +224,12 @@ impl Controller {
         let step = self.previous.map_or(0, |previous| moved(previous, absolute).0);
         self.previous = Some(absolute);
         let count = moved(self.origin, absolute);
-        let is_beyond = match &self.mode {
-            Mode::Running => count.0.unsigned_abs() > self.plan.travel_counts.unsigned_abs(),
-            Mode::Exciting(player) => player.is_beyond(self.plan.scale.depth(count)),
+        let is_beyond = match self.mode {
+            Mode::Running => count.0.unsigned_abs() > self.plan.travel_counts,
+            Mode::Exciting => {
+                let depth = self.plan.scale.depth(count);
+                self.player.as_ref().is_some_and(|player| player.is_beyond(depth))
+            }
             Mode::Idle | Mode::Faulted => return count,
         };
         if step.unsigned_abs() > u32::from(self.plan.config.limits.max_counts_per_tick) {
@@ -231,8 +244,8 @@ impl Controller {
 
     /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead.
     fn is_frozen(&mut self, step: i32) -> bool {
-        let pushes = self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
-        self.frozen_ticks = if pushes && step == 0 { self.frozen_ticks.saturating_add(1) } else { 0 };
+        let is_frozen = step == 0 && self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
+        self.frozen_ticks = if is_frozen { self.frozen_ticks.saturating_add(1) } else { 0 };
         self.frozen_ticks > FROZEN_TICKS
     }
 
@@ -261,16 +274,18 @@ impl Controller {
         speed: MillimetresPerSecond,
     ) -> Option<(MillinewtonMetres, Limits)> {
         let radius = self.plan.config.device.roller_radius;
-        match &mut self.mode {
+        match self.mode {
             Mode::Running => {
-                let resisting = Newtons(force.0.saturating_add(times(speed.0, self.plan.damping)));
+                let damping = scaled(speed.0.to_bits(), self.plan.damping.to_bits(), 30);
+                let resisting = Newtons(force.0.saturating_add(I16F16::from_bits(damping)));
                 let (given, damped) = self.observer.tick(self.plan.bounce_damping, depth, resisting);
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
-                let torque = I16F16::ZERO.saturating_sub(multiply(given.0, radius.0));
+                // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
+                let torque = I16F16::from_bits(-scaled(given.0.to_bits(), radius.0.to_bits(), 16));
                 Some((MillinewtonMetres(torque), limits))
             }
-            Mode::Exciting(player) => {
-                let torque = player.tick(radius, depth, speed);
+            Mode::Exciting => {
+                let torque = self.player.as_mut().and_then(|player| player.tick(radius, depth, speed));
                 if torque.is_none() {
                     self.mode = Mode::Idle;
                 }
@@ -283,7 +298,7 @@ impl Controller {
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
         let most = self.plan.torque_limits.torque;
         let allowed = self.winding.largest(&self.plan.thermal, most);
-        let held = wanted.0.clamp(-allowed, allowed);
+        let held = wanted.0.min(allowed).max(-allowed);
         let mut limits = limits;
         if held != wanted.0 {
             let thermal = if allowed < most { Limits::THERMAL } else { Limits::default() };

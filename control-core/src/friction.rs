@@ -1,6 +1,6 @@
 //! Friction along the needle inside tissue (seed 001, eq. 2): as printed, and as a clamped proxy that holds.
 
-use crate::math::{exp, multiply, saturate, times};
+use crate::math::{exp, multiply, scaled};
 use crate::units::{Millimetres, Newtons, Stiffness};
 use fixed::types::{I2F30, I16F16, I32F32};
 
@@ -34,24 +34,31 @@ impl Anchor {
         self.position = fine(depth.0);
     }
 
-    /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit there.
+    /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit that the layers make
+    /// there, for the law that asks.
     pub(crate) fn tick(
         &mut self,
         law: &Law,
         depth: Millimetres,
         inserted: Millimetres,
-        limit: Newtons,
+        limit: impl FnOnce() -> Newtons,
     ) -> Newtons {
         match law {
             Law::Paper { per_level_length, level_cap, follow, stiffness, limit } => {
                 self.follow(depth, *follow);
-                let level = exp(times(inserted.0, *per_level_length)).min(*level_cap);
-                let force = multiply(multiply(self.stretch(depth), level), stiffness.0);
-                Newtons(force.clamp(-limit.0, limit.0))
+                // 1/S_f1 is at most 1.
+                let levels = scaled(inserted.0.to_bits(), per_level_length.to_bits(), 30);
+                let level = exp(I16F16::from_bits(levels)).min(*level_cap);
+                // A metre, further than the needle is long: with levels up to 32 and slopes up to 7 N/mm all fits.
+                let stretch = self.stretch(depth).to_bits().clamp(-1 << 26, (1 << 26) - 1);
+                let levelled = scaled(stretch, level.to_bits(), 16);
+                let force = I16F16::from_bits(scaled(levelled, stiffness.0.to_bits(), 16));
+                Newtons(force.min(limit.0).max(-limit.0))
             }
             Law::Cone { stiffness, inverse_stiffness } => {
+                let limit = limit();
                 self.drag(depth, multiply(limit.0, *inverse_stiffness));
-                Newtons(multiply(self.stretch(depth), stiffness.0).clamp(-limit.0, limit.0))
+                Newtons(multiply(self.stretch(depth), stiffness.0).min(limit.0).max(-limit.0))
             }
         }
     }
@@ -59,7 +66,7 @@ impl Anchor {
     /// Goes `share` of the way to the needle.
     fn follow(&mut self, depth: Millimetres, share: I2F30) {
         let step_q46 = i64::from(self.stretch(depth).to_bits()) * i64::from(share.to_bits());
-        self.position = self.position.saturating_add(I32F32::from_bits(step_q46 >> 14));
+        self.position += I32F32::from_bits(step_q46 >> 14);
     }
 
     /// Is dragged along only when the cone is full; a resting needle keeps its force.
@@ -68,9 +75,10 @@ impl Anchor {
         self.position = fine(coarse(self.position).clamp(nearest, furthest));
     }
 
-    /// `x − w`.
+    /// `x − w`, towards −∞.
     fn stretch(&self, depth: Millimetres) -> I16F16 {
-        I16F16::from_bits(saturate((fine(depth.0) - self.position).to_bits() >> 16))
+        let upwards = I32F32::from_bits(0xFFFF);
+        depth.0.saturating_sub(coarse(self.position + upwards))
     }
 }
 

@@ -10,12 +10,13 @@ const EXP2_Q30: [i32; 6] = [1_073_741_824, 744_261_118, 257_941_248, 59_597_086,
 
 /// e^x for 0 ≤ x ≤ 8 (clamped to it), relative error below 5e-5.
 pub(crate) fn exp(x: I16F16) -> I16F16 {
-    let power = times(x.clamp(I16F16::ZERO, I16F16::from_bits(8 << 16)), LOG2_E).to_bits();
+    let x = x.clamp(I16F16::ZERO, I16F16::from_bits(8 << 16));
+    let power = scaled(x.to_bits(), LOG2_E.to_bits(), 30);
     // Round(x·log2(e)), 0 to 12; what is left of it lies in [−0.5, 0.5).
     let whole = (power + (1 << 15)) >> 16;
-    let fraction_q30 = (power - (whole << 16)) << 14;
+    let fraction_q32 = (power - (whole << 16)) << 16;
     let mantissa_q30 =
-        EXP2_Q30.iter().rev().fold(0, |sum, coefficient| coefficient + product(sum, fraction_q30, 30));
+        EXP2_Q30.iter().rev().fold(0, |sum, coefficient| coefficient + upper_half(sum, fraction_q32));
     // 2^whole · mantissa: Q30 to Q16 is a shift by 14, of which `whole` is taken back.
     let shift = 14 - whole;
     I16F16::from_bits((mantissa_q30 + (1 << (shift - 1))) >> shift)
@@ -34,6 +35,18 @@ pub(crate) fn multiply(a: I16F16, b: I16F16) -> I16F16 {
 /// `a · b` without its last `places` bits, towards −∞; saturating.
 pub(crate) fn product(a: i32, b: i32, places: u32) -> i32 {
     saturate((i64::from(a) * i64::from(b)) >> places)
+}
+
+/// `a · b` without its last `places` bits, towards −∞, where it is known to fit: half the instructions of [`product`].
+pub(crate) fn scaled(a: i32, b: i32, places: u32) -> i32 {
+    let wide = (i64::from(a) * i64::from(b)) >> places;
+    debug_assert!(i32::try_from(wide).is_ok(), "{a} · {b} >> {places}");
+    wide as i32
+}
+
+/// `a · b / 2^32`, towards −∞: one instruction on the board.
+pub(crate) fn upper_half(a: i32, b: i32) -> i32 {
+    ((i64::from(a) * i64::from(b)) >> 32) as i32
 }
 
 /// The nearest number of 32 bits.

@@ -72,10 +72,10 @@ impl Observer {
     }
 
     fn moved_in_a_bounce(&mut self, depth: Millimetres) -> I16F16 {
+        self.next = (self.next + 1) % BOUNCE_TICKS;
         let Some(oldest) = self.depths.get_mut(self.next) else { return I16F16::ZERO };
         let moved = depth.0.saturating_sub(oldest.0);
         *oldest = depth;
-        self.next = (self.next + 1) % BOUNCE_TICKS;
         moved
     }
 }

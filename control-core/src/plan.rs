@@ -2,7 +2,7 @@
 //! that is unstable, overflows or asks for more than the motor has is refused with the reason, never clamped.
 
 use crate::TICK_HZ;
-use crate::config::{Config, FrictionLaw, Layer, Parabola, Tissue, Wall};
+use crate::config::{Config, FrictionLaw, Layer, MAX_LAYERS, Parabola, Tissue, Wall};
 use crate::friction::Law;
 use crate::jog;
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
@@ -40,7 +40,7 @@ pub struct Plan {
     pub(crate) bounce_damping: BounceDamping,
     pub(crate) damping: I2F30,
     pub(crate) dac: DacScale,
-    pub(crate) travel_counts: i32,
+    pub(crate) travel_counts: u32,
     pub(crate) heartbeat_ticks: u32,
 }
 
@@ -208,7 +208,7 @@ impl Plan {
             bounce_damping: BounceDamping::new(config.passivity_damping),
             damping: I2F30::saturating_from_num(config.damping.0),
             dac: DacScale::new(config.device.dac, config.device.full_scale_torque),
-            travel_counts: counts_reaching(config.limits.travel, mm_per_count),
+            travel_counts: counts_reaching(config.limits.travel, mm_per_count).unsigned_abs(),
             heartbeat_ticks: u32::from(config.limits.heartbeat_ms) * TICK_HZ / 1000,
             config: config.clone(),
         })
@@ -335,7 +335,7 @@ fn largest_force(config: &Config) -> I16F16 {
 }
 
 fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
-    let (mut layers, mut walls) = (heapless::Vec::new(), heapless::Vec::new());
+    let (mut layers, mut walls) = (heapless::Vec::new(), heapless::Vec::<_, MAX_LAYERS>::new());
     let mut friction_above = I16F16::ZERO;
     for (index, layer) in config.layers.iter().enumerate() {
         let number = index as u8;
@@ -355,6 +355,7 @@ fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
             top: layer.top,
             contact: at(layer.top.0),
             exit: at(layer.top.0.saturating_sub(HEAL_DISTANCE)),
+            walls_above: walls.len(),
             friction_per_mm: I2F30::saturating_from_num(layer.friction.0),
             friction_above: Newtons(friction_above),
         };
@@ -363,7 +364,6 @@ fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
                 layer: number,
                 contact: ready.contact,
                 puncture: at(layer.top.0.saturating_add(wall.puncture_travel.0)),
-                exit: ready.exit,
                 jog: jog::Wall::new(wall, layer.top),
             };
             // All vectors hold MAX_LAYERS: the push cannot fail, nor the one below.
@@ -372,7 +372,7 @@ fn plan_layers(config: &Config, scale: Scale) -> Result<Layers, Refusal> {
         let _ = layers.push(ready);
     }
     check_deepest(config, friction_above)?;
-    Ok(Layers { layers, walls, friction: plan_friction(&config.friction) })
+    Layers::new(layers, walls, plan_friction(&config.friction)).ok_or(Refusal::Empty)
 }
 
 /// A layer begins below the one above it, and a wall below the depth at which the wall above it gives way, whatever lies

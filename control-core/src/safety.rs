@@ -2,7 +2,7 @@
 
 use crate::config::DacWidth;
 use crate::event::Limits;
-use crate::math::times;
+use crate::math::scaled;
 use crate::units::{DacCode, MillinewtonMetres};
 use fixed::types::{I2F30, I16F16};
 
@@ -43,12 +43,12 @@ impl Limiter {
         let mut torque = wanted.0;
         if self.faded < I2F30::ONE {
             self.faded = self.faded.saturating_add(limits.fade_per_tick).min(I2F30::ONE);
-            torque = times(torque, self.faded);
+            torque = I16F16::from_bits(scaled(torque.to_bits(), self.faded.to_bits(), 30));
             in_force = in_force.with(Limits::FADE_IN);
         }
         let lowest = self.given.saturating_sub(limits.slew_per_tick);
         let highest = self.given.saturating_add(limits.slew_per_tick);
-        let slewed = torque.clamp(lowest, highest);
+        let slewed = torque.min(highest).max(lowest);
         if slewed != torque {
             in_force = in_force.with(Limits::SLEW);
         }
@@ -60,28 +60,30 @@ impl Limiter {
 /// From torque to converter code.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DacScale {
-    width: DacWidth,
     codes_per_mnm: I16F16,
+    mid_scale: u16,
+    span: u16,
 }
 
 impl DacScale {
     /// For a converter whose full scale is `full_scale` torque.
     pub(crate) fn new(width: DacWidth, full_scale: MillinewtonMetres) -> Self {
-        Self { width, codes_per_mnm: I16F16::from_num(width.span()) / full_scale.0 }
+        let span = width.span();
+        Self { codes_per_mnm: I16F16::from_num(span) / full_scale.0, mid_scale: width.mid_scale(), span }
     }
 
     /// The nearest code; never beyond the converter's span.
     pub(crate) fn code(&self, torque: MillinewtonMetres) -> DacCode {
         let steps_q32 = i64::from(torque.0.to_bits()) * i64::from(self.codes_per_mnm.to_bits());
         let nearest = ((steps_q32 + (1 << 31)) >> 32) as i32;
-        let span = i32::from(self.width.span());
+        let span = i32::from(self.span);
         // Mid-scale is a step more than the span: never below 1 and never above the width.
-        DacCode((i32::from(self.width.mid_scale()) + nearest.clamp(-span, span)) as u16)
+        DacCode((i32::from(self.mid_scale) + nearest.min(span).max(-span)) as u16)
     }
 
     /// The code of zero torque.
     pub(crate) fn zero(&self) -> DacCode {
-        DacCode(self.width.mid_scale())
+        DacCode(self.mid_scale)
     }
 }
 

@@ -2,7 +2,7 @@
 //! torque is reached the torque limit falls to the continuous torque; that is a limit in force, not a fault.
 
 use crate::TICK_HZ;
-use crate::math::{product, saturate, times};
+use crate::math::{product, scaled};
 use crate::units::MillinewtonMetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
@@ -46,8 +46,9 @@ impl Winding {
     /// One tick with `given` torque.
     pub(crate) fn tick(&mut self, limits: &ThermalLimits, given: MillinewtonMetres) {
         let towards_q32 = (given.0.wide_mul(given.0) - self.heat).to_bits();
-        // The step is a share of 2^-13 or less: in Q52, with 20 places taken off last, nothing of it is lost.
-        let step_q52 = i64::from(saturate(towards_q32 >> 20)) * i64::from(limits.warming.to_bits());
+        // Torques stay below 512 mN·m: what is left of the difference fits. The step is a share of 2^-13 or less: in Q52, with
+        // 20 places taken off last, nothing of it is lost.
+        let step_q52 = i64::from((towards_q32 >> 20) as i32) * i64::from(limits.warming.to_bits());
         self.heat += I32F32::from_bits(step_q52 >> 20);
     }
 
@@ -56,8 +57,10 @@ impl Winding {
         if most <= limits.continuous {
             return most;
         }
-        let left_q16 = saturate((limits.allowed - self.heat).to_bits() >> 16).max(0);
+        // At most 180² (mN·m)².
+        let left_q16 = ((limits.allowed - self.heat).max(I32F32::ZERO).to_bits() >> 16) as i32;
         let share = I2F30::from_bits(product(left_q16, limits.per_blend.to_bits(), 16)).min(I2F30::ONE);
-        limits.continuous.saturating_add(times(most.saturating_sub(limits.continuous), share))
+        let more = scaled(most.saturating_sub(limits.continuous).to_bits(), share.to_bits(), 30);
+        limits.continuous.saturating_add(I16F16::from_bits(more))
     }
 }

@@ -1,8 +1,8 @@
 //! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
 
-use control_core::config::FrictionLaw;
+use control_core::config::{FrictionLaw, Layer, Parabola, Tissue, Wall};
 use control_core::event::{Fault, State};
-use control_core::units::{Counts, Millimetres, Newtons, Stiffness};
+use control_core::units::{Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
 use fixed::types::I16F16;
 
@@ -193,4 +193,45 @@ fn an_encoder_without_a_count_under_torque_is_dead_and_a_resting_needle_is_not()
     travel(&mut c, &mut at, 4.5, 10.0, |_| {});
     assert_eq!(hold(&mut c, at, 9.0).tripped, None);
     assert!(hold(&mut c, at, 0.1).enable);
+}
+
+/// Six walls 1 mm apart that give way after 0.5 mm.
+fn six_walls() -> Config {
+    let parabola = |vertex: f64, compliance: f64| Parabola {
+        vertex: Millimetres(I16F16::from_num(vertex)),
+        compliance: JogCompliance(I16F16::from_num(compliance)),
+        base: Newtons::default(),
+    };
+    let layer = |number: u8| Layer {
+        tissue: Tissue::Other,
+        top: Millimetres(I16F16::from_num(number)),
+        wall: Some(Wall {
+            elastic: parabola(0.0, 1.0),
+            puncture_travel: Millimetres(I16F16::from_num(0.5)),
+            relief: parabola(4.0, 100.0),
+            unload: Stiffness(I16F16::from_num(0.1)),
+        }),
+        friction: FrictionPerMillimetre::default(),
+    };
+    let mut config = Config { layers: (0..6).map(layer).collect(), ..Config::default() };
+    config.limits.max_counts_per_tick = 1_000;
+    config
+}
+
+#[test]
+fn a_needle_that_jumps_crosses_every_layer_and_wall_on_its_way_and_no_other() {
+    let mut c = started(&six_walls());
+    let per_count = c.plan().mm_per_count().to_num::<f64>();
+    let mut to = |mm: f64| {
+        let crossed = tick_at(&mut c, (mm / per_count).round() as i32).transitions;
+        [crossed.contact, crossed.puncture, crossed.exit]
+    };
+    assert_eq!(to(-1.0), [0, 0, 1], "it began at the first");
+    assert_eq!(to(2.7), [0b111, 0b111, 0], "three layers and their walls at once");
+    assert_eq!(to(4.2), [0b1_1000, 0b1000, 0], "the fifth is touched and has not given way");
+    assert_eq!(to(9.0), [0b10_0000, 0b11_0000, 0]);
+    assert_eq!(to(2.9), [0, 0, 0b11_0000], "0.1 mm outside the fourth it has not been left");
+    assert_eq!(to(9.0), [0b11_0000, 0b11_0000, 0], "what was left was whole again");
+    assert_eq!(to(-1.0), [0, 0, 0b11_1111]);
+    assert_eq!(to(9.0), [0b11_1111, 0b11_1111, 0]);
 }
