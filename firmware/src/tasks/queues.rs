@@ -23,8 +23,8 @@ pub(crate) enum SmallOrder {
 
 /// What a tick gave, with its number.
 pub(crate) struct Ticked {
-    /// Counts from power-on; a gap is what the queue had no room for.
-    pub(crate) tick: u64,
+    /// Counts from power-on, the lower half of the number; a gap is what the queue had no room for.
+    pub(crate) tick: u32,
     pub(crate) output: TickOutput,
 }
 

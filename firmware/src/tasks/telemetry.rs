@@ -160,12 +160,13 @@ impl Telemetry {
 
     fn take_samples(&mut self) {
         while let Some(ticked) = self.ends.outputs.dequeue() {
-            let dropped = ticked.tick.wrapping_sub(self.next_tick);
+            let dropped = ticked.tick.wrapping_sub(self.next_tick as u32);
             if dropped != 0 {
-                self.endpoint.note_dropped(dropped as u32);
+                self.endpoint.note_dropped(dropped);
             }
-            self.next_tick = ticked.tick + 1;
-            self.endpoint.record(ticked.tick, &ticked.output);
+            let tick = self.next_tick + u64::from(dropped);
+            self.next_tick = tick + 1;
+            self.endpoint.record(tick, &ticked.output);
         }
         self.endpoint.set_timing(Timing {
             clock_hz: timing::CORE_HZ,

@@ -21,8 +21,8 @@ pub(crate) struct Tick {
     controller: Controller,
     width: DacWidth,
     ends: TickEnds,
-    tick: u64,
-    entered: Option<u32>,
+    tick: u32,
+    entered: u32,
     supervised_ms: u32,
     unsupervised_ticks: u32,
 }
@@ -44,7 +44,7 @@ impl Tick {
             width: plan.config().device.dac,
             ends,
             tick: 0,
-            entered: None,
+            entered: 0,
             supervised_ms: 0,
             unsupervised_ticks: 0,
         }
@@ -72,7 +72,7 @@ impl Tick {
         if self.ends.outputs.enqueue(Ticked { tick: self.tick, output }).is_err() {
             // Telemetry sees the gap in the numbers and counts it.
         }
-        self.tick += 1;
+        self.tick = self.tick.wrapping_add(1);
         if shared::POWERED.load(Relaxed) != powered {
             shared::POWERED.store(powered, Relaxed);
             shared::LAST_WORDS.torque(powered);
@@ -91,7 +91,7 @@ impl Tick {
             SmallOrder::Start => self.controller.order(Order::Start),
             SmallOrder::Stop => self.controller.order(Order::Stop),
             SmallOrder::Zero => self.controller.order(Order::Zero),
-            SmallOrder::Heartbeat => self.controller.order(Order::Heartbeat),
+            SmallOrder::Heartbeat => self.controller.heartbeat(),
             SmallOrder::Large => {
                 if let Some(order) = self.ends.large_orders.dequeue() {
                     self.controller.order(order);
@@ -118,11 +118,10 @@ impl Tick {
 
     /// Counts ticks that never came and takes torque away when this one was too long.
     fn watch_time(&mut self, entered: u32) {
-        if let Some(before) = self.entered.replace(entered) {
-            let apart = entered.wrapping_sub(before);
-            if apart > timing::TICK_MISSED_CYCLES {
-                self.missed((apart + timing::TICK_CYCLES / 2) / timing::TICK_CYCLES - 1);
-            }
+        let apart = entered.wrapping_sub(core::mem::replace(&mut self.entered, entered));
+        // The first tick has none before it.
+        if apart > timing::TICK_MISSED_CYCLES && self.tick != 1 {
+            self.missed((apart + timing::TICK_CYCLES / 2) / timing::TICK_CYCLES - 1);
         }
         if self.timer.edge_waits() {
             self.missed(1);
