@@ -19,6 +19,9 @@ use serde::{Deserialize, Serialize};
 /// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
 const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
 
+/// Where the tissue finds the tip during an excitation: nobody's hand is on the needle then, and nobody feels tissue.
+const OUTSIDE: (Counts, Millimetres) = (Counts(i32::MIN), Millimetres(I16F16::MIN));
+
 /// What the tick reads.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickInput {
@@ -150,6 +153,7 @@ impl Controller {
             Order::Excite(excitation) if !self.mode.is_powered() => {
                 let depth = self.plan.scale.depth(self.latest_count());
                 self.player = Some(Player::new(&excitation, depth));
+                self.tissue = Tissue::default();
                 self.power_up(Mode::Exciting);
             }
             Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
@@ -187,7 +191,8 @@ impl Controller {
         let count = self.count(input.count);
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
-        let tissue = self.tissue.tick(&self.plan.layers, count, depth, speed);
+        let (tip, tip_depth) = if self.mode == Mode::Exciting { OUTSIDE } else { (count, depth) };
+        let tissue = self.tissue.tick(&self.plan.layers, tip, tip_depth, speed);
         self.watch_host();
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
             Some((wanted, limits)) => self.limit(wanted, limits),
