@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use control_core::Config;
 use control_core::config::{DacWidth, FrictionLaw, Layer, MAX_LAYERS, Parabola, SpeedMethod, Tissue, Wall};
 use control_core::event::State;
+use control_core::excitation::{Excitation, MAX_LINES, Servo, Signal};
 use control_core::units::{
-    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillimetresPerSecond, MillinewtonMetres,
+    Newtons, Stiffness,
 };
 use fixed::types::{I8F24, I16F16};
 use link::Command;
@@ -33,11 +35,12 @@ struct Profile {
 }
 
 impl Profile {
-    /// Adds the ticks until `end` of a board with `config` whose needle the plant moves. `meddle` is called every
-    /// millisecond.
+    /// Adds the ticks until `end` of a board with `config`, started by `begin`, whose needle the plant moves. `meddle` is
+    /// called every millisecond.
     fn add(
         &mut self,
         config: Config,
+        begin: Command,
         plant: impl PlantSide + 'static,
         end: Nanos,
         mut meddle: impl FnMut(&mut Pc, &mut Board),
@@ -46,7 +49,7 @@ impl Profile {
         let mut pc = Pc::new();
         pc.connect(&mut board);
         pc.must(&mut board, Command::Configure(config));
-        pc.must(&mut board, Command::Start);
+        pc.must(&mut board, begin);
         let handler = board.symbols().iter().find(|symbol| symbol.name == TICK);
         let handler = handler.expect("the image has the tick's handler").address;
         board.probe().tally().handler = Some(handler);
@@ -154,7 +157,7 @@ fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, i64)> {
 fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
-    let (mut board, _) = profile.add(Config::default(), venepuncture(BEGIN), end, |_, _| ());
+    let (mut board, _) = profile.add(Config::default(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
     profile.has_worked();
     let longest = profile.longest("default");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
@@ -189,7 +192,7 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
             }
         };
         let hand = plant::by_hand(plant::path(path(moves)));
-        profile.add(config, hand, BEGIN + 440 * MILLISECOND, restart);
+        profile.add(config, Command::Start, hand, BEGIN + 440 * MILLISECOND, restart);
     }
     profile.has_worked();
     let longest = profile.longest("heaviest");
@@ -212,12 +215,45 @@ fn nor_does_a_tick_in_which_every_wall_gives_way() {
         let beat = |pc: &mut Pc, board: &mut Board| {
             pc.send(board, Command::Heartbeat);
         };
-        let (_, pc) = profile.add(config, plant::path(hops.clone()), BEGIN + 470 * MILLISECOND, beat);
+        let (_, pc) =
+            profile.add(config, Command::Start, plant::path(hops.clone()), BEGIN + 470 * MILLISECOND, beat);
         let pairs = pc.heard.samples.windows(2).map(|pair| (pair[0].1.count, pair[1].1.count));
         let through = pairs.filter(|&(from, to)| from < 0 && i64::from(to) >= THROUGH).count();
         assert!(through > 5, "the needle went through in one tick {through} times");
         assert!(pc.heard.samples.iter().all(|(_, sample)| sample.state != State::Fault as u8), "no fault");
     }
     let longest = profile.longest("heaviest, all walls at once");
+    assert!(longest <= LONGEST, "a tick of {longest} instructions");
+}
+
+/// Every signal, as much of it as there may be and its legs as short as they may be, while the motor turns to and fro.
+#[test]
+fn nor_does_a_tick_that_plays_an_excitation() {
+    let torque = MillinewtonMetres(q(0.5));
+    let speed = MillimetresPerSecond(q(50.0));
+    let signals = [
+        Signal::SpeedStaircase {
+            slowest: MillimetresPerSecond(q(1.0)),
+            ratio: q(1.1),
+            steps: 32,
+            dwell_ms: 50,
+        },
+        Signal::Triangle { stroke: Millimetres(q(1.0)), speed },
+        Signal::ReversalLadder { smallest: Millimetres(q(0.1)), ratio: q(1.2), steps: 16, speed },
+        Signal::Multisine { torque, frequencies: (1..=MAX_LINES as u16).map(|line| 17 * line).collect() },
+        Signal::BreakawayRamps { torque, ramp_ms: 50 },
+        Signal::Hold,
+    ];
+    let turns = || (0..30).map(|turn| (f64::from(turn) * 20.0, i64::from(turn % 2) * 150));
+    let mut profile = Profile::default();
+    for signal in signals {
+        let config = heaviest(1.2).last().expect("there are some");
+        let servo = Servo { stiffness: Stiffness(q(0.5)), damping: Damping(I8F24::from_num(0.001)) };
+        let excitation = Excitation { signal, duration_ms: 10_000, servo, travel: Millimetres(q(100.0)) };
+        let end = BEGIN + 600 * MILLISECOND;
+        profile.add(config, Command::Excite(excitation), plant::path(path(turns())), end, |_, _| ());
+    }
+    assert!(profile.by_state.contains_key(&(State::Excitation as u8)), "nothing was played");
+    let longest = profile.longest("excitations");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
 }
