@@ -3,6 +3,7 @@
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
 use crate::estimate::Estimator;
+use crate::excitation::Excitation;
 use crate::fit::Fit;
 use crate::judge;
 use crate::kalman::tolerant;
@@ -172,7 +173,7 @@ fn residuals(
     }
 }
 
-/// Part of the force below which what hangs together over time casts no doubt.
+/// Part of the force below which what hangs together over time casts little doubt.
 const LEFT_MATTERS: f64 = 0.025;
 /// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
 /// two it must leave less than this part of what the refit left.
@@ -181,6 +182,8 @@ const MUCH_FORCE: f64 = 0.5;
 const MUCH_OF_REFIT: f64 = 0.65;
 /// What is left over what is explained at which a name is half as sure.
 const DOUBTED: f64 = 1.2;
+/// The same where what is left is little beside the force.
+const DOUBTED_LITTLE: f64 = 3.0;
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
@@ -256,11 +259,13 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = if explained > 0.0 { left / explained } else { 0.0 };
     let matters = left.sqrt() > LEFT_MATTERS * table.force_rms.fit;
-    let doubt = if matters { 1.0 / (1.0 + (leftover / DOUBTED).powi(2)) } else { 1.0 };
+    let half = if matters { DOUBTED } else { DOUBTED_LITTLE };
+    let doubt = 1.0 / (1.0 + (leftover / half).powi(2));
     // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
     let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
     let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
+    let excitation = Excitation::of(&fit_tracks, count);
     let mut effects: Vec<(f64, Named)> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
@@ -275,6 +280,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         if name == EffectName::RollerSlip {
             class.push(EffectName::CommandSaturation);
         }
+        class.extend(excitation.twin(name));
         // A spring that explains little of what it should explain may well have a gap.
         if name == EffectName::DriveCompliance && table.patched.fit.powi(2) > 0.3 * table.refit.fit.powi(2) {
             class.push(EffectName::Backlash);
@@ -316,13 +322,15 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,
             format!(
-                "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is off                  (seconds, counts, command) or where the axis is moved by something that was not recorded",
+                "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is off (seconds, counts, command) or where the axis is moved by something that was not recorded",
                 100.0 * judged.holdout / table.force_rms.holdout.max(1e-300)
             ),
         ));
     }
     let verdict = if !effects.is_empty() {
         Verdict::MissingPhysics
+    } else if excitation.is_one_speed() {
+        Verdict::InsufficientExcitation
     } else if disturbed && (carries || (understood && helps)) {
         Verdict::Unexplained
     } else if disturbed {
@@ -332,6 +340,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     } else {
         Verdict::NoMismatch
     };
+    let cannot_tell = matches!(verdict, Verdict::InsufficientExcitation);
     let mut hypotheses: Vec<Hypothesis> = found
         .iter()
         .map(|f| Hypothesis { name: f.effect.name, holdout_gain: f.holdout.sum, rejected_because: None })
@@ -399,8 +408,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         unexplained_fraction: unexplained,
         hypotheses,
         place: top_place,
-        separating_experiment: None,
-        reason: None,
+        separating_experiment: cannot_tell.then(|| prescribe::SPEEDS.to_owned()),
+        reason: cannot_tell.then(|| excitation.one_speed()),
     };
     report.sentence = crate::outcome::sentence(&report, nominal.rig.kind);
     let mut series = Vec::new();

@@ -6,7 +6,7 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` (where), `conclude`, `patch`,
+//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `conclude`, `patch`,
 //! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
 
 // Matrices are read by row and column.
@@ -17,6 +17,7 @@ mod conclude;
 pub mod effects;
 mod error;
 mod estimate;
+mod excitation;
 mod fit;
 mod html;
 mod judge;

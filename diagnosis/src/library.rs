@@ -89,6 +89,9 @@ fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {
     values.iter().flatten().map(|x| Some(*x))
 }
 
+/// Degrees of the polynomial that a profile along the travel may have: a slope or bend, and a step or bump.
+const PROFILE_DEGREES: [f64; 2] = [3.0, 6.0];
+
 /// `count` values from `from` to `to`, evenly spaced in their logarithm.
 pub(crate) fn logarithmic(from: f64, to: f64, count: usize) -> Vec<f64> {
     if from.is_nan() || to.is_nan() || from <= 0.0 || to <= from || count < 2 {
@@ -129,7 +132,9 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         }
         N::PreslidingFriction => one("deflection", logarithmic(2.0 * span.count, 0.03 * span.travel(), 9)),
         N::PositionDependentFriction | N::PositionDependentDamping => {
-            vec![Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", 3.0)])]
+            let of =
+                |degree| Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", degree)]);
+            PROFILE_DEGREES.map(of).to_vec()
         }
         N::LoadDependentFriction if span.force => vec![Effect::shaped(name, &[])],
         N::FrictionDrift | N::GainDrift => {

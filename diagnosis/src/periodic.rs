@@ -13,6 +13,8 @@ use std::f64::consts::TAU;
 /// Highest order of a turn that is looked for, and how many orders one effect may have.
 const HIGHEST: usize = 100;
 const MOST: usize = 14;
+/// Most cycles over the travel that are looked for where no turn is known.
+const MOST_CYCLES: f64 = 480.0;
 /// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
 const FEWEST: usize = 6;
 /// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
@@ -27,7 +29,7 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
         let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
         return Some((turn, (1..=highest).map(|n| n as f64).collect()));
     }
-    let most = (travel / shortest).min(160.0);
+    let most = (travel / shortest).min(MOST_CYCLES);
     // One over the travel is the reference; cycles over the travel play the part of orders.
     let count = (most * 2.0) as usize;
     (count >= 8).then(|| (travel, (FEWEST..=count).map(|i| 0.5 * i as f64).collect()))

@@ -21,7 +21,7 @@ pub(crate) fn separating(class: &[N]) -> Option<String> {
     } else if has(N::MassImbalance) && has(N::Cogging) {
         "slow turns at two tilts of the axis: gravity changes with tilt, cogging does not"
     } else if has(N::QuadraticDrag) || (has(N::StribeckFriction) && has(N::ViscousFriction)) {
-        "a staircase of constant speeds over two decades, both ways"
+        SPEEDS
     } else if has(N::Cogging) && has(N::TorqueRipple) {
         "slow turns with a small and with a large constant load: ripple grows with the command, cogging does not"
     } else if has(N::CommandSaturation) && has(N::RollerSlip) {
@@ -40,3 +40,6 @@ pub(crate) fn separating(class: &[N]) -> Option<String> {
 /// What a recording needs so that a diagnosis is possible at all.
 pub(crate) const GENERAL: &str = "ten seconds or more at 500 Hz or more with reversals, several speeds both ways and a \
     command that is not constant, for example a slow triangle with a multisine on top";
+
+/// What recordings at one speed need beside them.
+pub(crate) const SPEEDS: &str = "a staircase of constant speeds over two decades, both ways";

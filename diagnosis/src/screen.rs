@@ -3,6 +3,7 @@
 use crate::effects::Effect;
 use crate::fit::{Fit, dot};
 use crate::model::{Model, effect_inputs, effective_command, own_phase};
+use crate::select::PER_COEFFICIENT;
 use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
 use rayon::prelude::*;
@@ -134,9 +135,11 @@ pub(crate) fn best_on_grid(
 ) -> Option<(Effect, Score)> {
     let scores: Vec<Score> =
         grid.par_iter().map(|effect| score(fit, residuals, model, tracks, effect, limits)).collect();
+    // Of profiles along the travel the finer has more values to fit.
+    let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * effect.shape_or("degree", 0.0);
     let mut best: Option<(Effect, Score)> = None;
     for (effect, score) in grid.iter().zip(scores) {
-        if score.gain > 0.0 && best.as_ref().is_none_or(|(_, b)| score.gain > b.gain) {
+        if score.gain > 0.0 && best.as_ref().is_none_or(|(e, b)| net(effect, &score) > net(e, b)) {
             best = Some((effect.clone(), score));
         }
     }

@@ -31,7 +31,7 @@ pub(crate) struct Bench<'a> {
 
 /// What one value that is fitted costs in log-likelihood: half the logarithm of the number of independent stretches is
 /// about 3; shapes are searched and cost more.
-const PER_COEFFICIENT: f64 = 2.5;
+pub(crate) const PER_COEFFICIENT: f64 = 2.5;
 const PER_SHAPE: f64 = 4.0;
 /// How many effects are fitted in full at each step.
 const FINALISTS: usize = 8;
@@ -48,7 +48,7 @@ fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
     let waves = effect.waves().len();
     let coefficients = match effect.name {
         N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
-        N::PositionDependentFriction | N::PositionDependentDamping => 3,
+        N::PositionDependentFriction | N::PositionDependentDamping => effect.shape_or("degree", 3.0) as usize,
         N::FrictionDrift | N::AsymmetricFriction => 2,
         N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag => 0,
         _ => 1,

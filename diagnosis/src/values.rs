@@ -1,6 +1,6 @@
 //! From coefficients to the numbers of the report: values in the rig's units with intervals, by the contract's names.
 
-use crate::effects::{Effect, EffectName as N};
+use crate::effects::{Effect, EffectName as N, legendre};
 use crate::judge::waves_of;
 use crate::model::{Key, Nominal};
 use crate::report::Parameter;
@@ -210,16 +210,18 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
         }
         N::PositionDependentFriction | N::PositionDependentDamping => {
             // Largest less smallest of the fitted polynomial over the travel.
-            let c: Vec<f64> = (0..3).map(|k| term(k).0).collect();
+            let degree = found.shape_or("degree", 3.0) as usize;
+            let c: Vec<f64> = (0..degree).map(|k| term(k).0).collect();
+            let mut basis = vec![0.0; degree];
             let values: Vec<f64> = (0..=60)
                 .map(|i| {
-                    let x = -1.0 + f64::from(i) / 30.0;
-                    c[0] * x + c[1] * 0.5 * (3.0 * x * x - 1.0) + c[2] * 0.5 * (5.0 * x * x * x - 3.0 * x)
+                    legendre(-1.0 + f64::from(i) / 30.0, 1.0, &mut basis);
+                    c.iter().zip(&basis).map(|(c, b)| c * b).sum()
                 })
                 .collect();
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let sd = 2.0 * (0..3).map(|k| term(k).1.powi(2)).sum::<f64>().sqrt();
+            let sd = 2.0 * (0..degree).map(|k| term(k).1.powi(2)).sum::<f64>().sqrt();
             let (v, s) = scaled((high - low, sd));
             let unit = if found.name == N::PositionDependentFriction {
                 force.into()

@@ -261,7 +261,7 @@ fn transition(omega: f64, zeta: f64, dt: f64) -> [f64; 6] {
 }
 
 /// Legendre polynomials of degree 1 and up, times a factor.
-fn legendre(x: f64, times: f64, out: &mut [f64]) {
+pub(crate) fn legendre(x: f64, times: f64, out: &mut [f64]) {
     let (mut before, mut now) = (1.0, x);
     for (k, term) in out.iter_mut().enumerate() {
         *term = times * now;

@@ -10,8 +10,8 @@ mod name;
 mod plant;
 
 pub use command::CommandLaw;
-pub(crate) use law::wave_mean;
 pub use law::{Law, State};
+pub(crate) use law::{legendre, wave_mean};
 pub use name::{EffectName, Subsystem};
 pub use plant::{Plant, Surroundings};
 

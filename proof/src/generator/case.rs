@@ -1,11 +1,12 @@
 //! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the key.
 
+use super::draft::{Draft, Plan};
 use super::effects::{self, Parameter};
-use super::excite::{self, Excitation, Kind};
+use super::excite::{self, Kind};
 use super::machine::{Machine, Needs};
 use super::outside;
 use super::plant::Plant;
-use super::simulate::{Believed, Diverged, Row, Run, STEP, Series, simulate};
+use super::simulate::{Believed, Row, STEP, Series};
 use super::strength::{Declared, Measured, measure};
 use crate::rng::Rng;
 
@@ -98,164 +99,6 @@ impl Case {
     pub(crate) fn held_out(&self, band: f64) -> Measured {
         let rows: Vec<&[Row]> = self.recordings.iter().map(Vec::as_slice).collect();
         measure(&rows, 2, &self.believed, &self.declared, self.machine.rate, band)
-    }
-}
-
-struct Plan {
-    excitation: Excitation,
-    times: Vec<f64>,
-    tilt: Series,
-    force: Series,
-    unit_noise: Series,
-    rough: Series,
-    offset: f64,
-    start: f64,
-    zero: f64,
-    random: Rng,
-}
-
-struct Draft<'a> {
-    spec: &'a Spec,
-    rng: &'a Rng,
-    machine: Machine,
-    declared: Declared,
-    base: f64,
-    plans: Vec<Plan>,
-    noise_scale: f64,
-}
-
-impl Draft<'_> {
-    fn plant(&self, scales: &[(usize, f64)]) -> Plant {
-        let mut plant = self.machine.plant.clone();
-        for &(i, s) in scales {
-            let name = self.spec.hidden[i];
-            let mut form = self.rng.fork(&format!("form/{i}"));
-            if self.spec.category == Category::Outside {
-                outside::apply(name, &self.machine, &mut plant, self.base, s, &mut form);
-            } else {
-                effects::apply(name, &self.machine, &mut plant, self.base, s, &mut form);
-            }
-        }
-        plant
-    }
-
-    fn believed(&self, plant: &Plant) -> Believed {
-        let lacks = |name: &str| self.spec.hidden.contains(&name);
-        let m = &self.machine;
-        Believed {
-            inertia: plant.inertia,
-            viscous: if lacks("viscous_friction") { 0.0 } else { plant.viscous },
-            coulomb: if lacks("coulomb_friction") { 0.0 } else { plant.dry.coulomb },
-            gain: plant.gain,
-            offset: plant.offset,
-            weight: if m.weight_key { plant.weight } else { 0.0 },
-        }
-    }
-
-    fn play(&self, plant: &Plant, plan: &Plan, step: f64) -> Result<Vec<Row>, Diverged> {
-        let m = &self.machine;
-        let coulomb = m.plant.dry.coulomb;
-        let scale = self.noise_scale * m.noise_share * coulomb;
-        let mut disturbance = plan.unit_noise.clone();
-        disturbance.values.iter_mut().for_each(|x| *x *= scale);
-        if !plan.rough.values.is_empty() {
-            for (i, value) in disturbance.values.iter_mut().enumerate() {
-                *value += plan.rough.at(i as f64 * plan.unit_noise.interval);
-            }
-        }
-        let run = Run {
-            times: plan.times.clone(),
-            drive: plan.excitation.drive.clone(),
-            control: plan.excitation.control.clone(),
-            limit: m.limit,
-            command_step: m.command_step,
-            tilt: plan.tilt.clone(),
-            force: plan.force.clone(),
-            disturbance,
-            offset: plan.offset,
-            start: plan.start,
-            zero_counts: plan.zero,
-            speed_bound: 12.0 * m.top_speed,
-            random: plan.random.clone(),
-        };
-        simulate(plant, &self.believed(plant), &run, step)
-    }
-
-    fn measured(&self, plant: &Plant, step: f64) -> Result<Measured, Diverged> {
-        let fits: Vec<Vec<Row>> =
-            self.plans.iter().take(2).map(|p| self.play(plant, p, step)).collect::<Result<_, _>>()?;
-        let rows: Vec<&[Row]> = fits.iter().map(Vec::as_slice).collect();
-        let m = &self.machine;
-        Ok(measure(&rows, 2, &self.believed(plant), &self.declared, m.rate, m.residual_bandwidth()))
-    }
-
-    /// The |command| that the fit recordings exceed in 2 % of their rows when nothing is hidden.
-    fn peak_command(&self) -> Result<f64, Diverged> {
-        let plant = self.machine.plant.clone();
-        let mut commands = Vec::new();
-        for plan in self.plans.iter().take(2) {
-            commands.extend(self.play(&plant, plan, 40e-6)?.iter().map(|r| r.command.abs()));
-        }
-        commands.sort_by(f64::total_cmp);
-        Ok(commands[commands.len() * 98 / 100])
-    }
-
-    /// Finds the scale of effect `i` alone at which effect over noise is `target`. Where the effect is at its bound, the
-    /// disturbance gives way, then the encoder gets finer.
-    fn calibrate(&mut self, i: usize, target: f64) -> Result<f64, Diverged> {
-        let name = self.spec.hidden[i];
-        let (low, high, mut s) = if self.spec.category == Category::Outside {
-            outside::bounds(name)
-        } else {
-            effects::bounds(name, &self.machine)
-        };
-        s = (s * (target / 5.0)).clamp(low, high);
-        let coarse = 40e-6;
-        let mut last: Option<(f64, f64)> = None;
-        // Largest scale known to be too weak, smallest known to be too strong.
-        let (mut weak, mut strong): (Option<f64>, Option<f64>) = (None, None);
-        for _ in 0..10 {
-            let plant = self.plant(&[(i, s)]);
-            let Ok(now) = self.measured(&plant, coarse) else {
-                // Too strong to be run.
-                strong = Some(s);
-                s = (weak.unwrap_or(low) * s).sqrt();
-                continue;
-            };
-            let ratio = now.effect / now.noise.max(1e-300);
-            let miss = (target / ratio.max(1e-9)).ln();
-            if miss.abs() < 0.08 {
-                break;
-            }
-            if miss > 0.0 {
-                weak = Some(s);
-            } else {
-                strong = Some(s);
-            }
-            let slope = match last {
-                Some((s0, r0)) if (s / s0).ln().abs() > 1e-3 => {
-                    ((ratio / r0).ln() / (s / s0).ln()).clamp(0.4, 3.0)
-                }
-                _ => 1.0,
-            };
-            last = Some((s, ratio));
-            let wanted = s * (miss / slope).clamp(-2.5, 2.5).exp();
-            if let (Some(weak), Some(strong)) = (weak, strong) {
-                let inside = weak.min(strong) * 1.01 < wanted && wanted < weak.max(strong) / 1.01;
-                s = if inside { wanted } else { (weak * strong).sqrt() };
-                continue;
-            }
-            s = wanted.clamp(low, high);
-            if wanted > high || wanted < low {
-                let short = (wanted / s).powf(slope);
-                self.noise_scale = (self.noise_scale / short).clamp(0.03, 6.0);
-                if self.noise_scale <= 0.04 {
-                    self.machine.plant.counts_per_unit = (self.machine.plant.counts_per_unit * 2.0).round();
-                }
-                (last, weak, strong) = (None, None, None);
-            }
-        }
-        Ok(s)
     }
 }
 
@@ -380,20 +223,20 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
             let (low, high, guess) = effects::bounds(spec.hidden[i], &draft.machine);
             (2.0 * guess).clamp(low, high)
         } else {
-            draft.calibrate(i, spec.strength).ok()?
+            draft.calibrate(i, spec.strength, &scales).ok()?
         };
         scales.push((i, s));
     }
     // The second calibration may have moved the noise: each strength is measured again, alone, as it is.
     let mut alone = Vec::new();
     for scale in &scales {
-        let now = draft.measured(&draft.plant(&[*scale]), 40e-6).ok()?;
+        let now = draft.measured(scale.0, scale.1, &scales, 40e-6).ok()?;
         alone.push(now.effect / now.noise);
     }
     let plant = draft.plant(&scales);
+    let believed = draft.believed(&plant, &scales);
     let recordings: Vec<Vec<Row>> =
-        draft.plans.iter().map(|p| draft.play(&plant, p, STEP)).collect::<Result<_, _>>().ok()?;
-    let believed = draft.believed(&plant);
+        draft.plans.iter().map(|p| draft.play(&plant, &believed, p, STEP)).collect::<Result<_, _>>().ok()?;
     let rows: Vec<&[Row]> = recordings.iter().map(Vec::as_slice).collect();
     let m = &draft.machine;
     let together = measure(&rows[..2], 2, &believed, &declared, m.rate, m.residual_bandwidth());

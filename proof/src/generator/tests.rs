@@ -260,3 +260,14 @@ fn a_case_has_the_strength_asked_for_and_a_null_has_none() {
     let null = build(&spec(Category::Null, vec![], 0.0), 8, true).unwrap();
     assert!(null.together.effect < 1e-2 * null.together.noise, "{:?}", null.together);
 }
+
+#[test]
+fn each_half_of_a_pair_shows_beside_a_missing_friction() {
+    // The friction that the rig lacks must not lend its strength to the asymmetry of it.
+    for seed in [1, 4] {
+        let pair = spec(Category::Pair, vec!["coulomb_friction", "asymmetric_friction"], 10.0);
+        let case = build(&pair, seed, true).expect("a machine shows it");
+        let asymmetry = case.truths[1].1.iter().map(|p| p.value.abs()).fold(0.0, f64::max);
+        assert!(asymmetry > 0.3, "seed {seed}: asymmetry {asymmetry}");
+    }
+}

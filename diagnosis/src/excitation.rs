@@ -1,0 +1,85 @@
+//! What recordings excite: how many speeds, how many amplitudes. What they never played they cannot tell apart.
+
+use crate::effects::EffectName as N;
+use crate::track::Track;
+
+/// Range of the motion of some recordings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Excitation {
+    /// Speed that 95 % of the moving blocks stay below over the speed that 5 % do.
+    pub(crate) speeds: f64,
+    /// The same of the lengths of the strokes between reversals, nine tenths over one tenth.
+    pub(crate) strokes: f64,
+}
+
+/// Speeds within this factor are one speed: dry, viscous, quadratic and falling friction all fit it.
+const ONE_SPEED: f64 = 3.0;
+/// Strokes within this factor have one length: bristles and a gap both fit it.
+const ONE_LENGTH: f64 = 3.0;
+/// Shortest stroke, counts: less is a tremor.
+const STROKE_COUNTS: f64 = 4.0;
+
+/// Upper over lower quantile of positive values; infinite where there are none.
+fn ratio(mut values: Vec<f64>, part: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let Some(last) = values.len().checked_sub(1) else { return f64::INFINITY };
+    let at = |p: f64| values[(p * last as f64).round() as usize];
+    at(1.0 - part) / at(part).max(1e-300)
+}
+
+/// Lengths of the strokes of one recording.
+fn strokes(track: &Track, least: f64) -> Vec<f64> {
+    let mut out = Vec::new();
+    let mut from: Option<(usize, f64)> = None;
+    for (j, (v, rest)) in track.v.iter().zip(&track.rest).enumerate() {
+        if *rest {
+            continue;
+        }
+        match from {
+            Some((_, sign)) if sign == v.signum() => {}
+            _ => {
+                out.extend(from.map(|(start, _)| (track.x[j] - track.x[start]).abs()));
+                from = Some((j, v.signum()));
+            }
+        }
+    }
+    out.extend(from.map(|(start, _)| (track.x[track.blocks() - 1] - track.x[start]).abs()));
+    out.retain(|length| *length > least);
+    out
+}
+
+impl Excitation {
+    /// Measures recordings whose motion is smoothed; `count` is one of the encoder's, rad or m.
+    pub(crate) fn of(tracks: &[Track], count: f64) -> Self {
+        let moving = |track: &Track| -> Vec<f64> {
+            track.v.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()).collect()
+        };
+        let speeds = ratio(tracks.iter().flat_map(moving).collect(), 0.05);
+        let strokes = ratio(tracks.iter().flat_map(|t| strokes(t, STROKE_COUNTS * count)).collect(), 0.1);
+        Self { speeds, strokes }
+    }
+
+    /// Whether all motion is at about one speed.
+    pub(crate) fn is_one_speed(&self) -> bool {
+        self.speeds < ONE_SPEED
+    }
+
+    /// Why recordings at one speed cannot tell.
+    pub(crate) fn one_speed(&self) -> String {
+        format!(
+            "all motion is at about one speed (nine tenths of it within a factor of {:.1}), where what depends on speed and what does not look alike",
+            self.speeds
+        )
+    }
+
+    /// The twin of an effect that these recordings cannot tell from it, however well either fits.
+    pub(crate) fn twin(&self, name: N) -> Option<N> {
+        match name {
+            N::PreslidingFriction if self.strokes < ONE_LENGTH => Some(N::Backlash),
+            N::Backlash if self.strokes < ONE_LENGTH => Some(N::PreslidingFriction),
+            N::StribeckFriction if self.is_one_speed() => Some(N::QuadraticDrag),
+            N::QuadraticDrag if self.is_one_speed() => Some(N::StribeckFriction),
+            _ => None,
+        }
+    }
+}
