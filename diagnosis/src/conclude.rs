@@ -1,5 +1,6 @@
 //! From what the search found to the report: rivals and classes, confidence, values, places, the verdict.
 
+use crate::confidence::{self, Leftover};
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
 use crate::estimate::Estimator;
@@ -114,11 +115,9 @@ pub(crate) fn rivals(bench: &Bench, last: &Candidate, slow: &Candidate, held: &[
     }
 }
 
-fn confidence(found: &Found, class: &[EffectName]) -> f64 {
-    let nearest = found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(12.0, f64::min);
-    let by_rival = 1.0 - 0.5 * (-(nearest - 1.0).max(0.0) / 1.5).exp();
-    let by_holdout = 1.0 - 0.5 * (-(found.holdout.z - 1.0).max(0.0) / 1.2).exp();
-    (by_rival * by_holdout).clamp(0.05, 0.99)
+/// Standard errors that the nearest rival outside an effect's class is behind.
+fn nearest_rival(found: &Found, class: &[EffectName]) -> f64 {
+    found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(f64::INFINITY, f64::min)
 }
 
 /// Residual force of one model over recordings.
@@ -173,17 +172,13 @@ fn residuals(
     }
 }
 
-/// Part of the force below which what hangs together over time casts little doubt.
-const LEFT_MATTERS: f64 = 0.025;
 /// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
 /// two it must leave less than this part of what the refit left.
 const LITTLE_FORCE: f64 = 0.12;
 const MUCH_FORCE: f64 = 0.5;
 const MUCH_OF_REFIT: f64 = 0.65;
-/// What is left over what is explained at which a name is half as sure.
-const DOUBTED: f64 = 1.2;
-/// The same where what is left is little beside the force.
-const DOUBTED_LITTLE: f64 = 3.0;
+/// Least probability with which an effect is named.
+const NAMED: f64 = 0.5;
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
@@ -257,16 +252,18 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     // stand for something else.
     let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
     let left = s.last.noise.slow * inertia * inertia;
-    let leftover = if explained > 0.0 { left / explained } else { 0.0 };
-    let matters = left.sqrt() > LEFT_MATTERS * table.force_rms.fit;
-    let half = if matters { DOUBTED } else { DOUBTED_LITTLE };
-    let doubt = 1.0 / (1.0 + (leftover / half).powi(2));
+    let leftover = Leftover {
+        of_explained: if explained > 0.0 { left / explained } else { 0.0 },
+        of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
+        unexplained: table.patched.holdout / table.refit.holdout.max(1e-300),
+    };
     // A model that leaves much of the force, or much of what the refit left, has not understood it, whatever it names.
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
     let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
     let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
-    let excitation = Excitation::of(&fit_tracks, count);
+    let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
     let mut effects: Vec<(f64, Named)> = Vec::new();
+    let mut hypotheses: Vec<Hypothesis> = Vec::new();
     for (i, one) in found.iter().enumerate() {
         let name = one.effect.name;
         let mut class = vec![name];
@@ -290,18 +287,37 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
                 class.push(rival.name);
             }
         }
+        let evidence = confidence::evidence(one, nearest_rival(one, &class), leftover);
         let named = Named {
             name,
             subsystem: name.subsystem(),
-            confidence: confidence(one, &class) * doubt,
+            confidence: confidence::confidence(&evidence),
             parameters: values::parameters(&bench, &patched, i),
             place: place(&s, &patched, i),
             separating_experiment: prescribe::separating(&class),
             class,
         };
-        effects.push((one.holdout.sum, named));
+        let doubt = if !understood {
+            Some("with it the model still leaves too much of the force to have understood it".to_owned())
+        } else if !is_there(&named) {
+            Some("its size cannot be told from zero".to_owned())
+        } else if named.confidence < NAMED {
+            Some(format!("it is right with a probability of only {:.2}", named.confidence))
+        } else {
+            None
+        };
+        let may_be_judged = understood && is_there(&named);
+        hypotheses.push(Hypothesis {
+            name,
+            holdout_gain: one.holdout.sum,
+            evidence: may_be_judged.then_some(evidence),
+            class: named.class.clone(),
+            rejected_because: doubt.clone(),
+        });
+        if doubt.is_none() {
+            effects.push((one.holdout.sum, named));
+        }
     }
-    effects.retain(|(_, e)| understood && e.confidence >= 0.5 && is_there(e));
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
     let above = |x: f64| (x * x - floor * floor).max(0.0);
@@ -341,10 +357,6 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         Verdict::NoMismatch
     };
     let cannot_tell = matches!(verdict, Verdict::InsufficientExcitation);
-    let mut hypotheses: Vec<Hypothesis> = found
-        .iter()
-        .map(|f| Hypothesis { name: f.effect.name, holdout_gain: f.holdout.sum, rejected_because: None })
-        .collect();
     for one in &found {
         for rival in &one.rivals {
             if found.iter().all(|f| f.effect.name != rival.name)
@@ -353,6 +365,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
                 hypotheses.push(Hypothesis {
                     name: rival.name,
                     holdout_gain: one.holdout.sum - rival.lead,
+                    evidence: None,
+                    class: Vec::new(),
                     rejected_because: Some(format!(
                         "{} explains more by {:.1} standard errors",
                         one.effect.name, rival.z
@@ -366,6 +380,8 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
             hypotheses.push(Hypothesis {
                 name: *name,
                 holdout_gain: *gain,
+                evidence: None,
+                class: Vec::new(),
                 rejected_because: Some(reason.clone()),
             });
         }

@@ -10,12 +10,16 @@ pub(crate) struct Excitation {
     pub(crate) speeds: f64,
     /// The same of the lengths of the strokes between reversals, nine tenths over one tenth.
     pub(crate) strokes: f64,
+    /// Travel of all recordings in turns of the motor; infinite where the turn is not known.
+    pub(crate) turns: f64,
 }
 
 /// Speeds within this factor are one speed: dry, viscous, quadratic and falling friction all fit it.
 const ONE_SPEED: f64 = 3.0;
 /// Strokes within this factor have one length: bristles and a gap both fit it.
 const ONE_LENGTH: f64 = 3.0;
+/// Within less than a turn an off-centre mass pulls like a spring.
+const ONE_TURN: f64 = 1.0;
 /// Shortest stroke, counts: less is a tremor.
 const STROKE_COUNTS: f64 = 4.0;
 
@@ -49,14 +53,21 @@ fn strokes(track: &Track, least: f64) -> Vec<f64> {
 }
 
 impl Excitation {
-    /// Measures recordings whose motion is smoothed; `count` is one of the encoder's, rad or m.
-    pub(crate) fn of(tracks: &[Track], count: f64) -> Self {
+    /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the motor's, rad or m.
+    pub(crate) fn of(tracks: &[Track], count: f64, turn: Option<f64>) -> Self {
         let moving = |track: &Track| -> Vec<f64> {
             track.v.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()).collect()
         };
         let speeds = ratio(tracks.iter().flat_map(moving).collect(), 0.05);
         let strokes = ratio(tracks.iter().flat_map(|t| strokes(t, STROKE_COUNTS * count)).collect(), 0.1);
-        Self { speeds, strokes }
+        let travel = |track: &Track| {
+            let fold = |start: f64, pick: fn(f64, f64) -> f64| track.x.iter().copied().fold(start, pick);
+            fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
+        };
+        let turns = turn.map_or(f64::INFINITY, |turn| {
+            tracks.iter().map(|track| travel(track) / turn).fold(0.0, f64::max)
+        });
+        Self { speeds, strokes, turns }
     }
 
     /// Whether all motion is at about one speed.
@@ -77,6 +88,8 @@ impl Excitation {
         match name {
             N::PreslidingFriction if self.strokes < ONE_LENGTH => Some(N::Backlash),
             N::Backlash if self.strokes < ONE_LENGTH => Some(N::PreslidingFriction),
+            N::PositionSpring if self.turns < ONE_TURN => Some(N::MassImbalance),
+            N::MassImbalance if self.turns < ONE_TURN => Some(N::PositionSpring),
             N::StribeckFriction if self.is_one_speed() => Some(N::QuadraticDrag),
             N::QuadraticDrag if self.is_one_speed() => Some(N::StribeckFriction),
             _ => None,

@@ -215,6 +215,16 @@ impl Fit {
         Some(self.theta(0)[column])
     }
 
+    /// Amplitudes of an effect whose terms are pairs of cosine and sine, in the first recording.
+    pub(crate) fn amplitudes(&self, effect: usize) -> Vec<f64> {
+        let of_effect = |(column, theta): (&Column, f64)| {
+            matches!(column.key, Key::Term { effect: e, .. } if e == effect).then_some(theta)
+        };
+        let terms: Vec<f64> =
+            self.prepared[0].columns.iter().zip(self.theta(0)).filter_map(of_effect).collect();
+        terms.chunks_exact(2).map(|pair| pair[0].hypot(pair[1])).collect()
+    }
+
     /// The total input of the fitted model over each recording.
     pub(crate) fn totals(&self, tracks: &[Track]) -> Vec<Total> {
         tracks

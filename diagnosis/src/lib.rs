@@ -6,7 +6,7 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `conclude`, `patch`,
+//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `conclude`, `confidence`, `patch`,
 //! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
 
 // Matrices are read by row and column.
@@ -14,6 +14,7 @@
 
 mod check;
 mod conclude;
+mod confidence;
 pub mod effects;
 mod error;
 mod estimate;

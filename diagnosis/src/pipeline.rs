@@ -9,6 +9,7 @@ use crate::library::Span;
 use crate::model::{Key, Model, Nominal};
 use crate::noise::Colour;
 use crate::null;
+use crate::periodic;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::select::{Bench, Candidate, MOST};
@@ -31,6 +32,8 @@ pub(crate) struct Found {
     pub(crate) share: f64,
     /// Whether one of its values stands at the end of what is possible.
     pub(crate) at_bound: bool,
+    /// Whether its waves, if it has any, are those of teeth or poles.
+    pub(crate) is_comb: bool,
 }
 
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
@@ -38,7 +41,9 @@ const TRIED: usize = 3;
 
 /// Part of the refit's residual above the noise that an effect must explain on held-out recordings to be named.
 const SHARE: f64 = 0.05;
-/// The same where its gain is this many standard errors on fitted and on held-out recordings.
+/// Below this part it must also stand out by [`CERTAIN`]: the form of a larger effect is never quite right.
+const FAIR_SHARE: f64 = 0.1;
+/// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
 const LEAST_SHARE: f64 = 0.01;
 const CERTAIN: f64 = 6.0;
 
@@ -46,6 +51,11 @@ impl Found {
     /// Whether it stands out of every stretch of every recording, however little it explains beside larger effects.
     fn is_small_but_certain(&self) -> bool {
         self.share >= LEAST_SHARE && self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
+    }
+
+    /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
+    fn stands_out(&self) -> bool {
+        self.holdout.z.max(self.holdout.steady).min(self.fit.z.max(self.fit.steady)) >= CERTAIN
     }
 
     /// Why an effect may not be named, if it may not.
@@ -61,6 +71,18 @@ impl Found {
                 "it explains {:.1} % of what the noise leaves, less than 5 %",
                 100.0 * self.share
             ));
+        }
+        if self.share < FAIR_SHARE && !self.stands_out() {
+            return Some(format!(
+                "it explains {:.1} % of what the noise leaves, and not surely enough for so little",
+                100.0 * self.share
+            ));
+        }
+        if !self.is_comb {
+            return Some(
+                "its orders follow each other without a gap, as at places along the travel, not at teeth or poles"
+                    .into(),
+            );
         }
         self.at_bound.then(|| "its values stand at the end of what is possible".into())
     }
@@ -284,7 +306,16 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
                 last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
                     *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
                 });
-            Found { effect, rivals: Vec::new(), holdout, fit: judge::bootstrap(&gains), share, at_bound }
+            let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
+            Found {
+                effect,
+                rivals: Vec::new(),
+                holdout,
+                fit: judge::bootstrap(&gains),
+                share,
+                at_bound,
+                is_comb,
+            }
         })
         .collect()
 }

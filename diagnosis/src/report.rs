@@ -117,6 +117,12 @@ pub struct Hypothesis {
     pub name: EffectName,
     /// Log-likelihood per held-out second that it brings over the refit.
     pub holdout_gain: f64,
+    /// What speaks for and against it, as its confidence weighs it; only where it came through the search.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub evidence: Option<BTreeMap<String, f64>>,
+    /// Every effect that the data cannot tell from it, itself included; only where it came through the search.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub class: Vec<EffectName>,
     /// Why it lost; missing where it was named.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub rejected_because: Option<String>,

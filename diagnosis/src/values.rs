@@ -16,17 +16,21 @@ const LOAD_FRICTION: (f64, f64) = (0.5, 0.2);
 /// which judges.
 fn form_sd(name: N, value: &str) -> f64 {
     match (name, value) {
-        (N::StribeckFriction, "peak") => 0.16,
-        (N::StribeckFriction, _) => 0.13,
-        (N::PositionDependentFriction | N::PositionDependentDamping | N::RollerSlip, _) => 0.13,
-        (N::Backlash, _) => 0.07,
-        (N::PositionSpring, _) => 0.1,
-        (N::EncoderEccentricity, _) => 0.04,
-        (N::CommandDeadband | N::DriveCompliance, _) => 0.025,
-        (N::FrictionDrift | N::GainDrift | N::AsymmetricFriction, _) => 0.025,
-        (N::CommandDelay | N::ElectricalLag, _) => 0.015,
-        (N::PreslidingFriction, _) => 0.15,
-        (N::LoadDependentFriction | N::TiltGravity, _) => 0.03,
+        (N::StribeckFriction, "peak") => 0.2,
+        (N::StribeckFriction, _) => 0.18,
+        (N::PositionDependentFriction | N::PositionDependentDamping | N::PositionSpring, _) => 0.13,
+        (N::RollerSlip, _) => 0.3,
+        (N::PreslidingFriction, _) => 0.25,
+        (N::Backlash, _) => 0.09,
+        (N::FrictionDrift | N::GainDrift, "time_constant") => 0.06,
+        (N::EncoderEccentricity, _) => 0.05,
+        (N::ElectricalLag | N::FrictionDrift | N::GainDrift, _) => 0.04,
+        (N::DriveCompliance, _) => 0.035,
+        (N::CommandDeadband | N::LoadDependentFriction | N::TiltGravity, _) => 0.03,
+        (N::AsymmetricFriction, _) => 0.025,
+        (N::TorqueRipple, _) => 0.02,
+        (N::CommandDelay, _) => 0.015,
+        (N::CommandSaturation, _) => 0.01,
         _ => 0.005,
     }
 }

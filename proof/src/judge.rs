@@ -7,7 +7,7 @@ use crate::generator::case::{Case, Category};
 use crate::generator::effects::Parameter;
 use crate::rivals::Opinion;
 use crate::stats::{Rate, quantile};
-use crate::tool::{Answer, Named};
+use crate::tool::{Answer, Named, Weighed};
 
 /// From this confidence on a wrong name is confidently wrong.
 pub(crate) const CONFIDENT: f64 = 0.8;
@@ -74,9 +74,19 @@ impl Record {
     }
 
     fn is_true(&self, named: &Named) -> bool {
+        self.holds_truth(&named.name, &named.class)
+    }
+
+    fn holds_truth(&self, name: &str, class: &[String]) -> bool {
         self.category != Category::Outside
-            && named.class.len() <= WIDEST_CLASS
-            && (self.hidden.iter().any(|h| *h == named.name || named.class.iter().any(|c| c == h)))
+            && class.len() <= WIDEST_CLASS
+            && (self.hidden.iter().any(|h| *h == name || class.iter().any(|c| c == h)))
+    }
+
+    /// What came through the tool's search with its evidence, and whether it was right.
+    pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Weighed, bool)> {
+        let all = self.answer.as_ref().map_or(&[][..], |a| &a.weighed);
+        all.iter().map(|w| (w, self.holds_truth(&w.name, &w.class)))
     }
 
     fn found(&self, hidden: &str) -> bool {
@@ -376,6 +386,7 @@ pub(crate) mod tests {
                     parameters: vec![("peak".into(), 2.0, Some([1.9, 2.1]))],
                 })
                 .collect(),
+            weighed: Vec::new(),
             refit_holdout: 2.0,
             patched_holdout: 1.0,
             bandwidth_hz: 100.0,

@@ -4,6 +4,7 @@
 //! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
 
 mod bench;
+mod calibrate;
 mod cases;
 mod generator;
 mod judge;
@@ -29,6 +30,10 @@ use generator::files;
 /// # Errors
 /// One sentence: what could not be read, written or run, and where.
 pub fn run(options: &Options) -> Result<(), String> {
+    if !options.calibrate.is_empty() {
+        print!("{}", calibrate::calibrate(&options.calibrate)?);
+        return Ok(());
+    }
     let specs = wanted(options);
     if let Some(dir) = &options.write {
         return write_all(options, &specs, dir);

@@ -19,6 +19,8 @@ pub struct Options {
     pub write: Option<PathBuf>,
     /// Only cases whose category or hidden physics contains this text.
     pub only: Option<String>,
+    /// Results of earlier runs: find the weights of the tool's confidence from them, and run nothing.
+    pub calibrate: Vec<PathBuf>,
     /// Folder for `proof.json` and `proof.md`.
     pub out: PathBuf,
 }
@@ -33,6 +35,7 @@ impl Default for Options {
             minutes: None,
             write: None,
             only: None,
+            calibrate: Vec::new(),
             out: PathBuf::from("target"),
         }
     }
@@ -48,6 +51,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --minutes N   no case begins after N minutes; the report says how many were left
   --only TEXT   only cases whose category or hidden physics contains TEXT
   --write DIR   write the recordings to DIR/cases and the keys to DIR/keys, and run nothing
+  --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
   --out DIR     folder for proof.json and proof.md (target)
 ";
 
@@ -72,7 +76,8 @@ impl Options {
                 options.quick = true;
                 continue;
             }
-            let known = ["--seed", "--cases", "--jobs", "--minutes", "--only", "--write", "--out"];
+            let known =
+                ["--seed", "--cases", "--jobs", "--minutes", "--only", "--write", "--calibrate", "--out"];
             if !known.contains(&flag.as_str()) {
                 return Err(format!("`{flag}` is not a flag of prove; `prove --help` lists them"));
             }
@@ -85,6 +90,7 @@ impl Options {
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
                 "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
                 "--only" => options.only = Some(value),
+                "--calibrate" => options.calibrate = value.split(',').map(PathBuf::from).collect(),
                 "--write" => options.write = Some(PathBuf::from(value)),
                 _ => options.out = PathBuf::from(value),
             }

@@ -10,6 +10,7 @@ use crate::generator::case::Category;
 use crate::judge::{Record, Sums, share_text};
 use crate::options::Options;
 use crate::stats::{Rate, quantile, wilson};
+use crate::tool::Weighed;
 
 /// What was run, for the head of the report.
 #[derive(Clone, Debug)]
@@ -246,6 +247,10 @@ fn rate_json(r: &Rate) -> Value {
     json!({ "hits": r.hits, "trials": r.trials, "ci95": [low, high] })
 }
 
+fn weighed_json((weighed, right): (&Weighed, bool)) -> Value {
+    json!({ "name": weighed.name, "right": right, "evidence": weighed.evidence })
+}
+
 /// The whole result as JSON: sums, and one line for every case.
 pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
     let shares = |x: &[f64]| json!({ "median": quantile(x, 0.5), "p10": quantile(x, 0.1), "cases": x.len() });
@@ -276,6 +281,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
                 "id": r.id, "category": r.category.word(), "hidden": r.hidden, "strength": r.strength,
                 "achieved": r.achieved, "machine": r.machine, "rate_hz": r.rate, "right": r.right(),
                 "answer": r.answer_text(), "share": r.share(), "seconds": r.seconds,
+                "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
             })
         })
         .collect();

@@ -1,5 +1,6 @@
 //! The tool under test as the judge sees it: files in, the contract's report out.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::Value;
@@ -37,11 +38,21 @@ pub(crate) struct Named {
     pub(crate) parameters: Vec<(String, f64, Option<[f64; 2]>)>,
 }
 
+/// An effect that came through the tool's search, with the evidence that its confidence weighs; named or not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Weighed {
+    pub(crate) name: String,
+    pub(crate) class: Vec<String>,
+    pub(crate) evidence: BTreeMap<String, f64>,
+}
+
 /// What the judge reads of `diagnosis.json` and `patched-rig.toml`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
     pub(crate) verdict: String,
     pub(crate) effects: Vec<Named>,
+    /// For calibration only; another tool may have none.
+    pub(crate) weighed: Vec<Weighed>,
     /// Held-out force rmse under the refit and under the patched model.
     pub(crate) refit_holdout: f64,
     pub(crate) patched_holdout: f64,
@@ -74,8 +85,7 @@ pub(crate) fn read(report: &Value) -> Result<Answer, String> {
     let mut effects = Vec::new();
     for effect in list {
         let name = effect["name"].as_str().ok_or_else(|| missing("effects[].name"))?.to_string();
-        let class = effect["class"].as_array().ok_or_else(|| missing("effects[].class"))?;
-        let class = class.iter().filter_map(|v| v.as_str().map(String::from)).collect();
+        let class = strings(&effect["class"]).ok_or_else(|| missing("effects[].class"))?;
         let confidence = effect["confidence"].as_f64().ok_or_else(|| missing("effects[].confidence"))?;
         let mut parameters = Vec::new();
         for (key, p) in effect["parameters"].as_object().into_iter().flatten() {
@@ -92,11 +102,28 @@ pub(crate) fn read(report: &Value) -> Result<Answer, String> {
     Ok(Answer {
         verdict,
         effects,
+        weighed: weighed(report),
         refit_holdout: number(&report["fit"]["refit"]["holdout"]),
         patched_holdout: number(&report["fit"]["patched"]["holdout"]),
         bandwidth_hz: number(&report["residual_bandwidth_hz"]),
         gain: None,
     })
+}
+
+fn strings(list: &Value) -> Option<Vec<String>> {
+    Some(list.as_array()?.iter().filter_map(|v| v.as_str().map(String::from)).collect())
+}
+
+fn weighed(report: &Value) -> Vec<Weighed> {
+    let one = |hypothesis: &Value| {
+        let evidence = hypothesis["evidence"].as_object()?;
+        Some(Weighed {
+            name: hypothesis["name"].as_str()?.to_string(),
+            class: strings(&hypothesis["class"])?,
+            evidence: evidence.iter().filter_map(|(k, v)| Some((k.clone(), v.as_f64()?))).collect(),
+        })
+    };
+    report["hypotheses"].as_array().into_iter().flatten().filter_map(one).collect()
 }
 
 /// `gain` of `[actuator]`, read line by line: all that the judge needs of a rig file.
