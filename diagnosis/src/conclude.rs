@@ -347,7 +347,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         Verdict::MissingPhysics
     } else if excitation.is_one_speed() {
         Verdict::InsufficientExcitation
-    } else if disturbed && (carries || (understood && helps)) {
+    } else if (understood && helps) || (disturbed && carries) {
         Verdict::Unexplained
     } else if disturbed {
         Verdict::RandomDisturbance

@@ -28,7 +28,7 @@ pub(crate) struct Found {
     pub(crate) holdout: Gain,
     /// The same on the fitted recordings.
     pub(crate) fit: Gain,
-    /// Part of the refit's held-out residual above the sensor's noise that it explains.
+    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
     pub(crate) share: f64,
     /// Whether one of its values stands at the end of what is possible.
     pub(crate) at_bound: bool,
@@ -39,7 +39,7 @@ pub(crate) struct Found {
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
 
-/// Part of the refit's residual above the noise that an effect must explain on held-out recordings to be named.
+/// Part of the refit's residual above the noise that an effect must explain to be named.
 const SHARE: f64 = 0.05;
 /// Below this part it must also stand out by [`CERTAIN`]: the form of a larger effect is never quite right.
 const FAIR_SHARE: f64 = 0.1;
@@ -279,14 +279,25 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     let with = lay_all(last, bench.nominal, held, &last.noise);
     let with_fit = fit_costs(bench, last);
     let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
-    let square = |c: &Candidate, laid: &[Laid]| {
-        let totals: Vec<Total> = laid.iter().map(|l| l.total.clone()).collect();
+    let square = |c: &Candidate, tracks: &[Track], totals: &[Total]| {
         let inertia = crate::values::scale(bench.nominal, c).0;
-        estimator.rms(&residuals(&estimator, held, &totals, inertia), held).powi(2)
+        estimator.rms(&residuals(&estimator, tracks, totals, inertia), tracks).powi(2)
+    };
+    let on_fit = |c: &Candidate| square(c, bench.tracks, &c.fit.totals(bench.tracks));
+    let on_held = |c: &Candidate, laid: &[Laid]| {
+        square(c, held, &laid.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
     };
     let null = crate::fit::Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
     let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
-    let whole = square(&null, &lay_all(&null, bench.nominal, held, &last.noise));
+    let inertia = crate::values::scale(bench.nominal, last).0;
+    let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
+    let explainable = |whole: f64, tracks: &[Track]| {
+        let floor = (estimator.counting(tracks, &last.noise, count) * inertia).powi(2);
+        (whole - floor).max(0.02 * whole).max(1e-300)
+    };
+    let held_out = explainable(on_held(&null, &lay_all(&null, bench.nominal, held, &last.noise)), held);
+    let fitted = explainable(on_fit(&null), bench.tracks);
+    let (left_held_out, left_fitted) = (on_held(last, &with), on_fit(last));
     (0..last.model.effects.len())
         .map(|i| {
             let mut less = last.model.clone();
@@ -297,11 +308,9 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
             let laid = lay_all(&without, bench.nominal, held, &last.noise);
             let holdout = judge::compare(&with, &laid);
-            let (before, after) = (square(&without, &laid), square(last, &with));
-            let inertia = crate::values::scale(bench.nominal, last).0;
-            let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
-            let floor = (estimator.counting(held, &last.noise, count) * inertia).powi(2);
-            let share = (before - after) / (whole - floor).max(0.02 * whole).max(1e-300);
+            // What one recording hardly plays another may be made for.
+            let share = ((on_held(&without, &laid) - left_held_out) / held_out)
+                .max((on_fit(&without) - left_fitted) / fitted);
             let at_bound =
                 last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
                     *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
