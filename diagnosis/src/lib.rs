@@ -6,7 +6,7 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `conclude`, `confidence`, `patch`,
+//! `screen`, `periodic` and `select` (name), `judge` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `rivals`, `weigh` and `confidence` (how sure), `residuals`, `conclude`, `patch`,
 //! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
 
 // Matrices are read by row and column.
@@ -35,13 +35,16 @@ mod pipeline;
 mod prescribe;
 pub mod recording;
 pub mod report;
+mod residuals;
 pub mod rig;
+mod rivals;
 mod screen;
 mod select;
 mod solve;
 mod steps;
 mod track;
 mod values;
+mod weigh;
 
 pub use error::InputError;
 pub use locate::Map;

@@ -124,12 +124,13 @@ pub(crate) fn command_scale(nominal: &Nominal, tracks: &[Track]) -> f64 {
         square += track.command.iter().map(|u| u * u).sum::<f64>();
         rows += track.command.len() as f64;
     }
-    nominal.gain().abs() * (square / rows).sqrt().max(1e-12)
+    let gain = nominal.anchor.map_or(nominal.gain(), |anchor| anchor.0);
+    gain.abs() * (square / rows).sqrt().max(1e-12)
 }
 
 /// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
 pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit) {
-    let scale = command_scale(nominal, tracks);
+    let mut scale = command_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
@@ -141,6 +142,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit
         if round == 0 && nominal.gain_sd() > LOOSE {
             let white = noise::estimate(tracks, &totals, &noise, scale, Colour::White);
             anchor(nominal, &Fit::new(&model, nominal, tracks, &white));
+            scale = command_scale(nominal, tracks);
             fit = Fit::new(&model, nominal, tracks, &noise);
         }
         let totals = fit.totals(tracks);

@@ -14,6 +14,7 @@ use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::select::{Bench, Candidate, MOST};
 use crate::track::{Total, Track};
+use crate::values;
 
 /// Least gain of log-likelihood under coloured noise, after the cost of freedom, for an effect to be looked at on.
 pub(crate) const WORTH: f64 = 6.0;
@@ -211,36 +212,50 @@ pub(crate) fn search(
         white = finalist;
     }
     progress("judging on held-out recordings", 0.8);
-    let mut model = white.model.clone();
-    let mut last = bench.fit_slow(model.clone(), &[&slow_noise, &white.noise]);
-    let mut found;
-    // Whatever does not carry to the held-out recordings goes, the weakest first, until all that is left does.
-    loop {
-        let plain = bench.fit(model.clone(), &white.noise, Colour::White);
-        found = judge_all(&bench, &plain, &held);
-        let weakest = found
-            .iter()
-            .enumerate()
-            .filter_map(|(i, f)| f.weakness().map(|reason| (i, f.holdout.z, reason)))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((i, _, reason)) = weakest else { break };
-        lost.push((model.effects[i].name, found[i].holdout.sum, reason));
-        model.effects.remove(i);
-        last = bench.fit_slow(model.clone(), &[&null_slow.noise, &white.noise]);
-    }
-    if !model.effects.is_empty() {
-        smooth_held(&last, &nominal, &mut held, scale);
-    }
-    Ok(Search {
+    let last = bench.fit_slow(white.model.clone(), &[&slow_noise, &white.noise]);
+    let mut s = Search {
         nominal: nominal.clone(),
-        fit_tracks: tracks.clone(),
-        held_tracks: held,
+        fit_tracks: Vec::new(),
+        held_tracks: Vec::new(),
         span: span.clone(),
         null: null_slow,
         last,
-        found,
+        found: Vec::new(),
         lost,
-    })
+    };
+    prune(&mut s, &bench, &held, &white.noise);
+    if !s.last.model.effects.is_empty() {
+        smooth_held(&s.last, &nominal, &mut held, scale);
+    }
+    (s.fit_tracks, s.held_tracks) = (tracks, held);
+    Ok(s)
+}
+
+/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and
+/// judges that; `noise` is white.
+pub(crate) fn prune(s: &mut Search, bench: &Bench, held: &[Track], noise: &Noise) {
+    loop {
+        let plain = bench.fit(s.last.model.clone(), noise, Colour::White);
+        s.found = judge_all(bench, &plain, held);
+        let absent = |i: usize, name| {
+            let is_there = values::is_there(name, &values::parameters(bench, &plain, i));
+            (!is_there).then(|| "its size cannot be told from zero".to_owned())
+        };
+        let weakest = s
+            .found
+            .iter()
+            .enumerate()
+            .filter_map(|(i, f)| {
+                let reason = f.weakness().or_else(|| absent(i, f.effect.name))?;
+                Some((i, f.holdout.z, reason))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _, reason)) = weakest else { return };
+        s.lost.push((s.found[i].effect.name, s.found[i].holdout.sum, reason));
+        let mut model = s.last.model.clone();
+        model.effects.remove(i);
+        s.last = bench.fit_slow(model, &[&s.null.noise, noise]);
+    }
 }
 
 /// Candidates whose gain is this part of the best one's are near ties.
@@ -256,7 +271,7 @@ fn order_near_ties(bench: &Bench, before: f64, finalists: &mut [Candidate]) {
     }
     let estimator = Estimator::new(bench.tracks, &finalists[0].noise, bench.scale);
     let left = |c: &Candidate| {
-        let inertia = crate::values::scale(bench.nominal, c).0;
+        let inertia = values::scale(bench.nominal, c).0;
         let totals = c.fit.totals(bench.tracks);
         estimator.rms(&residuals(&estimator, bench.tracks, &totals, inertia), bench.tracks)
     };
@@ -280,7 +295,7 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     let with_fit = fit_costs(bench, last);
     let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
     let square = |c: &Candidate, tracks: &[Track], totals: &[Total]| {
-        let inertia = crate::values::scale(bench.nominal, c).0;
+        let inertia = values::scale(bench.nominal, c).0;
         estimator.rms(&residuals(&estimator, tracks, totals, inertia), tracks).powi(2)
     };
     let on_fit = |c: &Candidate| square(c, bench.tracks, &c.fit.totals(bench.tracks));
@@ -289,7 +304,7 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     };
     let null = crate::fit::Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
     let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
-    let inertia = crate::values::scale(bench.nominal, last).0;
+    let inertia = values::scale(bench.nominal, last).0;
     let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
     let explainable = |whole: f64, tracks: &[Track]| {
         let floor = (estimator.counting(tracks, &last.noise, count) * inertia).powi(2);

@@ -115,6 +115,14 @@ pub(crate) fn shape_sd(bench: &Bench, candidate: &Candidate, effect: usize, key:
     step
 }
 
+/// Whether at least one of the values that say how large an effect is cannot be zero.
+pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> bool {
+    let drifts = matches!(name, N::FrictionDrift | N::GainDrift);
+    let where_or_when = |key: &str| key.starts_with("period") || (drifts && key == "time_constant");
+    parameters.is_empty()
+        || parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
+}
+
 /// The parameters of an effect of a fitted model.
 pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) -> BTreeMap<String, Parameter> {
     let nominal = bench.nominal;

@@ -1,0 +1,110 @@
+//! Residual forces as people see them: under the nominal, the refitted and the patched model, and what one takes from
+//! the other.
+
+use crate::estimate::Estimator;
+use crate::judge;
+use crate::model::{Nominal, total};
+use crate::pipeline::lay_all;
+use crate::select::Candidate;
+use crate::track::{Total, Track};
+use crate::values;
+
+/// Residual force of one model over recordings.
+fn forces(estimator: &Estimator, tracks: &[Track], totals: &[Total], inertia: f64) -> Vec<Vec<f64>> {
+    crate::pipeline::residuals(estimator, tracks, totals, inertia)
+}
+
+/// Residual force per recording and block under the three models, and the drive's force, all by one estimator.
+pub(crate) struct Residuals {
+    pub(crate) force: Vec<Vec<f64>>,
+    pub(crate) nominal: Vec<Vec<f64>>,
+    pub(crate) refit: Vec<Vec<f64>>,
+    pub(crate) patched: Vec<Vec<f64>>,
+}
+
+/// The residuals of some recordings; `held` where offsets and phases are not fitted.
+pub(crate) fn residuals(
+    nominal: &Nominal,
+    estimator: &Estimator,
+    tracks: &[Track],
+    held: bool,
+    refit: &Candidate,
+    patched: &Candidate,
+) -> Residuals {
+    let model = crate::model::Model::default();
+    let plain = Nominal { anchor: None, ..nominal.clone() };
+    let at_nominal: Vec<Total> = tracks
+        .iter()
+        .map(|track| {
+            let columns = model.columns(&plain, track, &patched.noise);
+            let theta: Vec<f64> = columns.iter().map(|c| c.prior.mean).collect();
+            total(track, &columns, &theta)
+        })
+        .collect();
+    let drive: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
+    let lay = |c: &Candidate| -> Vec<Total> {
+        if held {
+            lay_all(c, nominal, tracks, &c.noise).into_iter().map(|laid| laid.total).collect()
+        } else {
+            c.fit.totals(tracks)
+        }
+    };
+    let j0 = nominal.rig.model.inertia;
+    let all = forces(estimator, tracks, &none, j0);
+    let less = forces(estimator, tracks, &drive, j0);
+    let force = all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+    Residuals {
+        force,
+        nominal: forces(estimator, tracks, &at_nominal, j0),
+        refit: forces(estimator, tracks, &lay(refit), values::scale(nominal, refit).0),
+        patched: forces(estimator, tracks, &lay(patched), values::scale(nominal, patched).0),
+    }
+}
+
+/// Part of the force that a refit must take from the held-out residual before values are called wrong.
+const REFIT_MATTERS: f64 = 0.02;
+
+/// Whether other values explain held-out recordings better than the rig's own, each recording's bias left aside.
+pub(crate) fn refit_matters(estimator: &Estimator, tracks: &[Track], held: &Residuals, force: f64) -> bool {
+    let unbiased = |residuals: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let centred = |(x, track): (&Vec<f64>, &Track)| {
+            let moving = estimator.moving(track);
+            let (sum, n) =
+                x.iter().zip(&moving).filter(|(_, m)| **m).fold((0.0, 0.0), |a, (x, _)| (a.0 + x, a.1 + 1.0));
+            let mean = if n > 0.0 { sum / n } else { 0.0 };
+            x.iter().map(|x| x - mean).collect()
+        };
+        residuals.iter().zip(tracks).map(centred).collect()
+    };
+    let (before, after) = (unbiased(&held.nominal), unbiased(&held.refit));
+    let taken = estimator.rms(&before, tracks).powi(2) - estimator.rms(&after, tracks).powi(2);
+    taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after)[0] > 0.0
+}
+
+/// Interval of the relative reduction of the held-out mean square.
+pub(crate) fn relative_gain(
+    estimator: &Estimator,
+    tracks: &[Track],
+    before: &[Vec<f64>],
+    after: &[Vec<f64>],
+) -> [f64; 2] {
+    let mut gains = Vec::new();
+    let mut whole = 0.0;
+    for ((track, a), b) in tracks.iter().zip(before).zip(after) {
+        let moving = estimator.moving(track);
+        for w in track.segments.windows(2) {
+            let mut gain = 0.0;
+            for j in w[0]..w[1] {
+                if moving[j] {
+                    gain += a[j] * a[j] - b[j] * b[j];
+                    whole += a[j] * a[j];
+                }
+            }
+            gains.push(gain);
+        }
+    }
+    let gain = judge::bootstrap(&gains);
+    // Nothing can take more than there is; some resamplings of few segments would.
+    if whole > 0.0 { [gain.low, gain.high].map(|x| (x / whole).min(1.0)) } else { [0.0, 0.0] }
+}

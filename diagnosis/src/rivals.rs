@@ -1,0 +1,142 @@
+//! Rivals: every effect found is taken out, others are fitted in its place, and how far they stay behind makes its class.
+
+use crate::effects::{Effect, EffectName};
+use crate::excitation::Excitation;
+use crate::fit::Fit;
+use crate::judge;
+use crate::kalman::tolerant;
+use crate::model::Nominal;
+use crate::noise::Colour;
+use crate::pipeline::{Found, Rival, lay_all};
+use crate::select::{Bench, Candidate};
+use crate::track::Track;
+
+/// How many rivals of each effect are fitted in full.
+const RIVALS: usize = 4;
+/// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
+const BEHIND_Z: f64 = 2.0;
+const BEHIND: f64 = 3.0;
+/// The same as a part of what the effect explains: less is the form of a law rather than its name.
+const BEHIND_PART: f64 = 0.015;
+/// A rival this far behind in log-likelihood under a slow disturbance, and by half of what the winner gains there, is
+/// behind, and counts as by this many standard errors.
+const BEHIND_SLOW: f64 = 30.0;
+const BEHIND_SLOW_Z: f64 = 4.0;
+/// Most effects that a class may hold.
+const MOST_IN_CLASS: usize = 3;
+/// Standard errors behind within which a rival's shape is worth polishing.
+const WITHIN_REACH: f64 = 8.0;
+
+/// Costs per segment on fitted and held-out recordings under one noise.
+fn costs(candidate: &Candidate, nominal: &Nominal, held: &[Track]) -> Vec<f64> {
+    let mut out = Vec::new();
+    for (one, places) in candidate.fit.prepared.iter().zip(&candidate.fit.places) {
+        for (square, (weight, count)) in
+            one.squares(places, &candidate.fit.solution.x).iter().zip(one.weights())
+        {
+            out.push(0.5 * count * tolerant(square / weight / count).0);
+        }
+    }
+    for laid in lay_all(candidate, nominal, held, &candidate.noise) {
+        out.extend(laid.costs);
+    }
+    out
+}
+
+/// The search for waves is dear, and only waves are like waves.
+fn is_periodic(name: EffectName) -> bool {
+    matches!(name, EffectName::Cogging | EffectName::TorqueRipple)
+}
+
+/// Fits the rivals of each effect in its place and says how far behind they are.
+pub(crate) fn fit_rivals(
+    bench: &Bench,
+    last: &Candidate,
+    slow: &Candidate,
+    held: &[Track],
+    found: &mut [Found],
+) {
+    let best = bench.fit(last.model.clone(), &last.noise, Colour::White);
+    let own = costs(&best, bench.nominal, held);
+    for i in 0..found.len() {
+        let mut less = best.model.clone();
+        less.effects.remove(i);
+        let name = best.model.effects[i].name;
+        let base_fit = Fit::new(&less, bench.nominal, bench.tracks, &best.noise);
+        let base = Candidate { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
+        let mut out: Vec<Rival> = Vec::new();
+        let periodic =
+            is_periodic(name) || matches!(name, EffectName::MassImbalance | EffectName::EncoderEccentricity);
+        let others: Vec<(Effect, f64)> = bench
+            .screen(&base, &|other| other != name && (periodic || !is_periodic(other)))
+            .into_iter()
+            .take(RIVALS)
+            .collect();
+        // Needed only where a rival comes near, and the same for all of them.
+        let mut without = None;
+        for (effect, _) in others {
+            let mut model = base.model.clone();
+            model.effects.push(effect.clone());
+            let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
+            let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
+            let lead = |rival: &Candidate| {
+                let theirs = costs(rival, bench.nominal, held);
+                judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
+            };
+            let mut gain = lead(&rival);
+            if gain.z < WITHIN_REACH {
+                // A rival that may be near is fitted as well as the winner was.
+                let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
+                let again = lead(&polished);
+                if again.sum < gain.sum {
+                    gain = again;
+                }
+            }
+            let mut rival = Rival { name: effect.name, z: gain.z, lead: gain.sum };
+            if rival.z < BEHIND_Z {
+                // What only a white noise takes for as good is behind.
+                let mut model = base.model.clone();
+                model.effects.push(effect.clone());
+                let theirs = bench.fit_slow(model, &[&slow.noise]).merit;
+                let without =
+                    *without.get_or_insert_with(|| bench.fit_slow(base.model.clone(), &[&slow.noise]).merit);
+                let behind = slow.merit - theirs;
+                if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
+                    rival.z = BEHIND_SLOW_Z;
+                    rival.lead = rival.lead.max(behind);
+                }
+            }
+            out.push(rival);
+        }
+        found[i].rivals = out;
+    }
+}
+
+/// Every effect that these recordings cannot tell from the one found, itself first.
+pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -> Vec<EffectName> {
+    let name = found.effect.name;
+    let mut class = vec![name];
+    // What no recording of motion tells apart: a drive that clips and a roller that slips at a constant force.
+    match name {
+        EffectName::CommandSaturation => class.push(EffectName::RollerSlip),
+        EffectName::RollerSlip => class.push(EffectName::CommandSaturation),
+        // A spring that explains little of what it should explain may well have a gap.
+        EffectName::DriveCompliance if leaves_much => class.push(EffectName::Backlash),
+        _ => {}
+    }
+    class.extend(excitation.twin(name).filter(|twin| !class.contains(twin)));
+    let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
+    let mut near: Vec<&Rival> = found.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < least).collect();
+    near.sort_by(|a, b| a.z.total_cmp(&b.z));
+    for rival in near {
+        if class.len() < MOST_IN_CLASS && !class.contains(&rival.name) {
+            class.push(rival.name);
+        }
+    }
+    class
+}
+
+/// Standard errors that the nearest rival outside an effect's class is behind.
+pub(crate) fn nearest(found: &Found, class: &[EffectName]) -> f64 {
+    found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(f64::INFINITY, f64::min)
+}

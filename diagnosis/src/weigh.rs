@@ -1,0 +1,147 @@
+//! How sure each effect found is. What is too unsure goes, and the rest is weighed again without it: a false companion
+//! takes from a true effect what speaks for it.
+
+use crate::confidence::{self, Evidence, Leftover};
+use crate::effects::EffectName;
+use crate::estimate::Estimator;
+use crate::excitation::Excitation;
+use crate::model::Model;
+use crate::noise::Colour;
+use crate::pipeline::{Found, Search, prune};
+use crate::report::{Both, FitTable, Parameter};
+use crate::residuals::{Residuals, relative_gain, residuals};
+use crate::rivals;
+use crate::select::{Bench, Candidate};
+use crate::track::Track;
+use crate::values;
+use std::collections::BTreeMap;
+
+/// Least probability with which an effect is named.
+const NAMED: f64 = 0.5;
+/// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
+/// two it must leave less than this part of what the refit left.
+const LITTLE_FORCE: f64 = 0.12;
+const MUCH_FORCE: f64 = 0.5;
+const MUCH_OF_REFIT: f64 = 0.65;
+/// Part of the refit's mean square that a spring leaves where it may well be a gap.
+const LEAVES_MUCH: f64 = 0.3;
+
+/// One effect with what speaks for and against it.
+pub(crate) struct Weighed {
+    pub(crate) found: Found,
+    pub(crate) class: Vec<EffectName>,
+    pub(crate) evidence: Evidence,
+    pub(crate) confidence: f64,
+    pub(crate) parameters: BTreeMap<String, Parameter>,
+    pub(crate) is_there: bool,
+}
+
+/// The model that stands, its effects weighed, and its residuals.
+pub(crate) struct Weighing {
+    pub(crate) effects: Vec<Weighed>,
+    pub(crate) patched: Candidate,
+    pub(crate) estimator: Estimator,
+    pub(crate) on_fit: Residuals,
+    pub(crate) on_held: Residuals,
+    pub(crate) table: FitTable,
+    /// What reading whole counts alone puts into the residual, N·m or N.
+    pub(crate) floor: f64,
+    /// Whether the model leaves little enough of the force to have understood it.
+    pub(crate) understood: bool,
+}
+
+impl Weighing {
+    /// Why an effect is not named, if it is not.
+    pub(crate) fn doubt(&self, weighed: &Weighed) -> Option<String> {
+        if !self.understood {
+            Some("with it the model still leaves too much of the force to have understood it".into())
+        } else if !weighed.is_there {
+            Some("its size cannot be told from zero".into())
+        } else if weighed.confidence < NAMED {
+            Some(unsure(weighed.confidence))
+        } else {
+            None
+        }
+    }
+}
+
+fn unsure(confidence: f64) -> String {
+    format!("it is right with a probability of only {confidence:.2}")
+}
+
+/// Weighs what the search found until nothing unsure stands beside something else.
+pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
+    let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
+    loop {
+        let weighing = once(s, bench, &refit, held, excitation);
+        let least =
+            weighing.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
+        let Some((i, least)) = least.filter(|(_, e)| e.confidence < NAMED && weighing.effects.len() > 1)
+        else {
+            return weighing;
+        };
+        s.lost.push((least.found.effect.name, least.found.holdout.sum, unsure(least.confidence)));
+        let mut model = s.last.model.clone();
+        model.effects.remove(i);
+        s.last = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
+        prune(s, bench, held, &weighing.patched.noise);
+    }
+}
+
+fn once(
+    s: &mut Search,
+    bench: &Bench,
+    refit: &Candidate,
+    held: &[Track],
+    excitation: &Excitation,
+) -> Weighing {
+    let nominal = bench.nominal;
+    let mut found = std::mem::take(&mut s.found);
+    let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
+    rivals::fit_rivals(bench, &patched, &s.last, held, &mut found);
+    let estimator = Estimator::new(bench.tracks, &patched.noise, bench.scale);
+    let on_fit = residuals(nominal, &estimator, bench.tracks, false, refit, &patched);
+    let on_held = residuals(nominal, &estimator, held, true, refit, &patched);
+    let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
+        fit: estimator.rms(a, bench.tracks),
+        holdout: estimator.rms(b, held),
+    };
+    let (inertia, _, _) = values::scale(nominal, &patched);
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
+    let table = FitTable {
+        metric: "force_rmse".into(),
+        unit: nominal.rig.kind.force().into(),
+        nominal: both(&on_fit.nominal, &on_held.nominal),
+        refit: both(&on_fit.refit, &on_held.refit),
+        patched: both(&on_fit.patched, &on_held.patched),
+        force_rms: both(&on_fit.force, &on_held.force),
+        holdout_gain_ci95: relative_gain(&estimator, held, &on_held.refit, &on_held.patched),
+    };
+    // What is left and hangs together over time, against what the effects explain: if most of it is left, the names
+    // stand for something else.
+    let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
+    let left = s.last.noise.slow * inertia * inertia;
+    let leftover = Leftover {
+        of_explained: if explained > 0.0 { left / explained } else { 0.0 },
+        of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
+        unexplained: table.patched.holdout / table.refit.holdout.max(1e-300),
+    };
+    let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
+    let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
+    let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
+    let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
+    let effects = found
+        .into_iter()
+        .enumerate()
+        .map(|(i, found)| {
+            let class = rivals::class(&found, excitation, leaves_much);
+            let evidence = confidence::evidence(&found, rivals::nearest(&found, &class), leftover);
+            let parameters = values::parameters(bench, &patched, i);
+            let is_there = values::is_there(found.effect.name, &parameters);
+            let confidence = confidence::confidence(&evidence);
+            Weighed { found, class, evidence, confidence, parameters, is_there }
+        })
+        .collect();
+    Weighing { effects, patched, estimator, on_fit, on_held, table, floor, understood }
+}
