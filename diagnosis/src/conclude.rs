@@ -16,6 +16,8 @@ use std::collections::BTreeMap;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
 const FOREIGN: f64 = 0.85;
+/// Part of the force that a model leaves at the most where it explains nearly all.
+const NEARLY_ALL: f64 = 0.12;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
 /// Part of the refit's mean square that doubtful effects must leave at the most for the mismatch to be called repeatable.
@@ -74,10 +76,12 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         !weighing.effects.is_empty() && table.patched.holdout.powi(2) < REPEATS * table.refit.holdout.powi(2);
     let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
     let refit_matters = refit_matters(estimator, &held_tracks, on_held, table.force_rms.holdout);
-    // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something.
+    // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something, unless what was
+    // found explains nearly all.
     let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
-    let foreign =
-        judged.holdout > FOREIGN * table.force_rms.holdout && judged.fit > FOREIGN * table.force_rms.fit;
+    let foreign = judged.holdout > FOREIGN * table.force_rms.holdout
+        && judged.fit > FOREIGN * table.force_rms.fit
+        && table.patched.holdout > NEARLY_ALL * table.force_rms.holdout;
     if foreign {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,

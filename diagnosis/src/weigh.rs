@@ -51,6 +51,12 @@ pub(crate) struct Weighing {
 }
 
 impl Weighing {
+    /// Confidence of the surest effect, if the model has understood the recordings.
+    fn surest(&self) -> f64 {
+        let all = self.effects.iter().map(|e| e.confidence).filter(|_| self.understood);
+        all.fold(0.0, f64::max)
+    }
+
     /// Why an effect is not named, if it is not.
     pub(crate) fn doubt(&self, weighed: &Weighed) -> Option<String> {
         if !self.understood {
@@ -69,22 +75,29 @@ fn unsure(confidence: f64) -> String {
     format!("it is right with a probability of only {confidence:.2}")
 }
 
-/// Weighs what the search found until nothing unsure stands beside something else.
+/// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
+    let mut best = once(s, bench, &refit, held, excitation);
     loop {
-        let weighing = once(s, bench, &refit, held, excitation);
-        let least =
-            weighing.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
-        let Some((i, least)) = least.filter(|(_, e)| e.confidence < NAMED && weighing.effects.len() > 1)
-        else {
-            return weighing;
+        let least = best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
+        let Some((i, least)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
+            return best;
         };
-        s.lost.push((least.found.effect.name, least.found.holdout.sum, unsure(least.confidence)));
+        let dropped = (least.found.effect.name, least.found.holdout.sum, unsure(least.confidence));
         let mut model = s.last.model.clone();
         model.effects.remove(i);
-        s.last = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
-        prune(s, bench, held, &weighing.patched.noise);
+        let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
+        let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
+        s.lost.push(dropped);
+        prune(s, bench, held, &best.patched.noise);
+        let next = once(s, bench, &refit, held, excitation);
+        if next.surest() <= best.surest() {
+            s.last = before;
+            s.lost.truncate(known);
+            return best;
+        }
+        best = next;
     }
 }
 
