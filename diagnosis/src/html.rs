@@ -2,8 +2,9 @@
 //! would be one too many.
 
 use crate::locate::Map;
-use crate::outcome::{Outcome, Series, short};
+use crate::outcome::{Outcome, Series, short, unit};
 use crate::report::{Named, Verdict};
+use crate::rig::Kind;
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("report.css");
@@ -79,12 +80,12 @@ fn what(out: &mut String, outcome: &Outcome) {
     }
     out.push_str("<section><h2>What was left out</h2>");
     for effect in &r.effects {
-        one(out, effect);
+        one(out, effect, outcome.evidence.kind);
     }
     out.push_str("</section>");
 }
 
-fn one(out: &mut String, effect: &Named) {
+fn one(out: &mut String, effect: &Named, kind: Kind) {
     let _ = write!(
         out,
         "<article><h3>{} <em>{:.0} % sure</em></h3><p><code>{}</code>, in the {}</p>",
@@ -113,10 +114,11 @@ fn one(out: &mut String, effect: &Named) {
     for region in &effect.place.states {
         let _ = write!(
             out,
-            "<p>Shows most for {} between {} and {}.</p>",
+            "<p>Shows most for {} between {} and {}{}.</p>",
             safe(&region.variable),
             short(region.low),
-            short(region.high)
+            short(region.high),
+            safe(&unit(&region.variable, kind))
         );
     }
     if effect.class.len() > 1 {
@@ -131,7 +133,7 @@ fn one(out: &mut String, effect: &Named) {
 
 const WIDE: f64 = 900.0;
 const HIGH: f64 = 190.0;
-const LEFT: f64 = 92.0;
+const LEFT: f64 = 136.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 32.0;
 

@@ -137,7 +137,8 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
     }
 }
 
-fn unit(variable: &str, kind: Kind) -> String {
+/// The unit of a variable of a region, with a space before it.
+pub(crate) fn unit(variable: &str, kind: Kind) -> String {
     match variable {
         "speed" => format!(" {}/s", kind.length()),
         "travel" | "angle" => format!(" {}", kind.length()),
