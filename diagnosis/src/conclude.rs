@@ -11,7 +11,7 @@ use crate::prescribe;
 use crate::report::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
 use crate::residuals::refit_matters;
 use crate::select::Bench;
-use crate::weigh::{Weighing, weigh};
+use crate::weigh::{Weighed, Weighing, weigh};
 use std::collections::BTreeMap;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
@@ -39,17 +39,17 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     s.fit_tracks = fit_tracks.clone();
     let mut effects: Vec<(f64, Named)> = Vec::new();
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
+    let hypothesis = |weighed: &Weighed| Hypothesis {
+        name: weighed.found.effect.name,
+        holdout_gain: weighed.found.holdout.sum,
+        evidence: (*understood && weighed.is_there).then(|| weighed.evidence.clone()),
+        class: weighed.class.clone(),
+        rejected_because: weighing.doubt(weighed),
+    };
+    hypotheses.extend(weighing.effects.iter().chain(&weighing.dropped).map(hypothesis));
     for (i, weighed) in weighing.effects.iter().enumerate() {
         let (found, name) = (&weighed.found, weighed.found.effect.name);
-        let doubt = weighing.doubt(weighed);
-        hypotheses.push(Hypothesis {
-            name,
-            holdout_gain: found.holdout.sum,
-            evidence: (*understood && weighed.is_there).then(|| weighed.evidence.clone()),
-            class: weighed.class.clone(),
-            rejected_because: doubt.clone(),
-        });
-        if doubt.is_some() {
+        if weighing.doubt(weighed).is_some() {
             continue;
         }
         let named = Named {

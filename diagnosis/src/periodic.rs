@@ -177,7 +177,7 @@ fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<u
             break;
         };
         // A later order must also be a fair part of what the first ones brought.
-        if best - gain < PER_ORDER + looked || best - gain < 0.004 * best {
+        if best - gain < PER_ORDER + looked || best - gain < 0.002 * best {
             break;
         }
         gain = best;

@@ -50,8 +50,8 @@ const CERTAIN: f64 = 6.0;
 
 impl Found {
     /// Whether it stands out of every stretch of every recording, however little it explains beside larger effects.
-    fn is_small_but_certain(&self) -> bool {
-        self.share >= LEAST_SHARE && self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
+    pub(crate) fn is_certain(&self) -> bool {
+        self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
     }
 
     /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
@@ -67,7 +67,7 @@ impl Found {
         if self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0 {
             return Some("its gain rests on few moments of the fitted recordings".into());
         }
-        if self.share < SHARE && !self.is_small_but_certain() {
+        if self.share < SHARE && !(self.share >= LEAST_SHARE && self.is_certain()) {
             return Some(format!(
                 "it explains {:.1} % of what the noise leaves, less than 5 %",
                 100.0 * self.share

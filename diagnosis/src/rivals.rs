@@ -14,7 +14,7 @@ use crate::track::Track;
 /// How many rivals of each effect are fitted in full.
 const RIVALS: usize = 4;
 /// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
-const BEHIND_Z: f64 = 2.0;
+pub(crate) const BEHIND_Z: f64 = 2.0;
 const BEHIND: f64 = 3.0;
 /// The same as a part of what the effect explains: less is the form of a law rather than its name.
 const BEHIND_PART: f64 = 0.015;

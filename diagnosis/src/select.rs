@@ -39,6 +39,8 @@ const FINALISTS: usize = 8;
 const POLISHED: usize = 3;
 /// Factors at which optima are looked for that lie apart.
 const APART: [f64; 8] = [0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.4];
+/// How often waves are looked for again under the noise that they leave.
+const SEARCHES: usize = 3;
 /// Most effects that are named together.
 pub(crate) const MOST: usize = 3;
 
@@ -201,9 +203,33 @@ impl Bench<'_> {
         candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     }
 
+    /// Looks for waves again under the noise that those found first have left: weak ones hide in the noise of a null that
+    /// knows of none.
+    fn search_waves_again(&self, candidate: &Candidate) -> Candidate {
+        let again = |from: &Candidate| {
+            let mut model = from.model.clone();
+            let name = model.effects.pop()?.name;
+            let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
+            let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
+            let (effect, _) =
+                periodic::search(name, &base, &residuals, &model, self.tracks, self.span, self.nominal)?;
+            model.effects.push(effect);
+            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
+        };
+        let mut best = self.fit(candidate.model.clone(), &candidate.noise, Colour::White);
+        for _ in 0..SEARCHES {
+            let Some(found) = again(&best) else { break };
+            best = found;
+        }
+        best
+    }
+
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
     pub(crate) fn polish_one(&self, candidate: &Candidate) -> Candidate {
         let last = candidate.model.effects.len() - 1;
+        if matches!(candidate.model.effects[last].name, N::Cogging | N::TorqueRipple) {
+            return self.search_waves_again(candidate);
+        }
         let mut model = candidate.model.clone();
         let merit =
             |model: &Model| Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood;

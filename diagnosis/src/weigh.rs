@@ -16,8 +16,10 @@ use crate::track::Track;
 use crate::values;
 use std::collections::BTreeMap;
 
-/// Least probability with which an effect is named.
-const NAMED: f64 = 0.5;
+/// Least probability with which an effect is named: two to one.
+const NAMED: f64 = 2.0 / 3.0;
+/// Probability of a name where more effects are as near than a class may hold.
+const UNDECIDED: f64 = 0.5;
 /// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
 /// two it must leave less than this part of what the refit left.
 const LITTLE_FORCE: f64 = 0.12;
@@ -39,6 +41,8 @@ pub(crate) struct Weighed {
 /// The model that stands, its effects weighed, and its residuals.
 pub(crate) struct Weighing {
     pub(crate) effects: Vec<Weighed>,
+    /// What went because it was unsure.
+    pub(crate) dropped: Vec<Weighed>,
     pub(crate) patched: Candidate,
     pub(crate) estimator: Estimator,
     pub(crate) on_fit: Residuals,
@@ -84,19 +88,22 @@ pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &
         let Some((i, least)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
             return best;
         };
-        let dropped = (least.found.effect.name, least.found.holdout.sum, unsure(least.confidence));
+        let (name, gain, reason) =
+            (least.found.effect.name, least.found.holdout.sum, unsure(least.confidence));
         let mut model = s.last.model.clone();
         model.effects.remove(i);
         let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
-        s.lost.push(dropped);
+        s.lost.push((name, gain, reason));
         prune(s, bench, held, &best.patched.noise);
-        let next = once(s, bench, &refit, held, excitation);
+        let mut next = once(s, bench, &refit, held, excitation);
         if next.surest() <= best.surest() {
             s.last = before;
             s.lost.truncate(known);
             return best;
         }
+        next.dropped = best.dropped;
+        next.dropped.push(best.effects.remove(i));
         best = next;
     }
 }
@@ -149,12 +156,15 @@ fn once(
         .enumerate()
         .map(|(i, found)| {
             let class = rivals::class(&found, excitation, leaves_much);
-            let evidence = confidence::evidence(&found, rivals::nearest(&found, &class), leftover);
+            let nearest = rivals::nearest(&found, &class);
+            let evidence = confidence::evidence(&found, nearest, leftover);
             let parameters = values::parameters(bench, &patched, i);
             let is_there = values::is_there(found.effect.name, &parameters);
-            let confidence = confidence::confidence(&evidence);
+            // More that explain it as well than a class holds: nothing is decided.
+            let most = if nearest < rivals::BEHIND_Z { UNDECIDED } else { 1.0 };
+            let confidence = confidence::confidence(&evidence).min(most);
             Weighed { found, class, evidence, confidence, parameters, is_there }
         })
         .collect();
-    Weighing { effects, patched, estimator, on_fit, on_held, table, floor, understood }
+    Weighing { effects, dropped: Vec::new(), patched, estimator, on_fit, on_held, table, floor, understood }
 }
