@@ -36,6 +36,8 @@ pub(crate) struct Weighed {
     pub(crate) confidence: f64,
     pub(crate) parameters: BTreeMap<String, Parameter>,
     pub(crate) is_there: bool,
+    /// Whether more effects than a class may hold explain it as well.
+    pub(crate) undecided: bool,
 }
 
 /// The model that stands, its effects weighed, and its residuals.
@@ -67,6 +69,8 @@ impl Weighing {
             Some("with it the model still leaves too much of the force to have understood it".into())
         } else if !weighed.is_there {
             Some("its size cannot be told from zero".into())
+        } else if weighed.undecided {
+            Some("more effects than a class may hold explain it as well".into())
         } else if weighed.confidence < NAMED {
             Some(unsure(weighed.confidence))
         } else {
@@ -160,10 +164,10 @@ fn once(
             let evidence = confidence::evidence(&found, nearest, leftover);
             let parameters = values::parameters(bench, &patched, i);
             let is_there = values::is_there(found.effect.name, &parameters);
-            // More that explain it as well than a class holds: nothing is decided.
-            let most = if nearest < rivals::BEHIND_Z { UNDECIDED } else { 1.0 };
+            let undecided = nearest < rivals::BEHIND_Z;
+            let most = if undecided { UNDECIDED } else { 1.0 };
             let confidence = confidence::confidence(&evidence).min(most);
-            Weighed { found, class, evidence, confidence, parameters, is_there }
+            Weighed { found, class, evidence, confidence, parameters, is_there, undecided }
         })
         .collect();
     Weighing { effects, dropped: Vec::new(), patched, estimator, on_fit, on_held, table, floor, understood }
