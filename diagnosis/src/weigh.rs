@@ -147,7 +147,7 @@ fn once(
     let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = Leftover {
-        of_explained: if explained > 0.0 { left / explained } else { 0.0 },
+        of_explained: if explained > 0.0 { left / explained } else { f64::INFINITY },
         of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
         unexplained: table.patched.holdout / table.refit.holdout.max(1e-300),
     };
