@@ -60,6 +60,18 @@ fn the_default_is_a_venepuncture_with_two_punctures() {
 }
 
 #[test]
+fn a_wall_is_pressed_then_gives_way_then_rubs() {
+    let mut c = started(&Config::default());
+    let (mut at, mut states) = (0.0, Vec::new());
+    travel(&mut c, &mut at, 10.0, 10.0, |out| states.push(out.sample.state));
+    states.dedup();
+    let one_wall = [State::Elastic, State::Puncture, State::Friction].map(|state| state as u8);
+    // The skin begins at depth zero, and behind it is the vessel.
+    assert_eq!(states, [one_wall, one_wall].concat());
+    assert_eq!(hold(&mut c, at, 0.1).sample.state, State::Friction as u8, "at rest");
+}
+
+#[test]
 fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
     for (law, held) in [(Config::default().friction, true), (paper(), false)] {
         let mut c = started(&Config { friction: law, ..Config::default() });
