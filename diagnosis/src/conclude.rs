@@ -11,13 +11,11 @@ use crate::prescribe;
 use crate::report::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
 use crate::residuals::refit_matters;
 use crate::select::Bench;
-use crate::weigh::{Weighed, Weighing, weigh};
+use crate::weigh::{LITTLE_FORCE, Weighed, Weighing, weigh};
 use std::collections::BTreeMap;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
 const FOREIGN: f64 = 0.85;
-/// Part of the force that a model leaves at the most where it explains nearly all.
-const NEARLY_ALL: f64 = 0.12;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
 /// Part of the refit's mean square that doubtful effects must leave at the most for the mismatch to be called repeatable.
@@ -81,7 +79,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
     let foreign = judged.holdout > FOREIGN * table.force_rms.holdout
         && judged.fit > FOREIGN * table.force_rms.fit
-        && table.patched.holdout > NEARLY_ALL * table.force_rms.holdout;
+        && table.patched.holdout > LITTLE_FORCE * table.force_rms.holdout;
     if foreign {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,

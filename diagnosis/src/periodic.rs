@@ -186,6 +186,11 @@ fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<u
     (chosen, gain)
 }
 
+/// Whether an effect is made of waves that are sought: the search is dear, and only waves are like waves.
+pub(crate) fn is_periodic(name: N) -> bool {
+    matches!(name, N::Cogging | N::TorqueRipple)
+}
+
 /// Longest run of neighbouring orders that teeth or poles make.
 const LONGEST_RUN: usize = 4;
 /// Part of the strongest amplitude that an order must have to count in a run.
@@ -195,7 +200,7 @@ const STANDS: f64 = 0.2;
 /// after the other, and repeats only because so little of the travel is seen. Orders count from the turn where it is known,
 /// otherwise from the longest wave.
 pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
-    if !matches!(effect.name, N::Cogging | N::TorqueRipple) {
+    if !is_periodic(effect.name) {
         return true;
     }
     let strongest = amplitudes.iter().copied().fold(0.0, f64::max);

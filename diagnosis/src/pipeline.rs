@@ -11,6 +11,7 @@ use crate::noise::Colour;
 use crate::null;
 use crate::periodic;
 use crate::recording::Recording;
+use crate::residuals::forces;
 use crate::rig::Rig;
 use crate::select::{Bench, Candidate, MOST};
 use crate::track::{Total, Track};
@@ -273,14 +274,13 @@ fn order_near_ties(bench: &Bench, before: f64, finalists: &mut [Candidate]) {
     let left = |c: &Candidate| {
         let inertia = values::scale(bench.nominal, c).0;
         let totals = c.fit.totals(bench.tracks);
-        estimator.rms(&residuals(&estimator, bench.tracks, &totals, inertia), bench.tracks)
+        estimator.rms(&forces(&estimator, bench.tracks, &totals, inertia), bench.tracks)
     };
     finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
 }
 
 /// Costs per segment of a model on the recordings it was fitted to, under some noise.
-fn fit_costs(bench: &Bench, c: &Candidate) -> Vec<f64> {
-    let _ = bench;
+pub(crate) fn fit_costs(c: &Candidate) -> Vec<f64> {
     let mut out = Vec::new();
     for (one, places) in c.fit.prepared.iter().zip(&c.fit.places) {
         for (square, (weight, count)) in one.squares(places, &c.fit.solution.x).iter().zip(one.weights()) {
@@ -292,11 +292,11 @@ fn fit_costs(bench: &Bench, c: &Candidate) -> Vec<f64> {
 
 fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
     let with = lay_all(last, bench.nominal, held, &last.noise);
-    let with_fit = fit_costs(bench, last);
+    let with_fit = fit_costs(last);
     let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
     let square = |c: &Candidate, tracks: &[Track], totals: &[Total]| {
         let inertia = values::scale(bench.nominal, c).0;
-        estimator.rms(&residuals(&estimator, tracks, totals, inertia), tracks).powi(2)
+        estimator.rms(&forces(&estimator, tracks, totals, inertia), tracks).powi(2)
     };
     let on_fit = |c: &Candidate| square(c, bench.tracks, &c.fit.totals(bench.tracks));
     let on_held = |c: &Candidate, laid: &[Laid]| {
@@ -319,7 +319,7 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
             let effect = less.effects.remove(i);
             let fit = crate::fit::Fit::new(&less, bench.nominal, bench.tracks, &last.noise);
             let without = Candidate { model: less, noise: last.noise, fit, merit: 0.0 };
-            let without_fit = fit_costs(bench, &without);
+            let without_fit = fit_costs(&without);
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
             let laid = lay_all(&without, bench.nominal, held, &last.noise);
             let holdout = judge::compare(&with, &laid);
@@ -341,19 +341,5 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
                 is_comb,
             }
         })
-        .collect()
-}
-
-/// Residual force of a model over recordings, per block.
-pub(crate) fn residuals(
-    estimator: &Estimator,
-    tracks: &[Track],
-    totals: &[Total],
-    inertia: f64,
-) -> Vec<Vec<f64>> {
-    tracks
-        .iter()
-        .zip(totals)
-        .map(|(track, total)| estimator.residual(track, total).into_iter().map(|a| a * inertia).collect())
         .collect()
 }

@@ -9,9 +9,18 @@ use crate::select::Candidate;
 use crate::track::{Total, Track};
 use crate::values;
 
-/// Residual force of one model over recordings.
-fn forces(estimator: &Estimator, tracks: &[Track], totals: &[Total], inertia: f64) -> Vec<Vec<f64>> {
-    crate::pipeline::residuals(estimator, tracks, totals, inertia)
+/// Residual force of a model over recordings, per block.
+pub(crate) fn forces(
+    estimator: &Estimator,
+    tracks: &[Track],
+    totals: &[Total],
+    inertia: f64,
+) -> Vec<Vec<f64>> {
+    tracks
+        .iter()
+        .zip(totals)
+        .map(|(track, total)| estimator.residual(track, total).into_iter().map(|a| a * inertia).collect())
+        .collect()
 }
 
 /// Residual force per recording and block under the three models, and the drive's force, all by one estimator.

@@ -4,10 +4,10 @@ use crate::effects::{Effect, EffectName};
 use crate::excitation::Excitation;
 use crate::fit::Fit;
 use crate::judge;
-use crate::kalman::tolerant;
 use crate::model::Nominal;
 use crate::noise::Colour;
-use crate::pipeline::{Found, Rival, lay_all};
+use crate::periodic::is_periodic;
+use crate::pipeline::{Found, Rival, fit_costs, lay_all};
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
 
@@ -29,23 +29,11 @@ const WITHIN_REACH: f64 = 8.0;
 
 /// Costs per segment on fitted and held-out recordings under one noise.
 fn costs(candidate: &Candidate, nominal: &Nominal, held: &[Track]) -> Vec<f64> {
-    let mut out = Vec::new();
-    for (one, places) in candidate.fit.prepared.iter().zip(&candidate.fit.places) {
-        for (square, (weight, count)) in
-            one.squares(places, &candidate.fit.solution.x).iter().zip(one.weights())
-        {
-            out.push(0.5 * count * tolerant(square / weight / count).0);
-        }
-    }
+    let mut out = fit_costs(candidate);
     for laid in lay_all(candidate, nominal, held, &candidate.noise) {
         out.extend(laid.costs);
     }
     out
-}
-
-/// The search for waves is dear, and only waves are like waves.
-fn is_periodic(name: EffectName) -> bool {
-    matches!(name, EffectName::Cogging | EffectName::TorqueRipple)
 }
 
 /// Fits the rivals of each effect in its place and says how far behind they are.

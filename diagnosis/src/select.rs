@@ -227,7 +227,7 @@ impl Bench<'_> {
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
     pub(crate) fn polish_one(&self, candidate: &Candidate) -> Candidate {
         let last = candidate.model.effects.len() - 1;
-        if matches!(candidate.model.effects[last].name, N::Cogging | N::TorqueRipple) {
+        if periodic::is_periodic(candidate.model.effects[last].name) {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();

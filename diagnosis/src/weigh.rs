@@ -22,7 +22,7 @@ const NAMED: f64 = 2.0 / 3.0;
 const UNDECIDED: f64 = 0.5;
 /// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
 /// two it must leave less than this part of what the refit left.
-const LITTLE_FORCE: f64 = 0.12;
+pub(crate) const LITTLE_FORCE: f64 = 0.12;
 const MUCH_FORCE: f64 = 0.5;
 const MUCH_OF_REFIT: f64 = 0.65;
 /// Part of the refit's mean square that a spring leaves where it may well be a gap.
@@ -72,15 +72,11 @@ impl Weighing {
         } else if weighed.undecided {
             Some("more effects than a class may hold explain it as well".into())
         } else if weighed.confidence < NAMED {
-            Some(unsure(weighed.confidence))
+            Some(format!("it is right with a probability of only {:.2}", weighed.confidence))
         } else {
             None
         }
     }
-}
-
-fn unsure(confidence: f64) -> String {
-    format!("it is right with a probability of only {confidence:.2}")
 }
 
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
@@ -89,16 +85,13 @@ pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &
     let mut best = once(s, bench, &refit, held, excitation);
     loop {
         let least = best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
-        let Some((i, least)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
+        let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
             return best;
         };
-        let (name, gain, reason) =
-            (least.found.effect.name, least.found.holdout.sum, unsure(least.confidence));
         let mut model = s.last.model.clone();
         model.effects.remove(i);
         let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
-        s.lost.push((name, gain, reason));
         prune(s, bench, held, &best.patched.noise);
         let mut next = once(s, bench, &refit, held, excitation);
         if next.surest() <= best.surest() {
