@@ -69,6 +69,8 @@ fn said(tally: &Tally) -> String {
 
 fn mutate(name: &str, board_only: &[&str]) -> Result<Tally, Failure> {
     let folder = shell::target().join("mutants").join(name);
+    fs::create_dir_all(&folder)
+        .map_err(|error| Failure::new(format!("{} cannot be made: {error}", folder.display())))?;
     let mut command = cargo();
     command.args(["mutants", "--package", name, "--profile", "mutants", "--baseline", "skip"]);
     command.args(["--timeout", LIMIT_S, "--no-shuffle", "--output"]).arg(&folder);
