@@ -468,3 +468,17 @@ fn follow_share(anchor_ms: u16) -> I2F30 {
     let y2 = y.saturating_mul(y);
     y - y2 / 2 + y2.saturating_mul(y) / 6
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_anchor_follows_by_its_share_of_a_tick() {
+        for anchor_ms in [5_u16, 60, 1_000] {
+            let exact = -(-0.1 / f64::from(anchor_ms)).exp_m1();
+            let share = follow_share(anchor_ms).to_num::<f64>();
+            assert!((share - exact).abs() < 1.2e-8, "{anchor_ms} ms: {share} for {exact}");
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
 
-use control_core::config::{FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::config::{FrictionLaw, Layer, Parabola, SpeedMethod, Tissue, Wall};
 use control_core::event::{Fault, State};
 use control_core::units::{Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
@@ -69,6 +69,41 @@ fn a_wall_is_pressed_then_gives_way_then_rubs() {
     // The skin begins at depth zero, and behind it is the vessel.
     assert_eq!(states, [one_wall, one_wall].concat());
     assert_eq!(hold(&mut c, at, 0.1).sample.state, State::Friction as u8, "at rest");
+}
+
+#[test]
+fn a_needle_drawn_back_slowly_is_not_withdrawn_yet() {
+    // From edges, for one count in a window is faster already.
+    let mut c = started(&Config { speed: SpeedMethod::EdgeTiming, ..Config::default() });
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 10.0, 10.0, |_| ());
+    let mut drawn_back_at = |mm_per_s: f64| {
+        let (mut last, mm) = (State::Approach as u8, at - 1.0);
+        travel(&mut c, &mut at, mm, mm_per_s, |out| last = out.sample.state);
+        last
+    };
+    assert_eq!(drawn_back_at(0.7), State::Friction as u8);
+    assert_eq!(drawn_back_at(1.5), State::Withdrawal as u8);
+}
+
+#[test]
+fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
+    let layer = |top: i16, friction: f64| Layer {
+        tissue: Tissue::Other,
+        top: Millimetres(I16F16::from_num(top)),
+        wall: None,
+        friction: FrictionPerMillimetre(I16F16::from_num(friction)),
+    };
+    let layers = [layer(0, 0.0), layer(2, 1.5)].into_iter().collect();
+    let mut config = Config { layers, ..Config::default() };
+    config.limits.travel = Millimetres(I16F16::from_num(3));
+    let mut c = started(&config);
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 2.05, 5.0, |_| ());
+    assert_ne!(hold(&mut c, at, 0.01).force, Newtons::default());
+    // Not so far as to have left the inner layer.
+    travel(&mut c, &mut at, 1.9, 5.0, |_| ());
+    assert_eq!(hold(&mut c, at, 0.01).force, Newtons::default());
 }
 
 #[test]

@@ -184,7 +184,7 @@ fn a_wall_that_would_ring_hit_or_pull_is_refused() {
     assert!(is_field(with_wall(|w| w.unload.0 = q(2.01)), Field::UnloadStiffness));
     assert!(is_field(with_wall(|w| w.unload.0 = q(0.04)), Field::UnloadStiffness));
 
-    assert_eq!(with_wall(|w| w.elastic.base.0 = q(0.049)), None);
+    assert_eq!(with_wall(|w| w.elastic.base.0 = I16F16::from_bits(3_277)), None);
     for base in [0.051, -0.051] {
         let hit = with_wall(|w| w.elastic.base.0 = q(base));
         assert!(matches!(hit, Some(Refusal::ContactStep { layer: 0, .. })), "{hit:?}");
@@ -193,7 +193,7 @@ fn a_wall_that_would_ring_hit_or_pull_is_refused() {
     assert_eq!(with_wall(|w| w.relief.vertex.0 = q(1.0)), Some(Refusal::WrongWay { layer: 0 }));
     assert_eq!(with_wall(|w| w.relief.vertex.0 = q(1.01)), None);
     // The relief begins at (1 − 1.5)²/a + b: 0.25 N are what the wall gave way at.
-    assert_eq!(with_wall(|w| w.relief.compliance.0 = q(1.01)), None);
+    assert_eq!(with_wall(|w| w.relief.compliance.0 = q(1.0)), None);
     let strong = with_wall(|w| w.relief.compliance.0 = q(0.99));
     assert_eq!(strong, Some(Refusal::ReliefAboveElastic { layer: 0 }));
 
@@ -217,6 +217,37 @@ fn inside_tissue_the_slopes_of_a_wall_and_of_friction_add_up() {
     // 0.5 N/mm of the wall.
     assert_eq!(below(1.49), None);
     assert!(matches!(below(1.51), Some(Refusal::TooStiff { layer: 1, .. })));
+    // 1.6 N/mm on the way in, where nothing holds the needle above the outermost layer.
+    let on_the_way_in = |layers: &[Layer]| {
+        refusal(|config| {
+            weak(config);
+            config.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
+            config.layers = layers.iter().copied().collect();
+        })
+    };
+    let steep = Wall { elastic: parabola(0.0, 1.25, 0.0), unload: Stiffness(q(0.05)), ..wall() };
+    assert_eq!(on_the_way_in(&[layer(1.0, Some(steep))]), None);
+    let inner = on_the_way_in(&[layer(0.0, None), layer(1.0, Some(steep))]);
+    assert!(matches!(inner, Some(Refusal::TooStiff { layer: 1, .. })), "{inner:?}");
+}
+
+#[test]
+fn friction_as_printed_is_as_stiff_as_its_highest_level() {
+    let with_cap = |level_cap: f64| {
+        refusal(|config| {
+            weak(config);
+            config.friction = FrictionLaw::Paper {
+                level_length: Millimetres(q(23.0)),
+                level_cap: q(level_cap),
+                anchor_ms: 60,
+                stiffness: Stiffness(q(1.0)),
+                limit: Newtons(q(0.5)),
+            };
+        })
+    };
+    // The limit is 2 N/mm; the number of layers stands for friction.
+    assert_eq!(with_cap(2.0), None);
+    assert!(matches!(with_cap(2.01), Some(Refusal::TooStiff { layer: 1, .. })));
 }
 
 #[test]
@@ -234,14 +265,14 @@ fn more_force_than_the_motor_has_is_refused() {
             config.layers = [outer, inner].into_iter().collect();
         })
     };
-    assert_eq!(with(2.51, 0.0), None);
+    assert_eq!(with(2.5, 0.0), None);
     assert!(matches!(with(2.49, 0.0), Some(Refusal::TooStrong { layer: 1, .. })));
     // 4 mm of 0.01 N/mm above the wall's 0.25 N; 10 mm of it at the end of the travel.
     assert_eq!(with(2.92, 0.01), None);
     assert!(matches!(with(2.88, 0.01), Some(Refusal::TooStrong { layer: 1, .. })));
-    // 0.05 N/mm: 0.45 N at the wall, 0.5 N at the end.
-    assert_eq!(with(5.02, 0.05), None);
-    assert!(matches!(with(4.98, 0.05), Some(Refusal::TooStrong { layer: 1, .. })));
+    // 1/16 N/mm: 0.5 N at the wall, 0.625 N at the end.
+    assert_eq!(with(6.25, 0.0625), None);
+    assert!(matches!(with(6.24, 0.0625), Some(Refusal::TooStrong { layer: 1, .. })));
 }
 
 #[test]
