@@ -25,7 +25,7 @@ pub(crate) struct Record {
     pub(crate) machine: &'static str,
     pub(crate) rate: f64,
     pub(crate) answer: Result<Answer, String>,
-    /// Mean square that the hidden physics adds on the held-out recording, at the tool's bandwidth.
+    /// Mean square that is left on the held-out recording with the true model in hand, at the tool's bandwidth.
     pub(crate) oracle: f64,
     pub(crate) opinions: Vec<Opinion>,
     /// The same at the rivals' bandwidth.
@@ -59,9 +59,9 @@ impl Record {
             machine: case.machine.name,
             rate: case.machine.rate,
             answer,
-            oracle: case.held_out(band).effect.powi(2),
+            oracle: case.held_out(band).noise.powi(2),
             opinions,
-            oracle_rivals: case.held_out(own).effect.powi(2),
+            oracle_rivals: case.held_out(own).noise.powi(2),
             seconds,
             truths: case.truths.clone(),
             true_gain: case.plant.gain,
@@ -140,11 +140,11 @@ impl Record {
         }
     }
 
-    /// Share of what an oracle gets on the held-out recording; `None` where nothing is hidden or the tool failed.
+    /// Share of what an oracle gets on the held-out recording; `None` where there is nothing to get.
     pub(crate) fn share(&self) -> Option<f64> {
-        let answer = self.answer.as_ref().ok()?;
-        let gain = answer.refit_holdout.powi(2) - answer.patched_holdout.powi(2);
-        (self.oracle > 0.0 && gain.is_finite()).then(|| (gain / self.oracle).clamp(-2.0, 2.0))
+        // A tool that fails improves nothing.
+        let Ok(answer) = &self.answer else { return Some(0.0) };
+        share_of_oracle(answer.refit_holdout.powi(2), answer.patched_holdout.powi(2), self.oracle)
     }
 
     /// Whether each 95 % interval of a parameter with a known truth holds it. Where the unit has force in it the truth is
@@ -166,6 +166,17 @@ impl Record {
         }
         out
     }
+}
+
+/// Least part of what a refit leaves that must be left to explain for shares of it to mean anything.
+const EXPLAINABLE: f64 = 0.05;
+
+/// Share of the way from what a refit leaves to what an oracle leaves, all of them mean squares on the held-out recording:
+/// the oracle has the true model and leaves the noise.
+fn share_of_oracle(refit: f64, patched: f64, oracle: f64) -> Option<f64> {
+    let all = refit - oracle;
+    let gain = refit - patched;
+    (gain.is_finite() && all > EXPLAINABLE * refit).then(|| (gain / all).clamp(-2.0, 2.0))
 }
 
 /// What one rival reached.
@@ -267,10 +278,11 @@ pub(crate) fn sum(records: &[Record]) -> Sums {
             }
         }
         if matches!(r.category, Category::Single | Category::Pair) {
-            let share = r.share().unwrap_or(0.0);
-            s.shares.push(share);
-            if r.right() {
-                s.shares_right.push(share);
+            if let Some(share) = r.share() {
+                s.shares.push(share);
+                if r.right() {
+                    s.shares_right.push(share);
+                }
             }
             for (name, inside) in r.coverage() {
                 s.coverage.add(inside);
@@ -320,8 +332,8 @@ fn sum_rival(records: &[Record], i: usize, name: &'static str) -> RivalSums {
             Category::Outside => s.outside_abstains.add(silent),
             _ => {}
         }
-        if matches!(r.category, Category::Single | Category::Pair) && r.oracle_rivals > 0.0 {
-            s.shares.push(((o.refit_mean_square - o.mean_square) / r.oracle_rivals).clamp(-2.0, 2.0));
+        if matches!(r.category, Category::Single | Category::Pair) {
+            s.shares.extend(share_of_oracle(o.refit_mean_square, o.mean_square, r.oracle_rivals));
         }
     }
     s
@@ -361,9 +373,9 @@ pub(crate) mod tests {
             machine: "bench",
             rate: 1000.0,
             answer: Ok(answer),
-            oracle: 3.0,
+            oracle: 1.0,
             opinions: Vec::new(),
-            oracle_rivals: 3.0,
+            oracle_rivals: 1.0,
             seconds: 1.0,
             truths: vec![(
                 "stribeck_friction",
@@ -445,8 +457,10 @@ pub(crate) mod tests {
         assert_eq!(sums.null_alarms, Rate { hits: 1, trials: 2 });
         assert_eq!(sums.false_names, Rate { hits: 3, trials: 4 });
         assert_eq!(sums.outside_confident, Rate { hits: 0, trials: 1 });
-        // 2² − 1² = 3, all of what the oracle gets.
+        // From 2² to 1², which is what the oracle leaves.
         assert_eq!(records[0].share(), Some(1.0));
+        assert_eq!(share_of_oracle(4.0, 2.5, 1.0), Some(0.5));
+        assert_eq!(share_of_oracle(4.0, 3.9, 3.9), None, "nothing to get");
         // Truth 1 with the true gain is 2 in the scale of the gain that the tool believes.
         assert_eq!(sums.coverage, Rate { hits: 1, trials: 1 });
         assert_eq!(sums.confidence[4].2, Rate { hits: 1, trials: 2 });

@@ -280,7 +280,9 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
             json!({
                 "id": r.id, "category": r.category.word(), "hidden": r.hidden, "strength": r.strength,
                 "achieved": r.achieved, "machine": r.machine, "rate_hz": r.rate, "right": r.right(),
-                "answer": r.answer_text(), "share": r.share(), "seconds": r.seconds,
+                "answer": r.answer_text(), "share": r.share(),
+                "refit": r.answer.as_ref().ok().map(|a| a.refit_holdout), "patched": r.answer.as_ref().ok().map(|a| a.patched_holdout),
+                "oracle": r.oracle.sqrt(), "seconds": r.seconds,
                 "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
             })
         })

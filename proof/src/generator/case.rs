@@ -95,7 +95,7 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// The three recordings measured at another bandwidth, on the held-out one: what an oracle would remove.
+    /// The three recordings measured at another bandwidth, on the held-out one: what an oracle would remove and leave.
     pub(crate) fn held_out(&self, band: f64) -> Measured {
         let rows: Vec<&[Row]> = self.recordings.iter().map(Vec::as_slice).collect();
         measure(&rows, 2, &self.believed, &self.declared, self.machine.rate, band)
