@@ -31,7 +31,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
     let weighing = weigh(&mut s, &bench, &held_tracks, &excitation);
-    let Weighing { patched, estimator, on_fit, on_held, table, floor, understood, .. } = &weighing;
+    let Weighing { patched, estimator, on_fit, on_held, table, floor, understood, swing, .. } = &weighing;
     let maps =
         locate::maps((&fit_tracks, &on_fit.patched), (&held_tracks, &on_held.patched), nominal.rig.turn());
     s.fit_tracks = fit_tracks.clone();
@@ -40,7 +40,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let hypothesis = |weighed: &Weighed| Hypothesis {
         name: weighed.found.effect.name,
         holdout_gain: weighed.found.holdout.sum,
-        evidence: (*understood && weighed.is_there).then(|| weighed.evidence.clone()),
+        evidence: weighing.rests_on_evidence(weighed).then(|| weighed.evidence.clone()),
         class: weighed.class.clone(),
         rejected_because: weighing.doubt(weighed),
     };
@@ -89,11 +89,12 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
             ),
         ));
     }
+    let swings = swing.and_then(|swing| swing.in_words()).filter(|_| disturbed);
     let verdict = if !effects.is_empty() {
         Verdict::MissingPhysics
     } else if excitation.is_one_speed() {
         Verdict::InsufficientExcitation
-    } else if (*understood && helps) || (disturbed && carries) {
+    } else if (*understood && helps) || (disturbed && carries) || swings.is_some() {
         Verdict::Unexplained
     } else if disturbed {
         Verdict::RandomDisturbance
@@ -169,7 +170,11 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         hypotheses,
         place: top_place,
         separating_experiment: cannot_tell.then(|| prescribe::SPEEDS.to_owned()),
-        reason: cannot_tell.then(|| excitation.one_speed()),
+        reason: match verdict {
+            Verdict::InsufficientExcitation => Some(excitation.one_speed()),
+            Verdict::Unexplained => swings,
+            _ => None,
+        },
     };
     report.sentence = crate::outcome::sentence(&report, nominal.rig.kind);
     let mut series = Vec::new();

@@ -43,6 +43,7 @@ mod select;
 mod solve;
 mod steps;
 mod track;
+mod unnamed;
 mod values;
 mod weigh;
 

@@ -123,8 +123,9 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
             percent(fit.refit.holdout)
         ),
         Verdict::Unexplained => format!(
-            "Simulation and recordings differ repeatably by {:.1} % of the force, and no known effect explains it",
-            percent(fit.patched.holdout)
+            "Simulation and recordings differ repeatably by {:.1} % of the force, and no known effect explains it{}",
+            percent(fit.patched.holdout),
+            report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),
         Verdict::RandomDisturbance => format!(
             "A disturbance of {:.1} % of the force acts on the axis that does not repeat and depends on nothing recorded",

@@ -157,7 +157,7 @@ pub struct Report {
     /// What to record next, when the recordings cannot tell.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub separating_experiment: Option<String>,
-    /// Why the recordings cannot tell.
+    /// Why the recordings cannot tell, or what is left where no effect is.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub reason: Option<String>,
 }

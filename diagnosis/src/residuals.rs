@@ -2,7 +2,7 @@
 //! the other.
 
 use crate::estimate::Estimator;
-use crate::judge;
+use crate::judge::{self, Gain};
 use crate::model::{Nominal, total};
 use crate::pipeline::lay_all;
 use crate::select::Candidate;
@@ -88,16 +88,16 @@ pub(crate) fn refit_matters(estimator: &Estimator, tracks: &[Track], held: &Resi
     };
     let (before, after) = (unbiased(&held.nominal), unbiased(&held.refit));
     let taken = estimator.rms(&before, tracks).powi(2) - estimator.rms(&after, tracks).powi(2);
-    taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after)[0] > 0.0
+    taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after).low > 0.0
 }
 
-/// Interval of the relative reduction of the held-out mean square.
+/// Relative reduction of the held-out mean square.
 pub(crate) fn relative_gain(
     estimator: &Estimator,
     tracks: &[Track],
     before: &[Vec<f64>],
     after: &[Vec<f64>],
-) -> [f64; 2] {
+) -> Gain {
     let mut gains = Vec::new();
     let mut whole = 0.0;
     for ((track, a), b) in tracks.iter().zip(before).zip(after) {
@@ -113,7 +113,7 @@ pub(crate) fn relative_gain(
             gains.push(gain);
         }
     }
-    let gain = judge::bootstrap(&gains);
-    // Nothing can take more than there is; some resamplings of few segments would.
-    if whole > 0.0 { [gain.low, gain.high].map(|x| (x / whole).min(1.0)) } else { [0.0, 0.0] }
+    let whole = whole.max(1e-300);
+    gains.iter_mut().for_each(|gain| *gain /= whole);
+    judge::bootstrap(&gains)
 }

@@ -12,6 +12,8 @@ const OVER_IMPACT: f64 = 1.3;
 const MOST: usize = 80;
 const FEWEST: usize = 2;
 const REACH: usize = 40;
+/// Gain of log-likelihood of a second part of a jump, in the next block.
+const PER_PART: f64 = 4.0;
 /// How often what is left is looked through again: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
@@ -36,8 +38,13 @@ pub(crate) fn find(track: &Track, fit: &Fit, r: usize, residual: &[f64], count: 
         jumps.sort_unstable();
         (jumps, sizes, left) = together(track, fit, r, residual, &jumps, count);
     }
+    let is_fault = jumps.len() >= FEWEST;
+    let mut parts = Jumps::new(track, fit, r, &jumps);
+    parts.split(&sizes, residual);
+    sizes = parts.sizes(residual);
+    jumps = parts.blocks;
     let mut lost = vec![0.0; n];
-    if jumps.len() >= FEWEST {
+    if is_fault {
         for (j, size) in jumps.into_iter().zip(sizes) {
             lost[j..].iter_mut().for_each(|lost| *lost += size);
         }
@@ -45,45 +52,77 @@ pub(crate) fn find(track: &Track, fit: &Fit, r: usize, residual: &[f64], count: 
     lost
 }
 
-/// What a jump of position and a jump of speed look like where the axis moves: elsewhere they are nearly the same.
-struct Templates {
+/// What a jump of position and a jump of speed look like at one place where the axis moves: elsewhere they are nearly the
+/// same.
+struct Template {
+    /// Logarithm of the variance that quantisation has there: the faster, the less, and the sharper the response.
+    quantum: f64,
     position: Vec<f64>,
     speed: Vec<f64>,
 }
 
-impl Templates {
-    fn new(track: &Track, fit: &Fit, r: usize) -> Option<Self> {
+/// Templates from slow motion to fast.
+struct Templates(Vec<Template>);
+
+/// Parts of the moving blocks, ordered by quantisation, at which templates are taken.
+const TEMPLATES: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
+
+impl Template {
+    fn new(track: &Track, fit: &Fit, r: usize, at: usize) -> Self {
         let n = track.blocks();
-        let moves = |j: &usize| !track.rest[*j - 1..*j + REACH].iter().any(|rest| *rest);
-        let at = (1..n.checked_sub(REACH)?)
-            .filter(moves)
-            .min_by_key(|j| j.abs_diff(n / 2))
-            .or_else(|| (n >= 4 * REACH).then_some(n / 2))?;
         let gains = &fit.prepared[r].gains;
         let mut step = vec![0.0; n];
         step[at..].fill(1.0);
         let mut pulse = vec![0.0; n];
         pulse[at - 1] = 1.0 / track.span[at - 1];
         let cut = |input: Input| gains.response(track, &input)[at..at + REACH].to_vec();
-        Some(Self { position: cut(Input::Sensor(step)), speed: cut(Input::Held(pulse)) })
+        Self {
+            quantum: track.quantum[at].ln(),
+            position: cut(Input::Sensor(step)),
+            speed: cut(Input::Held(pulse)),
+        }
+    }
+}
+
+impl Templates {
+    fn new(track: &Track, fit: &Fit, r: usize) -> Option<Self> {
+        let n = track.blocks();
+        let moves = |j: &usize| !track.rest[*j - 1..*j + REACH].iter().any(|rest| *rest);
+        let mut places: Vec<usize> = (1..n.checked_sub(REACH)?).filter(moves).collect();
+        if places.is_empty() && n >= 4 * REACH {
+            places.push(n / 2);
+        }
+        places.sort_by(|a, b| track.quantum[*a].total_cmp(&track.quantum[*b]).then(a.cmp(b)));
+        let last = places.len().checked_sub(1)?;
+        let mut at: Vec<usize> = TEMPLATES.iter().map(|part| places[(part * last as f64) as usize]).collect();
+        at.dedup();
+        Some(Self(at.into_iter().map(|at| Template::new(track, fit, r, at)).collect()))
+    }
+
+    fn nearest(&self, quantum: f64) -> &Template {
+        let distance = |t: &&Template| (t.quantum - quantum.ln()).abs();
+        self.0
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .expect("there is at least one template")
     }
 
     /// Blocks at which a jump of position stands out, with its size, the clearest first.
     fn peaks(&self, track: &Track, residual: &[f64]) -> Vec<(usize, f64)> {
-        let (pp, ss) = (dot(&self.position, &self.position), dot(&self.speed, &self.speed));
         let mut found: Vec<(f64, usize, f64)> = Vec::new();
-        if pp <= 0.0 || ss <= 0.0 {
-            return Vec::new();
-        }
         for j in 5..residual.len().saturating_sub(REACH) {
-            let p = dot(&self.position, &residual[j..j + REACH]);
+            let Template { position, speed, .. } = self.nearest(track.quantum[j]);
+            let (pp, ss) = (dot(position, position), dot(speed, speed));
+            if pp <= 0.0 || ss <= 0.0 {
+                continue;
+            }
+            let p = dot(position, &residual[j..j + REACH]);
             let gain = 0.5 * p * p / pp;
             // What is lost is lost on the way: the reading falls behind the motion.
             if track.rest[j] || gain <= PER_JUMP || p * track.v[j] >= 0.0 {
                 continue;
             }
-            let impact =
-                |k: usize| dot(&self.speed, &residual[j + 1 - k..j + 1 - k + REACH]).powi(2) * 0.5 / ss;
+            let impact = |k: usize| dot(speed, &residual[j + 1 - k..j + 1 - k + REACH]).powi(2) * 0.5 / ss;
             if gain > OVER_IMPACT * impact(0).max(impact(1)) {
                 found.push((gain, j, p / pp));
             }
@@ -99,6 +138,90 @@ impl Templates {
     }
 }
 
+/// Jumps that are fitted together, with what each does to the residual.
+struct Jumps<'a> {
+    track: &'a Track,
+    fit: &'a Fit,
+    r: usize,
+    blocks: Vec<usize>,
+    responses: Vec<Vec<f64>>,
+}
+
+impl<'a> Jumps<'a> {
+    fn new(track: &'a Track, fit: &'a Fit, r: usize, blocks: &[usize]) -> Self {
+        let mut all = Self { track, fit, r, blocks: Vec::new(), responses: Vec::new() };
+        blocks.iter().for_each(|block| all.push(*block));
+        all
+    }
+
+    fn push(&mut self, block: usize) {
+        let mut step = vec![0.0; self.track.blocks()];
+        step[block..].fill(1.0);
+        self.blocks.push(block);
+        self.responses.push(self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step)));
+    }
+
+    fn keep(&mut self, stands: &[bool]) {
+        let mut kept = stands.iter();
+        self.blocks.retain(|_| *kept.next().unwrap_or(&false));
+        let mut kept = stands.iter();
+        self.responses.retain(|_| *kept.next().unwrap_or(&false));
+    }
+
+    /// Sizes that leave the least, all fitted at once.
+    fn sizes(&self, residual: &[f64]) -> Vec<f64> {
+        let count = self.blocks.len();
+        let mut m = Square::zero(count);
+        for (a, i) in self.responses.iter().enumerate() {
+            for (b, j) in self.responses.iter().enumerate().take(a + 1) {
+                let product = dot(i, j);
+                m.add(a, b, product);
+                if a != b {
+                    m.add(b, a, product);
+                }
+            }
+        }
+        let right: Vec<f64> = self.responses.iter().map(|response| dot(response, residual)).collect();
+        Factor::new(&m).solve(&right)
+    }
+
+    fn left(&self, sizes: &[f64], residual: &[f64]) -> Vec<f64> {
+        let mut left = residual.to_vec();
+        for (response, size) in self.responses.iter().zip(sizes) {
+            left.iter_mut().zip(response).for_each(|(left, x)| *left -= size * x);
+        }
+        left
+    }
+
+    /// A jump within a block shows in part in that block and whole in the next one: gives each jump a second part in the
+    /// neighbour that explains more, where one does.
+    fn split(&mut self, sizes: &[f64], residual: &[f64]) {
+        let left = self.left(sizes, residual);
+        let places: Vec<(usize, f64)> = self.blocks.iter().copied().zip(sizes.iter().copied()).collect();
+        for (i, (block, size)) in places.into_iter().enumerate() {
+            let mut best: Option<(f64, usize)> = None;
+            for neighbour in [block - 1, block + 1] {
+                if self.blocks.contains(&neighbour) {
+                    continue;
+                }
+                self.push(neighbour);
+                let other = self.responses.pop().unwrap_or_default();
+                self.blocks.pop();
+                // Moves a part of the jump to the neighbour, a part between none and all of it.
+                let moved: Vec<f64> = other.iter().zip(&self.responses[i]).map(|(a, b)| a - b).collect();
+                let (along, square) = (dot(&moved, &left), dot(&moved, &moved));
+                let gain = 0.5 * along * along / square.max(1e-300);
+                if along * size > 0.0 && gain > PER_PART && best.is_none_or(|(most, _)| gain > most) {
+                    best = Some((gain, neighbour));
+                }
+            }
+            if let Some((_, neighbour)) = best {
+                self.push(neighbour);
+            }
+        }
+    }
+}
+
 /// Fits the sizes of all jumps at once and drops those that do not stand: places, sizes, and the residual without them.
 fn together(
     track: &Track,
@@ -108,38 +231,13 @@ fn together(
     jumps: &[usize],
     count: f64,
 ) -> (Vec<usize>, Vec<f64>, Vec<f64>) {
-    let n = track.blocks();
-    let responses: Vec<Vec<f64>> = jumps
-        .iter()
-        .map(|j| {
-            let mut step = vec![0.0; n];
-            step[*j..].fill(1.0);
-            fit.prepared[r].gains.response(track, &Input::Sensor(step))
-        })
-        .collect();
-    let solve = |kept: &[usize]| -> Vec<f64> {
-        let mut m = Square::zero(kept.len());
-        for (a, i) in kept.iter().enumerate() {
-            for (b, j) in kept.iter().enumerate() {
-                m.add(a, b, dot(&responses[*i], &responses[*j]));
-            }
-        }
-        let right: Vec<f64> = kept.iter().map(|i| dot(&responses[*i], residual)).collect();
-        Factor::new(&m).solve(&right)
+    let mut all = Jumps::new(track, fit, r, jumps);
+    let stands = |(size, response): (&f64, &Vec<f64>)| {
+        0.5 * size * size * dot(response, response) > PER_JUMP && size.abs() > 0.7 * count
     };
-    let all: Vec<usize> = (0..jumps.len()).collect();
-    let first = solve(&all);
-    let stands = |i: &usize| {
-        let size = first[*i];
-        0.5 * size * size * dot(&responses[*i], &responses[*i]) > PER_JUMP && size.abs() > 0.7 * count
-    };
-    let kept: Vec<usize> = all.into_iter().filter(stands).collect();
-    let sizes = solve(&kept);
-    let mut left = residual.to_vec();
-    for (i, size) in kept.iter().zip(&sizes) {
-        for (left, x) in left.iter_mut().zip(&responses[*i]) {
-            *left -= size * x;
-        }
-    }
-    (kept.iter().map(|i| jumps[*i]).collect(), sizes, left)
+    let stand: Vec<bool> = all.sizes(residual).iter().zip(&all.responses).map(stands).collect();
+    all.keep(&stand);
+    let sizes = all.sizes(residual);
+    let left = all.left(&sizes, residual);
+    (all.blocks, sizes, left)
 }

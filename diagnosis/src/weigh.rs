@@ -13,6 +13,7 @@ use crate::residuals::{Residuals, relative_gain, residuals};
 use crate::rivals;
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
+use crate::unnamed::{self, Swing};
 use crate::values;
 use std::collections::BTreeMap;
 
@@ -54,6 +55,8 @@ pub(crate) struct Weighing {
     pub(crate) floor: f64,
     /// Whether the model leaves little enough of the force to have understood it.
     pub(crate) understood: bool,
+    /// A force that swings whatever the axis does.
+    pub(crate) swing: Option<Swing>,
 }
 
 impl Weighing {
@@ -63,10 +66,17 @@ impl Weighing {
         all.fold(0.0, f64::max)
     }
 
+    /// Whether it is for its evidence, weighed, that an effect is named or not.
+    pub(crate) fn rests_on_evidence(&self, weighed: &Weighed) -> bool {
+        self.understood && weighed.is_there && !self.swing.is_some_and(|swing| swing.is_mistaken())
+    }
+
     /// Why an effect is not named, if it is not.
     pub(crate) fn doubt(&self, weighed: &Weighed) -> Option<String> {
         if !self.understood {
             Some("with it the model still leaves too much of the force to have understood it".into())
+        } else if let Some(swing) = self.swing.filter(Swing::is_mistaken) {
+            Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
         } else if !weighed.is_there {
             Some("its size cannot be told from zero".into())
         } else if weighed.undecided {
@@ -105,6 +115,10 @@ pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &
     }
 }
 
+fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'a> {
+    unnamed::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
+}
+
 fn once(
     s: &mut Search,
     bench: &Bench,
@@ -126,6 +140,7 @@ fn once(
     let (inertia, _, _) = values::scale(nominal, &patched);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
+    let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
     let table = FitTable {
         metric: "force_rmse".into(),
         unit: nominal.rig.kind.force().into(),
@@ -133,14 +148,11 @@ fn once(
         refit: both(&on_fit.refit, &on_held.refit),
         patched: both(&on_fit.patched, &on_held.patched),
         force_rms: both(&on_fit.force, &on_held.force),
-        holdout_gain_ci95: relative_gain(&estimator, held, &on_held.refit, &on_held.patched),
+        // Nothing can take more than there is; some resamplings of few segments would.
+        holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
     };
-    // What is left and hangs together over time, against what the effects explain: if most of it is left, the names
-    // stand for something else.
-    let explained = (table.refit.fit.powi(2) - table.patched.fit.powi(2)).max(0.0);
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = Leftover {
-        of_explained: if explained > 0.0 { left / explained } else { f64::INFINITY },
         of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
         unexplained: table.patched.holdout / table.refit.holdout.max(1e-300),
     };
@@ -148,13 +160,14 @@ fn once(
     let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
     let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
     let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
+    let swing = unnamed::swing(&estimator, &left_by(bench.tracks, &on_fit), &left_by(held, &on_held));
     let effects = found
         .into_iter()
         .enumerate()
         .map(|(i, found)| {
             let class = rivals::class(&found, excitation, leaves_much);
             let nearest = rivals::nearest(&found, &class);
-            let evidence = confidence::evidence(&found, nearest, leftover);
+            let evidence = confidence::evidence(&found, leftover);
             let parameters = values::parameters(bench, &patched, i);
             let is_there = values::is_there(found.effect.name, &parameters);
             let undecided = nearest < rivals::BEHIND_Z;
@@ -163,5 +176,16 @@ fn once(
             Weighed { found, class, evidence, confidence, parameters, is_there, undecided }
         })
         .collect();
-    Weighing { effects, dropped: Vec::new(), patched, estimator, on_fit, on_held, table, floor, understood }
+    Weighing {
+        effects,
+        dropped: Vec::new(),
+        patched,
+        estimator,
+        on_fit,
+        on_held,
+        table,
+        floor,
+        understood,
+        swing,
+    }
 }

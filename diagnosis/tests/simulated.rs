@@ -44,6 +44,15 @@ fn a_pure_disturbance_is_called_one() {
 }
 
 #[test]
+fn a_force_that_swings_by_itself_is_told_with_its_frequency_and_not_named() {
+    for closed in [false, true] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed, ..setup("hum") });
+        assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
+        assert!(outcome.report.sentence.contains("swings at 13.7 Hz"), "{}", outcome.report.sentence);
+    }
+}
+
+#[test]
 fn strong_effects_are_named_with_their_values() {
     // Effect, parameter, true value, tolerance.
     let cases: [(&'static str, &str, f64, f64); 8] = [

@@ -146,6 +146,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             slow = slow * 0.999f64.powf(1000.0 / setup.rate)
                 + s * C * 0.045 * random.normal() * (1000.0 / setup.rate).sqrt();
         }
+        if is("hum") {
+            slow = 2.5e-4 * s * (std::f64::consts::TAU * 13.7 * t).sin();
+        }
         for _ in 0..substeps {
             let mut u = command;
             if is("command_deadband") && u.abs() < 0.012 * s {

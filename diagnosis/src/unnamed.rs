@@ -1,0 +1,159 @@
+//! What explains a residual without being an effect: a force that swings at a frequency of its own, whatever the axis does.
+//! Under a loop the command answers it, and delays, lags and springs take it on.
+
+use crate::estimate::Estimator;
+use crate::periodic::golden;
+use crate::track::Track;
+use std::f64::consts::TAU;
+
+/// Samples per second that the search looks at, over the bandwidth of the residual.
+const OVERSAMPLED: f64 = 2.6;
+/// Fewest cycles over the longest recording: less is a drift.
+const FEWEST_CYCLES: f64 = 12.0;
+/// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that does not follow it, for
+/// a light axis gives way to it, and that may be about as fast otherwise: what repeats with the motion swings too, at its
+/// frequency and multiples of it.
+const GIVES_WAY: f64 = 0.06;
+const FAST_MOTION: f64 = 0.02;
+/// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what comes from outside with
+/// about as much at the most, and what a lag or a short delay leaves is less than the drive makes.
+const DRIVEN: f64 = 1.2;
+
+/// A force at one frequency on the held-out recordings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Swing {
+    pub(crate) hertz: f64,
+    /// Part of what the refit leaves that swings so.
+    pub(crate) part: f64,
+    /// Part of what the refit leaves that swings so and that the effects found have taken on.
+    pub(crate) taken: f64,
+}
+
+/// Parts from which on the effects found stand for a swing, and from which on a swing is what was left out.
+const MISTAKEN: f64 = 0.2;
+const DOMINANT: f64 = 0.4;
+
+impl Swing {
+    /// Whether the effects found explain what is a swing.
+    pub(crate) fn is_mistaken(&self) -> bool {
+        self.taken > MISTAKEN
+    }
+
+    /// What was left out in words, where it is a swing.
+    pub(crate) fn in_words(&self) -> Option<String> {
+        (self.part > DOMINANT).then(|| {
+            format!(
+                "{:.0} % of what a refit leaves is a force that swings at {:.1} Hz, whatever the axis does",
+                100.0 * self.part,
+                self.hertz
+            )
+        })
+    }
+}
+
+/// The drive's force, and the residuals of the refitted and of the patched model.
+pub(crate) struct Left<'a> {
+    pub(crate) tracks: &'a [Track],
+    pub(crate) force: &'a [Vec<f64>],
+    pub(crate) refit: &'a [Vec<f64>],
+    pub(crate) patched: &'a [Vec<f64>],
+}
+
+/// One recording's samples, evenly spaced.
+struct Samples {
+    step_s: f64,
+    values: Vec<f64>,
+}
+
+fn samples(estimator: &Estimator, tracks: &[Track], signals: &[Vec<f64>]) -> Vec<Samples> {
+    let one = |(track, signal): (&Track, &Vec<f64>)| {
+        let rate = track.block_rate();
+        let every = (rate / (OVERSAMPLED * estimator.bandwidth_hz)).floor().max(1.0) as usize;
+        let moving: Vec<f64> = signal
+            .iter()
+            .zip(estimator.moving(track))
+            .map(|(x, moving)| if moving { *x } else { 0.0 })
+            .collect();
+        let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / every as f64;
+        Samples { step_s: every as f64 / rate, values: moving.chunks_exact(every).map(mean).collect() }
+    };
+    tracks.iter().zip(signals).map(one).collect()
+}
+
+impl Samples {
+    fn seconds(&self) -> f64 {
+        self.step_s * self.values.len() as f64
+    }
+
+    /// Sum of squares that a swing of any size and phase explains.
+    fn explained(&self, hertz: f64) -> f64 {
+        let (turn_sin, turn_cos) = (TAU * hertz * self.step_s).sin_cos();
+        let (mut cos, mut sin) = (1.0, 0.0);
+        let (mut along_cos, mut along_sin) = (0.0, 0.0);
+        for x in &self.values {
+            along_cos += x * cos;
+            along_sin += x * sin;
+            (cos, sin) = (cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin);
+        }
+        2.0 * (along_cos.powi(2) + along_sin.powi(2)) / self.values.len().max(1) as f64
+    }
+}
+
+fn explained(all: &[Samples], hertz: f64) -> f64 {
+    all.iter().map(|one| one.explained(hertz)).sum()
+}
+
+fn square(all: &[Samples]) -> f64 {
+    all.iter().flat_map(|one| &one.values).map(|x| x * x).sum::<f64>().max(1e-300)
+}
+
+/// Sum of squares of what is about as fast as `hertz` or faster: of what a mean over a period leaves.
+fn fast(all: &[Samples], hertz: f64) -> f64 {
+    let fast = |one: &Samples| -> f64 {
+        let reach = ((0.5 / hertz / one.step_s).round() as usize).max(1);
+        let Some(first) = one.values.get(..2 * reach + 1) else { return 0.0 };
+        let mut sum: f64 = first.iter().sum();
+        let mut square = 0.0;
+        for (i, middle) in one.values.iter().enumerate().skip(reach) {
+            square += (middle - sum / (2 * reach + 1) as f64).powi(2);
+            let Some(next) = one.values.get(i + reach + 1) else { break };
+            sum += next - one.values[i - reach];
+        }
+        square
+    };
+    all.iter().map(fast).sum()
+}
+
+/// Whether a swing may go its own way, for the axis does not move as fast.
+fn is_apart(motion: &[Samples], hertz: f64) -> bool {
+    let (whole, there) = (square(motion), explained(motion, hertz));
+    there < GIVES_WAY * whole && fast(motion, hertz) - there < FAST_MOTION * whole
+}
+
+/// The swing whose frequency the fitted recordings tell, as the held-out ones show it; none where the axis itself moves as
+/// fast.
+pub(crate) fn swing(estimator: &Estimator, fit: &Left, held: &Left) -> Option<Swing> {
+    let of_fit = samples(estimator, fit.tracks, fit.refit);
+    let before = samples(estimator, held.tracks, held.refit);
+    let after = samples(estimator, held.tracks, held.patched);
+    let seconds = of_fit.iter().chain(&before).map(Samples::seconds).fold(0.0, f64::max);
+    let apart = 0.5 / seconds;
+    let first = FEWEST_CYCLES / seconds;
+    let count = ((estimator.bandwidth_hz - first) / apart).max(0.0) as usize;
+    let (coarse, _) = (0..count)
+        .map(|i| first + apart * i as f64)
+        .map(|hertz| (hertz, explained(&of_fit, hertz)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let near =
+        |hertz: f64, all: &[Samples]| golden(hertz - apart, hertz + apart, 10, |hertz| explained(all, hertz));
+    // Each recorder has a clock of its own.
+    let hertz = near(near(coarse, &of_fit), &before);
+    let speeds: Vec<Vec<f64>> = held.tracks.iter().map(|track| track.v.clone()).collect();
+    let of_held = |signals: &[Vec<f64>]| samples(estimator, held.tracks, signals);
+    let swings = explained(&before, hertz);
+    if explained(&of_held(held.force), hertz) > DRIVEN * swings || !is_apart(&of_held(&speeds), hertz) {
+        return None;
+    }
+    let part = swings / square(&before);
+    Some(Swing { hertz, part, taken: part - explained(&after, hertz) / square(&before) })
+}
