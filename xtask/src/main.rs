@@ -25,7 +25,7 @@ The project's chores.
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask bench             measures, prints the table and writes target/bench.json
-  cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: most of an hour
+  cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
 
