@@ -38,16 +38,14 @@ pub(crate) fn find(track: &Track, fit: &Fit, r: usize, residual: &[f64], count: 
         jumps.sort_unstable();
         (jumps, sizes, left) = together(track, fit, r, residual, &jumps, count);
     }
-    let is_fault = jumps.len() >= FEWEST;
+    let mut lost = vec![0.0; n];
+    if jumps.len() < FEWEST {
+        return lost;
+    }
     let mut parts = Jumps::new(track, fit, r, &jumps);
     parts.split(&sizes, residual);
-    sizes = parts.sizes(residual);
-    jumps = parts.blocks;
-    let mut lost = vec![0.0; n];
-    if is_fault {
-        for (j, size) in jumps.into_iter().zip(sizes) {
-            lost[j..].iter_mut().for_each(|lost| *lost += size);
-        }
+    for (block, size) in parts.blocks.iter().zip(parts.sizes(residual)) {
+        lost[*block..].iter_mut().for_each(|lost| *lost += size);
     }
     lost
 }
@@ -154,11 +152,17 @@ impl<'a> Jumps<'a> {
         all
     }
 
-    fn push(&mut self, block: usize) {
+    /// What a jump by one at `block` does to the residual.
+    fn response(&self, block: usize) -> Vec<f64> {
         let mut step = vec![0.0; self.track.blocks()];
         step[block..].fill(1.0);
+        self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step))
+    }
+
+    fn push(&mut self, block: usize) {
+        let response = self.response(block);
         self.blocks.push(block);
-        self.responses.push(self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step)));
+        self.responses.push(response);
     }
 
     fn keep(&mut self, stands: &[bool]) {
@@ -204,9 +208,7 @@ impl<'a> Jumps<'a> {
                 if self.blocks.contains(&neighbour) {
                     continue;
                 }
-                self.push(neighbour);
-                let other = self.responses.pop().unwrap_or_default();
-                self.blocks.pop();
+                let other = self.response(neighbour);
                 // Moves a part of the jump to the neighbour, a part between none and all of it.
                 let moved: Vec<f64> = other.iter().zip(&self.responses[i]).map(|(a, b)| a - b).collect();
                 let (along, square) = (dot(&moved, &left), dot(&moved, &moved));

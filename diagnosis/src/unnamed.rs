@@ -4,6 +4,7 @@
 use crate::estimate::Estimator;
 use crate::periodic::golden;
 use crate::track::Track;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Samples per second that the search looks at, over the bandwidth of the residual.
@@ -130,30 +131,40 @@ fn is_apart(motion: &[Samples], hertz: f64) -> bool {
     there < GIVES_WAY * whole && fast(motion, hertz) - there < FAST_MOTION * whole
 }
 
-/// The swing whose frequency the fitted recordings tell, as the held-out ones show it; none where the axis itself moves as
-/// fast.
-pub(crate) fn swing(estimator: &Estimator, fit: &Left, held: &Left) -> Option<Swing> {
-    let of_fit = samples(estimator, fit.tracks, fit.refit);
-    let before = samples(estimator, held.tracks, held.refit);
-    let after = samples(estimator, held.tracks, held.patched);
-    let seconds = of_fit.iter().chain(&before).map(Samples::seconds).fold(0.0, f64::max);
-    let apart = 0.5 / seconds;
-    let first = FEWEST_CYCLES / seconds;
+/// The frequency at which a swing would explain the most of what the refit leaves on the fitted recordings.
+pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
+    let left = samples(estimator, fit.tracks, fit.refit);
+    let apart = apart(&left);
+    let first = 2.0 * FEWEST_CYCLES * apart;
     let count = ((estimator.bandwidth_hz - first) / apart).max(0.0) as usize;
     let (coarse, _) = (0..count)
+        .into_par_iter()
         .map(|i| first + apart * i as f64)
-        .map(|hertz| (hertz, explained(&of_fit, hertz)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let near =
-        |hertz: f64, all: &[Samples]| golden(hertz - apart, hertz + apart, 10, |hertz| explained(all, hertz));
-    // Each recorder has a clock of its own.
-    let hertz = near(near(coarse, &of_fit), &before);
-    let speeds: Vec<Vec<f64>> = held.tracks.iter().map(|track| track.v.clone()).collect();
+        .map(|hertz| (hertz, explained(&left, hertz)))
+        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.total_cmp(&a.0)))?;
+    Some(nearby(coarse, apart, &left))
+}
+
+/// Distance of frequencies that recordings of this length tell apart, halved.
+fn apart(all: &[Samples]) -> f64 {
+    0.5 / all.iter().map(Samples::seconds).fold(f64::MIN_POSITIVE, f64::max)
+}
+
+fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
+    golden(hertz - apart, hertz + apart, 10, |hertz| explained(all, hertz))
+}
+
+/// The swing at about `hertz` as held-out recordings show it; none where the axis itself moves or is driven so.
+pub(crate) fn swing(estimator: &Estimator, hertz: f64, held: &Left) -> Option<Swing> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, held.tracks, signals);
+    let (before, after) = (of_held(held.refit), of_held(held.patched));
+    // Each recorder has a clock of its own.
+    let hertz = nearby(hertz, apart(&before), &before);
     let swings = explained(&before, hertz);
+    let speeds: Vec<Vec<f64>> = held.tracks.iter().map(|track| track.v.clone()).collect();
     if explained(&of_held(held.force), hertz) > DRIVEN * swings || !is_apart(&of_held(&speeds), hertz) {
         return None;
     }
-    let part = swings / square(&before);
-    Some(Swing { hertz, part, taken: part - explained(&after, hertz) / square(&before) })
+    let whole = square(&before);
+    Some(Swing { hertz, part: swings / whole, taken: (swings - explained(&after, hertz)) / whole })
 }

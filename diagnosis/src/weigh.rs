@@ -55,7 +55,8 @@ pub(crate) struct Weighing {
     pub(crate) floor: f64,
     /// Whether the model leaves little enough of the force to have understood it.
     pub(crate) understood: bool,
-    /// A force that swings whatever the axis does.
+    /// Frequency at which a force may swing whatever the axis does, and that force if it does.
+    hertz: Option<f64>,
     pub(crate) swing: Option<Swing>,
 }
 
@@ -92,7 +93,7 @@ impl Weighing {
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
-    let mut best = once(s, bench, &refit, held, excitation);
+    let mut best = once(s, bench, &refit, held, excitation, None);
     loop {
         let least = best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
         let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
@@ -103,7 +104,7 @@ pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &
         let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
         prune(s, bench, held, &best.patched.noise);
-        let mut next = once(s, bench, &refit, held, excitation);
+        let mut next = once(s, bench, &refit, held, excitation, best.hertz);
         if next.surest() <= best.surest() {
             s.last = before;
             s.lost.truncate(known);
@@ -119,12 +120,14 @@ fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'
     unnamed::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
 }
 
+/// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
 fn once(
     s: &mut Search,
     bench: &Bench,
     refit: &Candidate,
     held: &[Track],
     excitation: &Excitation,
+    hertz: Option<f64>,
 ) -> Weighing {
     let nominal = bench.nominal;
     let mut found = std::mem::take(&mut s.found);
@@ -160,7 +163,8 @@ fn once(
     let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
     let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
     let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
-    let swing = unnamed::swing(&estimator, &left_by(bench.tracks, &on_fit), &left_by(held, &on_held));
+    let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, &on_fit)));
+    let swing = hertz.and_then(|hertz| unnamed::swing(&estimator, hertz, &left_by(held, &on_held)));
     let effects = found
         .into_iter()
         .enumerate()
@@ -186,6 +190,7 @@ fn once(
         table,
         floor,
         understood,
+        hertz,
         swing,
     }
 }
