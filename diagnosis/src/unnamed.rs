@@ -42,7 +42,7 @@ impl Swing {
 
     /// What was left out in words, where it is a swing.
     pub(crate) fn in_words(&self) -> Option<String> {
-        (self.part > DOMINANT).then(|| {
+        (self.part > DOMINANT || self.is_mistaken()).then(|| {
             format!(
                 "{:.0} % of what a refit leaves is a force that swings at {:.1} Hz, whatever the axis does",
                 100.0 * self.part,

@@ -69,15 +69,19 @@ impl Weighing {
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
     pub(crate) fn rests_on_evidence(&self, weighed: &Weighed) -> bool {
-        self.understood && weighed.is_there && !self.swing.is_some_and(|swing| swing.is_mistaken())
+        self.understood && weighed.is_there && !self.stands_for_swing()
+    }
+
+    fn stands_for_swing(&self) -> bool {
+        self.swing.is_some_and(|swing| swing.is_mistaken())
     }
 
     /// Why an effect is not named, if it is not.
     pub(crate) fn doubt(&self, weighed: &Weighed) -> Option<String> {
-        if !self.understood {
-            Some("with it the model still leaves too much of the force to have understood it".into())
-        } else if let Some(swing) = self.swing.filter(Swing::is_mistaken) {
+        if let Some(swing) = self.swing.filter(Swing::is_mistaken) {
             Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
+        } else if !self.understood {
+            Some("with it the model still leaves too much of the force to have understood it".into())
         } else if !weighed.is_there {
             Some("its size cannot be told from zero".into())
         } else if weighed.undecided {
@@ -93,7 +97,25 @@ impl Weighing {
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
-    let mut best = once(s, bench, &refit, held, excitation, None);
+    let best = without_unsure(s, bench, &refit, held, excitation);
+    if !best.stands_for_swing() {
+        return best;
+    }
+    // No model of the axis holds what goes its own way.
+    s.last = bench.fit_slow(Model::default(), &[&s.null.noise]);
+    let refitted = once(s, bench, &refit, held, excitation, best.hertz);
+    let dropped = best.dropped.into_iter().chain(best.effects).collect();
+    Weighing { dropped, swing: best.swing, ..refitted }
+}
+
+fn without_unsure(
+    s: &mut Search,
+    bench: &Bench,
+    refit: &Candidate,
+    held: &[Track],
+    excitation: &Excitation,
+) -> Weighing {
+    let mut best = once(s, bench, refit, held, excitation, None);
     loop {
         let least = best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
         let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
@@ -104,7 +126,7 @@ pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &
         let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
         prune(s, bench, held, &best.patched.noise);
-        let mut next = once(s, bench, &refit, held, excitation, best.hertz);
+        let mut next = once(s, bench, refit, held, excitation, best.hertz);
         if next.surest() <= best.surest() {
             s.last = before;
             s.lost.truncate(known);
