@@ -228,6 +228,19 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
     }
 }
 
+/// How near, as a part of it, the end of what a value may be is to be at it.
+const AT_END: f64 = 0.05;
+
+/// Whether a drift is at the end of what may be told from something else: what settles at once is how a recording begins,
+/// and what has hardly begun at its end is any slow change.
+pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
+    matches!(effect.name, N::FrictionDrift | N::GainDrift)
+        && movable(effect, span).iter().any(|(key, low, high)| {
+            let value = effect.shape[*key];
+            value < low * (1.0 + AT_END) || value > high * (1.0 - AT_END)
+        })
+}
+
 /// Whether the likelihood of an effect's first shape value has several optima.
 pub(crate) fn has_optima_apart(name: N) -> bool {
     matches!(name, N::CommandDelay | N::ElectricalLag | N::Backlash | N::RollerSlip | N::DriveCompliance)

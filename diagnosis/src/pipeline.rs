@@ -5,7 +5,7 @@ use crate::error::InputError;
 use crate::estimate::Estimator;
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::Noise;
-use crate::library::Span;
+use crate::library::{self, Span};
 use crate::model::{Key, Model, Nominal};
 use crate::noise::Colour;
 use crate::null;
@@ -354,10 +354,11 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
             let force = relative_gain(&estimator, held, &less_held_out, &left_held_out);
             let mut sizes = sizes(&estimator, bench.tracks, &left_fitted, &less_fitted);
             sizes.extend(self::sizes(&estimator, held, &left_held_out, &less_held_out));
-            let at_bound =
+            let is_bound =
                 last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
                     *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
                 });
+            let at_bound = is_bound || library::is_at_end(&effect, bench.span);
             let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
             Found {
                 effect,
