@@ -259,3 +259,35 @@ pub(crate) fn positive(name: N) -> bool {
             | N::PositionSpring
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drift_settles_neither_at_once_nor_long_after_the_end() {
+        let span = Span {
+            speed: 10.0,
+            speed_floor: 0.1,
+            slow: 1.0,
+            low: 0.0,
+            high: 20.0,
+            command: 1.0,
+            duration: 50.0,
+            row: 1e-3,
+            block: 2.5e-3,
+            count: 1e-3,
+            clip: 0.27,
+            tilt: false,
+            force: false,
+        };
+        let at_end = |name: N, time_constant: f64| {
+            is_at_end(&Effect::shaped(name, &[("time_constant", time_constant)]), &span)
+        };
+        for name in [N::FrictionDrift, N::GainDrift] {
+            assert!(at_end(name, 1.0) && at_end(name, 250.0));
+            assert!(!at_end(name, 2.0) && !at_end(name, 15.0) && !at_end(name, 100.0));
+        }
+        assert!(!at_end(N::ElectricalLag, 1e-6), "what is instant may be no lag, and is judged by its size");
+    }
+}
