@@ -48,11 +48,11 @@ pub(crate) fn evidence(found: &Found, left: Leftover) -> Evidence {
 /// 101, 303, 505 (pairs and physics without a name) and 707 (physics without a name), thirty of them wrong.
 const BIAS: f64 = 0.66;
 const WEIGHTS: [(&str, f64); 5] = [
-    ("least_z", 0.82),
-    ("share", 1.64),
-    ("left_of_force", -0.77),
-    ("unexplained", -1.87),
-    ("pliable", -1.73),
+    ("least_z", 0.74),
+    ("share", 1.53),
+    ("left_of_force", -0.68),
+    ("unexplained", -2.66),
+    ("pliable", -1.71),
 ];
 
 /// Least and most that is ever claimed.
