@@ -27,6 +27,8 @@ pub(crate) struct Span {
     /// Smallest part of the largest command at which a drive may clip. Where the inertia is hardly known, a drive that
     /// clips at little explains slow motion as well as forces in balance do.
     pub(crate) clip: f64,
+    /// Largest command that may do nothing.
+    pub(crate) dead: f64,
     /// Whether the columns are there and vary.
     pub(crate) tilt: bool,
     pub(crate) force: bool,
@@ -52,6 +54,7 @@ impl Span {
             .flat_map(|t| t.v.iter().zip(&t.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()))
             .collect();
         moving.sort_by(f64::total_cmp);
+        let command = fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs())));
         let fast = speeds[speeds.len() * 99 / 100];
         Self {
             slow: moving.get(moving.len() / 4).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
@@ -59,12 +62,13 @@ impl Span {
             speed_floor: fold(&|t| t.speed_floor),
             low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),
             high: fold(&|t| t.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
-            command: fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs()))),
+            command,
             duration: fold(&|t| t.row_time.last().copied().unwrap_or(0.0)),
             row: seconds / rows,
             block: seconds / blocks,
             count: 1.0 / nominal.rig.encoder.counts_per_unit,
             clip: if nominal.anchor.is_some() { 0.45 } else { 0.27 },
+            dead: nominal.most_ignored() * command,
             tilt: varies(tracks.iter().flat_map(|t| column(&t.tilt))),
             force: varies(tracks.iter().flat_map(|t| column(&t.force))),
         }
@@ -143,7 +147,7 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         N::CommandDeadband => {
             let mut out = Vec::new();
             for shift in [0.0, 1.0] {
-                for width in logarithmic(0.01 * span.command, 0.3 * span.command, 9) {
+                for width in logarithmic(0.01 * span.command, 0.85 * span.dead, 11) {
                     out.push(Effect::shaped(name, &[("half_width", width), ("shift", shift)]));
                 }
             }
@@ -208,7 +212,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         }
         N::PreslidingFriction => vec![("deflection", 0.5 * span.count, 0.1 * span.travel())],
         N::FrictionDrift | N::GainDrift => vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)],
-        N::CommandDeadband => vec![("half_width", 0.001 * span.command, 0.35 * span.command)],
+        N::CommandDeadband => vec![("half_width", 0.001 * span.command, span.dead)],
         N::CommandSaturation => vec![("limit", 0.9 * span.clip * span.command, span.command)],
         N::RollerSlip => vec![("limit", 0.03 * span.command, span.command), ("creep_time", 5e-5, 0.05)],
         N::CommandDelay => vec![("delay", 1e-6, 0.06)],
@@ -278,6 +282,7 @@ mod tests {
             block: 2.5e-3,
             count: 1e-3,
             clip: 0.27,
+            dead: 0.8,
             tilt: false,
             force: false,
         };

@@ -48,6 +48,10 @@ const REACH: f64 = 3.0;
 /// How many standard deviations a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
+/// Largest part of the command that may do nothing, where the inertia is known and where it is not.
+const IGNORED: f64 = 0.8;
+const IGNORED_UNANCHORED: f64 = 0.35;
+
 impl Nominal {
     /// Gain over inertia as the rig states it.
     pub(crate) fn gain(&self) -> f64 {
@@ -142,6 +146,12 @@ impl Nominal {
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
+    }
+
+    /// Largest part of the command that may do nothing. Where the inertia is hardly known, a drive that ignores its command
+    /// explains any balance of forces, and so explains nothing.
+    pub(crate) fn most_ignored(&self) -> f64 {
+        if self.anchor.is_some() { IGNORED_UNANCHORED } else { IGNORED }
     }
 
     /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.

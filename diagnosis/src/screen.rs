@@ -2,15 +2,11 @@
 
 use crate::effects::Effect;
 use crate::fit::{Fit, dot};
-use crate::model::{Model, effect_inputs, effective_command, own_phase};
+use crate::model::{Model, Nominal, effect_inputs, effective_command, own_phase};
 use crate::select::PER_COEFFICIENT;
 use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
 use rayon::prelude::*;
-
-/// All command effects together may change this part of the command's mean size at the most: a drive that ignores its command explains
-/// any balance of forces, and so explains nothing.
-const EXPLAINED_AWAY: f64 = 0.35;
 
 /// What a score test says.
 #[derive(Debug, Clone)]
@@ -23,7 +19,7 @@ pub(crate) struct Score {
 pub(crate) type Terms = Vec<Vec<Vec<f64>>>;
 
 /// Inputs that an effect would add to a model over one recording; for command effects the change of the command.
-pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec<Input> {
+pub(crate) fn added_inputs(model: &Model, nominal: &Nominal, track: &Track, effect: &Effect) -> Vec<Input> {
     let before = effective_command(track, &model.effects);
     let command = before.as_deref().unwrap_or(&track.command);
     if crate::effects::CommandLaw::new(effect).is_some() {
@@ -32,7 +28,8 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
         let after = effective_command(track, &with).expect("the effect acts on the command");
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         let taken: f64 = after.iter().zip(&track.command).map(|(a, b)| (a - b).abs()).sum();
-        if taken > EXPLAINED_AWAY * track.command.iter().map(|u| u.abs()).sum::<f64>() {
+        let whole: f64 = track.command.iter().map(|u| u.abs()).sum();
+        if taken > nominal.most_ignored() * whole {
             return vec![Input::Held(vec![0.0; track.blocks()])];
         }
         return vec![track.rows_input(&change)];
@@ -42,12 +39,21 @@ pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec
 }
 
 /// Responses of an effect's terms under the noise of a fit.
-pub(crate) fn responses(fit: &Fit, model: &Model, tracks: &[Track], effect: &Effect) -> Terms {
+pub(crate) fn responses(
+    fit: &Fit,
+    model: &Model,
+    nominal: &Nominal,
+    tracks: &[Track],
+    effect: &Effect,
+) -> Terms {
     tracks
         .iter()
         .zip(&fit.prepared)
         .map(|(track, one)| {
-            added_inputs(model, track, effect).iter().map(|input| one.gains.response(track, input)).collect()
+            added_inputs(model, nominal, track, effect)
+                .iter()
+                .map(|input| one.gains.response(track, input))
+                .collect()
         })
         .collect()
 }
@@ -104,9 +110,9 @@ pub(crate) fn score(
     model: &Model,
     tracks: &[Track],
     effect: &Effect,
-    limits: (f64, f64),
+    nominal: &Nominal,
 ) -> Score {
-    let terms = responses(fit, model, tracks, effect);
+    let terms = responses(fit, model, nominal, tracks, effect);
     let sums = project(fit, residuals, &terms, own_phase(effect.name));
     if crate::effects::CommandLaw::new(effect).is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.
@@ -117,7 +123,7 @@ pub(crate) fn score(
     let coefficients = Factor::new(&sums.information).solve(&sums.score);
     let mut gain = 0.5 * dot(&coefficients, &sums.score);
     if coefficients.len() == 1 {
-        let (low, high) = limits;
+        let (low, high) = nominal.limits(effect.name);
         let x = coefficients[0].clamp(low, high);
         gain = x * sums.score[0] - 0.5 * x * x * sums.information.at(0, 0);
     }
@@ -131,10 +137,10 @@ pub(crate) fn best_on_grid(
     model: &Model,
     tracks: &[Track],
     grid: &[Effect],
-    limits: (f64, f64),
+    nominal: &Nominal,
 ) -> Option<(Effect, Score)> {
     let scores: Vec<Score> =
-        grid.par_iter().map(|effect| score(fit, residuals, model, tracks, effect, limits)).collect();
+        grid.par_iter().map(|effect| score(fit, residuals, model, tracks, effect, nominal)).collect();
     // Of profiles along the travel the finer has more values to fit.
     let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * effect.shape_or("degree", 0.0);
     let mut best: Option<(Effect, Score)> = None;

@@ -112,15 +112,8 @@ impl Bench<'_> {
                 ),
                 _ => {
                     let grid = library::shapes(*name, self.span, self.nominal);
-                    screen::best_on_grid(
-                        &now.fit,
-                        &residuals,
-                        &now.model,
-                        self.tracks,
-                        &grid,
-                        self.nominal.limits(*name),
-                    )
-                    .map(|(effect, score)| (effect, score.gain))
+                    screen::best_on_grid(&now.fit, &residuals, &now.model, self.tracks, &grid, self.nominal)
+                        .map(|(effect, score)| (effect, score.gain))
                 }
             };
             if *name == N::MissedCounts && self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0)) {
@@ -140,9 +133,8 @@ impl Bench<'_> {
 
     /// Moves the shape of an effect to its largest score gain, one value after another.
     fn refine(&self, now: &Candidate, residuals: &[Vec<f64>], mut effect: Effect) -> (Effect, f64) {
-        let limits = self.nominal.limits(effect.name);
         let gain = |effect: &Effect| {
-            screen::score(&now.fit, residuals, &now.model, self.tracks, effect, limits).gain
+            screen::score(&now.fit, residuals, &now.model, self.tracks, effect, self.nominal).gain
         };
         let movable = library::movable(&effect, self.span);
         let mut best = gain(&effect);
