@@ -158,6 +158,13 @@ fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], s
     }
 }
 
+/// Smooths fitted recordings with a model fitted to them: what a null leaves out is noise to its smoother, and next to
+/// rest and reversals such a smoother knows neither the speed nor its sign.
+fn smooth_fitted(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track]) {
+    let totals = candidate.fit.totals(tracks);
+    null::resmooth(tracks, &totals, &candidate.noise, 1.0 / nominal.rig.encoder.counts_per_unit);
+}
+
 /// Looks for lost counts in every recording under the null, and again with the noise that is left without them.
 fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise, scale: f64) {
     let mut noise = *noise;
@@ -195,19 +202,17 @@ pub(crate) fn search(
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
     smooth_held(&first, &nominal, &mut held, scale);
     find_steps(&nominal, &span, &mut held, &noise, scale);
-    let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
-    let mut white = bench.fit(Model::default(), &noise, Colour::White);
-    let null_slow = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
-    let mut slow_merit = null_slow.merit;
-    let mut slow_noise = null_slow.noise;
+    let mut white = Bench::new(&nominal, &tracks, &span, scale).fit(Model::default(), &noise, Colour::White);
+    let mut slow = Bench::new(&nominal, &tracks, &span, scale).fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
     let mut tried = 0;
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
-        let candidates = bench.screen(&white, &|_| true);
-        let mut finalists = bench.finalists(&white, &candidates);
-        bench.polish(&mut finalists);
-        order_near_ties(&bench, white.merit, &mut finalists);
+        let on = Bench::new(&nominal, &tracks, &span, scale);
+        let candidates = on.screen(&white, &|_| true);
+        let mut finalists = on.finalists(&white, &candidates);
+        on.polish(&mut finalists);
+        order_near_ties(&on, white.merit, &mut finalists);
         let mut taken = None;
         for finalist in finalists {
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
@@ -215,42 +220,45 @@ pub(crate) fn search(
                 break;
             }
             tried += 1;
-            let slow = bench.fit_slow(finalist.model.clone(), &[&slow_noise, &finalist.noise]);
-            let gain = slow.merit - slow_merit;
+            let with = on.fit_slow(finalist.model.clone(), &[&slow.noise, &finalist.noise]);
+            let gain = with.merit - slow.merit;
             if gain < WORTH {
                 lost.push((name, gain, "what it explains is no more than a slow disturbance would".into()));
                 continue;
             }
-            let mut judged = judge_all(&bench, &finalist, &held);
-            let own = judged.pop().expect("the last effect is judged");
-            if let Some(reason) = own.weakness() {
-                lost.push((name, own.holdout.sum, reason));
+            let (mut own_tracks, mut own_held) = (tracks.clone(), held.clone());
+            smooth_fitted(&with, &nominal, &mut own_tracks);
+            let own = Bench::new(&nominal, &own_tracks, &span, scale);
+            let slow = own.fit_slow(finalist.model.clone(), &[&with.noise, &finalist.noise]);
+            smooth_held(&slow, &nominal, &mut own_held, scale);
+            let finalist = own.fit(finalist.model, &finalist.noise, Colour::White);
+            let judged = judge_all(&own, &finalist, &own_held).pop().expect("the last effect is judged");
+            if let Some(reason) = judged.weakness() {
+                lost.push((name, judged.holdout.sum, reason));
                 continue;
             }
-            taken = Some((finalist, slow));
+            taken = Some((finalist, slow, own_tracks, own_held));
             break;
         }
-        let Some((finalist, slow)) = taken else { break };
-        slow_merit = slow.merit;
-        slow_noise = slow.noise;
-        white = finalist;
+        let Some(next) = taken else { break };
+        (white, slow, tracks, held) = next;
     }
     progress("judging on held-out recordings", 0.8);
-    let last = bench.fit_slow(white.model.clone(), &[&slow_noise, &white.noise]);
+    let bench = Bench::new(&nominal, &tracks, &span, scale);
+    let last = bench.fit_slow(white.model.clone(), &[&slow.noise, &white.noise]);
+    let null = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut s = Search {
         nominal: nominal.clone(),
         fit_tracks: Vec::new(),
         held_tracks: Vec::new(),
         span: span.clone(),
-        null: null_slow,
+        null,
         last,
         found: Vec::new(),
         lost,
     };
     prune(&mut s, &bench, &held, &white.noise);
-    if !s.last.model.effects.is_empty() {
-        smooth_held(&s.last, &nominal, &mut held, scale);
-    }
+    smooth_held(&s.last, &nominal, &mut held, scale);
     (s.fit_tracks, s.held_tracks) = (tracks, held);
     Ok(s)
 }

@@ -70,7 +70,11 @@ fn needs_dry(name: N) -> bool {
     )
 }
 
-impl Bench<'_> {
+impl<'a> Bench<'a> {
+    pub(crate) fn new(nominal: &'a Nominal, tracks: &'a [Track], span: &'a Span, scale: f64) -> Self {
+        Self { nominal, tracks, span, scale }
+    }
+
     /// Fits a model with noise of its own, starting from known noise.
     pub(crate) fn fit(&self, model: Model, from: &Noise, colour: Colour) -> Candidate {
         let first = Fit::new(&model, self.nominal, self.tracks, from);
