@@ -247,7 +247,17 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
 
 /// Whether the likelihood of an effect's first shape value has several optima.
 pub(crate) fn has_optima_apart(name: N) -> bool {
-    matches!(name, N::CommandDelay | N::ElectricalLag | N::Backlash | N::RollerSlip | N::DriveCompliance)
+    matches!(
+        name,
+        N::CommandDeadband
+            | N::CommandDelay
+            | N::ElectricalLag
+            | N::FrictionDrift
+            | N::GainDrift
+            | N::Backlash
+            | N::RollerSlip
+            | N::DriveCompliance
+    )
 }
 
 /// Whether a single coefficient must be positive for the effect to be what its name says.

@@ -203,7 +203,8 @@ pub(crate) fn search(
     smooth_held(&first, &nominal, &mut held, scale);
     find_steps(&nominal, &span, &mut held, &noise, scale);
     let mut white = Bench::new(&nominal, &tracks, &span, scale).fit(Model::default(), &noise, Colour::White);
-    let mut slow = Bench::new(&nominal, &tracks, &span, scale).fit_slow(Model::default(), &[&noise, &white.noise]);
+    let mut slow =
+        Bench::new(&nominal, &tracks, &span, scale).fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut lost: Vec<(EffectName, f64, String)> = Vec::new();
     let mut tried = 0;
     for step in 0..MOST {

@@ -39,6 +39,8 @@ const FINALISTS: usize = 8;
 const POLISHED: usize = 3;
 /// Factors at which optima are looked for that lie apart.
 const APART: [f64; 8] = [0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.4];
+/// How often they are looked for farther away.
+const FARTHER: usize = 4;
 /// How often waves are looked for again under the noise that they leave.
 const SEARCHES: usize = 3;
 /// Most effects that are named together.
@@ -231,18 +233,27 @@ impl<'a> Bench<'a> {
             |model: &Model| Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood;
         let mut best = candidate.fit.log_likelihood;
         let movable = library::movable(&candidate.model.effects[last], self.span);
-        // The score test holds the gain and looks near by: delays and events have optima that lie apart.
+        // The score test holds the gain and looks near by: delays, drifts and events have optima that lie apart.
         if let (true, Some((key, low, high))) =
             (library::has_optima_apart(candidate.model.effects[last].name), movable.first().copied())
         {
-            let at = model.effects[last].shape[key];
-            for factor in APART {
-                let mut trial = candidate.model.clone();
-                trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
-                let value = merit(&trial);
-                if value > best {
-                    best = value;
-                    model = trial;
+            for _ in 0..FARTHER {
+                let at = model.effects[last].shape[key];
+                let mut taken = None;
+                for factor in APART {
+                    let mut trial = model.clone();
+                    trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
+                    let value = merit(&trial);
+                    if value > best {
+                        best = value;
+                        taken = Some((factor, trial));
+                    }
+                }
+                let Some((factor, trial)) = taken else { break };
+                model = trial;
+                // Only from the edge of what was looked at is it worth looking farther.
+                if factor > APART[0] && factor < APART[APART.len() - 1] {
+                    break;
                 }
             }
         }
