@@ -15,7 +15,7 @@ pub(crate) type Evidence = BTreeMap<String, f64>;
 pub(crate) struct Leftover {
     /// Root mean square of what hangs together over time and is not explained, over the force's.
     pub(crate) of_force: f64,
-    /// Held-out residual of the patched model over the refit's.
+    /// Mean square that the patched model leaves on held-out recordings over the refit's, both above the counting's.
     pub(crate) unexplained: f64,
 }
 
@@ -37,7 +37,7 @@ pub(crate) fn evidence(found: &Found, left: Leftover) -> Evidence {
         ("least_z", log(found.least_z(), 2.0, SUREST)),
         ("share", log(found.share, least_share, 1.0)),
         ("left_of_force", log(left.of_force, 0.005, 0.3)),
-        ("unexplained", left.unexplained.powi(2).min(1.0)),
+        ("unexplained", left.unexplained.min(1.0)),
         ("pliable", f64::from(u8::from(is_pliable(found.effect.name)))),
     ]
     .map(|(key, value)| (key.to_owned(), value))

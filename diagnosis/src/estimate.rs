@@ -9,7 +9,9 @@ use std::f64::consts::TAU;
 
 /// Largest bandwidth, Hz.
 const WIDEST_HZ: f64 = 50.0;
-const NARROWEST_HZ: f64 = 5.0;
+const NARROWEST_HZ: f64 = 3.0;
+/// Part of the force that sensor noise may be in it: more hides what is left out.
+const NOISY: f64 = 0.01;
 
 /// The estimator for some recordings.
 #[derive(Debug, Clone, Copy)]
@@ -18,11 +20,11 @@ pub(crate) struct Estimator {
 }
 
 impl Estimator {
-    /// Chooses the bandwidth at which sensor noise stays below a tenth of the acceleration `scale`.
+    /// Chooses the bandwidth at which sensor noise stays below [`NOISY`] of the acceleration `scale`.
     pub(crate) fn new(tracks: &[Track], noise: &Noise, scale: f64) -> Self {
         let slowest = tracks.iter().map(Track::block_rate).fold(f64::INFINITY, f64::min);
         let mut hz = WIDEST_HZ.min(0.25 * slowest);
-        while hz > NARROWEST_HZ && sensor_noise(tracks, noise, hz) > 0.05 * scale {
+        while hz > NARROWEST_HZ && sensor_noise(tracks, noise, hz) > NOISY * scale {
             hz *= 0.9;
         }
         Self { bandwidth_hz: hz.max(NARROWEST_HZ) }

@@ -180,7 +180,7 @@ pub(crate) fn effective_command(track: &Track, effects: &[Effect]) -> Option<Vec
     if laws.is_empty() {
         return None;
     }
-    let held = track.command.iter().zip(&track.row_hold);
+    let held = track.command.iter().zip(track.row_hold.iter());
     Some(held.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
 }
 
@@ -205,6 +205,9 @@ pub(crate) fn direction(track: &Track) -> Vec<f64> {
     track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
 }
 
+/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz.
+const SECOND_MASS_STEP_S: f64 = 4e-4;
+
 /// The inputs of one effect on force or sensor over a recording.
 pub(crate) fn effect_inputs(
     track: &Track,
@@ -219,19 +222,20 @@ pub(crate) fn effect_inputs(
     let count = law.names().len();
     let n = track.blocks();
     if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
-        // What a second mass does is faster than a block: row by row.
+        // What a second mass does is faster than a block.
         let mut out = vec![0.0];
-        let signal: Vec<f64> = command
-            .iter()
-            .zip(&track.row_hold)
-            .enumerate()
-            .map(|(i, (u, h))| {
-                let velocity = track.v[(i / track.rows_per_block).min(n - 1)];
-                let state = State { drive: *u, command: *u, velocity, dt: *h, ..State::default() };
-                law.terms(&state, &mut out);
-                out[0]
-            })
-            .collect();
+        let mut signal = Vec::with_capacity(command.len());
+        let (block, step) = (track.rows_per_block, track.rows_per_step(SECOND_MASS_STEP_S));
+        let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
+        for (j, (command, hold)) in blocks.enumerate() {
+            let velocity = track.v[j.min(n - 1)];
+            for (command, hold) in command.chunks(step).zip(hold.chunks(step)) {
+                let dt: f64 = hold.iter().sum();
+                let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / dt;
+                law.terms(&State { drive: mean, command: mean, velocity, dt, ..State::default() }, &mut out);
+                signal.extend(std::iter::repeat_n(out[0], command.len()));
+            }
+        }
         return vec![track.rows_input(&signal)];
     }
     let mut columns = vec![Vec::with_capacity(n); count];

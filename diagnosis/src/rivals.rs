@@ -10,6 +10,7 @@ use crate::periodic::is_periodic;
 use crate::pipeline::{Found, Rival, fit_costs, lay_all};
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
+use rayon::prelude::*;
 
 /// How many rivals of each effect are fitted in full.
 const RIVALS: usize = 4;
@@ -52,7 +53,6 @@ pub(crate) fn fit_rivals(
         let name = best.model.effects[i].name;
         let base_fit = Fit::new(&less, bench.nominal, bench.tracks, &best.noise);
         let base = Candidate { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
-        let mut out: Vec<Rival> = Vec::new();
         let periodic =
             is_periodic(name) || matches!(name, EffectName::MassImbalance | EffectName::EncoderEccentricity);
         let others: Vec<(Effect, f64)> = bench
@@ -60,41 +60,45 @@ pub(crate) fn fit_rivals(
             .into_iter()
             .take(RIVALS)
             .collect();
-        // Needed only where a rival comes near, and the same for all of them.
-        let mut without = None;
-        for (effect, _) in others {
+        let with = |effect: &Effect| {
             let mut model = base.model.clone();
             model.effects.push(effect.clone());
-            let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
-            let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
-            let lead = |rival: &Candidate| {
-                let theirs = costs(rival, bench.nominal, held);
-                judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
-            };
-            let mut gain = lead(&rival);
-            if gain.z < WITHIN_REACH {
-                // A rival that may be near is fitted as well as the winner was.
-                let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
-                let again = lead(&polished);
-                if again.sum < gain.sum {
-                    gain = again;
+            model
+        };
+        let mut out: Vec<Rival> = others
+            .par_iter()
+            .map(|(effect, _)| {
+                let model = with(effect);
+                let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
+                let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
+                let lead = |rival: &Candidate| {
+                    let theirs = costs(rival, bench.nominal, held);
+                    judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
+                };
+                let mut gain = lead(&rival);
+                if gain.z < WITHIN_REACH {
+                    // A rival that may be near is fitted as well as the winner was.
+                    let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
+                    let again = lead(&polished);
+                    if again.sum < gain.sum {
+                        gain = again;
+                    }
                 }
+                Rival { name: effect.name, z: gain.z, lead: gain.sum }
+            })
+            .collect();
+        // Needed only where a rival comes near, and the same for all of them.
+        let mut without = None;
+        for (rival, (effect, _)) in out.iter_mut().zip(&others).filter(|(rival, _)| rival.z < BEHIND_Z) {
+            // What only a white noise takes for as good is behind.
+            let theirs = bench.fit_slow(with(effect), &[&slow.noise]).merit;
+            let without =
+                *without.get_or_insert_with(|| bench.fit_slow(base.model.clone(), &[&slow.noise]).merit);
+            let behind = slow.merit - theirs;
+            if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
+                rival.z = BEHIND_SLOW_Z;
+                rival.lead = rival.lead.max(behind);
             }
-            let mut rival = Rival { name: effect.name, z: gain.z, lead: gain.sum };
-            if rival.z < BEHIND_Z {
-                // What only a white noise takes for as good is behind.
-                let mut model = base.model.clone();
-                model.effects.push(effect.clone());
-                let theirs = bench.fit_slow(model, &[&slow.noise]).merit;
-                let without =
-                    *without.get_or_insert_with(|| bench.fit_slow(base.model.clone(), &[&slow.noise]).merit);
-                let behind = slow.merit - theirs;
-                if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
-                    rival.z = BEHIND_SLOW_Z;
-                    rival.lead = rival.lead.max(behind);
-                }
-            }
-            out.push(rival);
         }
         found[i].rivals = out;
     }

@@ -5,6 +5,7 @@
 
 use crate::recording::Recording;
 use crate::rig::Rig;
+use std::sync::Arc;
 
 /// What an input does over each block, from the state at the block's start.
 #[derive(Debug, Clone)]
@@ -35,10 +36,10 @@ pub(crate) struct Track {
     /// Variance of that mean from quantisation alone.
     pub(crate) quantum: Vec<f64>,
     /// Time of each row since the first, and the length for which its command is held (one fewer than rows).
-    pub(crate) row_time: Vec<f64>,
-    pub(crate) row_hold: Vec<f64>,
+    pub(crate) row_time: Arc<[f64]>,
+    pub(crate) row_hold: Arc<[f64]>,
     /// Command per row.
-    pub(crate) command: Vec<f64>,
+    pub(crate) command: Arc<[f64]>,
     /// Block means.
     pub(crate) tilt: Option<Vec<f64>>,
     pub(crate) force: Option<Vec<f64>>,
@@ -99,8 +100,8 @@ impl Track {
             segments: Vec::new(),
             lost: vec![0.0; n],
             speed_floor: 0.0,
-            row_time,
-            row_hold,
+            row_time: row_time.into(),
+            row_hold: row_hold.into(),
         };
         let mean = |column: &[f64]| -> Vec<f64> {
             column.chunks_exact(m).take(n).map(|c| c.iter().sum::<f64>() / m as f64).collect()
@@ -162,6 +163,12 @@ impl Track {
     pub(crate) fn block_rate(&self) -> f64 {
         let n = self.blocks();
         n as f64 / (self.start[n - 1] + self.span[n - 1])
+    }
+
+    /// Rows that fit into a step of `seconds`, at least one and at most a block.
+    pub(crate) fn rows_per_step(&self, seconds: f64) -> usize {
+        let rows = seconds * self.block_rate() * self.rows_per_block as f64;
+        (rows.round() as usize).clamp(1, self.rows_per_block)
     }
 
     /// What a signal held row by row does over each block.

@@ -142,6 +142,11 @@ fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'
     unnamed::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
 }
 
+/// Mean square of a residual above what counting makes of it.
+fn above(residual: f64, floor: f64) -> f64 {
+    (residual.powi(2) - floor.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
+}
+
 /// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
 fn once(
     s: &mut Search,
@@ -179,7 +184,7 @@ fn once(
     let left = s.last.noise.slow * inertia * inertia;
     let leftover = Leftover {
         of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
-        unexplained: table.patched.holdout / table.refit.holdout.max(1e-300),
+        unexplained: above(table.patched.holdout, floor) / above(table.refit.holdout, floor),
     };
     let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
     let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;

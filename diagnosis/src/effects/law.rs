@@ -1,7 +1,7 @@
 //! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
 
 use super::load::Load;
-use super::{Effect, EffectName};
+use super::{Effect, EffectName, PerStep};
 use std::f64::consts::TAU;
 
 /// Where the plant is during one step.
@@ -45,7 +45,7 @@ pub struct Law {
     /// What hangs on the motor by a gap or a grip.
     load: Load,
     /// Transition of the resonator for a step of `dt`: kept because steps repeat.
-    resonator: Option<(f64, [f64; 6])>,
+    resonator: PerStep<[f64; 6]>,
 }
 
 impl Law {
@@ -119,7 +119,7 @@ impl Law {
         };
         let state = [0.0; 3];
         let load = Load::new(effect);
-        Some(Self { name: effect.name, a, b, waves, times, names, state, load, resonator: None })
+        Some(Self { name: effect.name, a, b, waves, times, names, state, load, resonator: PerStep::new() })
     }
 
     /// Names of the terms, in order.
@@ -217,14 +217,8 @@ impl Law {
         if dt <= 0.0 {
             return 0.0;
         }
-        let m = match self.resonator {
-            Some((known, m)) if known == dt => m,
-            _ => {
-                let m = transition(self.a, self.b, dt);
-                self.resonator = Some((dt, m));
-                m
-            }
-        };
+        let (omega, zeta) = (self.a, self.b);
+        let m = self.resonator.of(dt, |dt| transition(omega, zeta, dt));
         if self.state[2] == 0.0 {
             // At the start the spring carries the standing force.
             self.state = [force / (self.a * self.a), 0.0, 1.0];

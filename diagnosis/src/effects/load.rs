@@ -7,8 +7,8 @@
 //! a ceiling, friction taken as shared like the inertia. Both are driven by the command, so that little noise of the
 //! measured motion enters, and bounded, so that nothing drifts.
 
-use super::Effect;
 use super::law::State;
+use super::{Effect, PerStep};
 use std::f64::consts::TAU;
 
 /// The load's motion against the motor's.
@@ -28,6 +28,8 @@ pub(crate) struct Load {
     limit: f64,
     /// Time in which the creep follows the command, s.
     creep_time: f64,
+    /// What is left of a difference to the creep after a step.
+    creep_left: PerStep<f64>,
     /// Lead over the load and its rate; none before the first command.
     lead: Option<(f64, f64)>,
     /// Creep as a part of that at which the grip is at its ceiling.
@@ -53,6 +55,7 @@ impl Load {
             coast: get("coast", 0.0),
             limit: get("limit", f64::INFINITY),
             creep_time: get("creep_time", 1e-3),
+            creep_left: PerStep::new(),
             lead: None,
             creep: 0.0,
         }
@@ -88,11 +91,11 @@ impl Load {
     pub(crate) fn by_grip(&mut self, command: f64, dt: f64) -> f64 {
         let wanted = command / self.limit;
         let held = self.creep.clamp(-1.0, 1.0);
-        let ratio = dt / self.creep_time.max(1e-9);
+        let time = self.creep_time.max(1e-9);
         self.creep = if self.creep.abs() < 1.0 {
-            wanted + (self.creep - wanted) * (-ratio).exp()
+            wanted + (self.creep - wanted) * self.creep_left.of(dt, |dt| (-dt / time).exp())
         } else {
-            self.creep + (wanted - held) * ratio
+            self.creep + (wanted - held) * dt / time
         };
         let carried = 0.5 * (held + self.creep.clamp(-1.0, 1.0));
         command - self.limit * carried
