@@ -117,6 +117,8 @@ impl Found {
 #[derive(Clone, Debug)]
 pub(crate) struct Rival {
     pub(crate) name: EffectName,
+    /// Its shape, as well fitted as it was compared.
+    pub(crate) effect: Effect,
     /// Mean lead of the winner over its standard error, over all segments.
     pub(crate) z: f64,
     /// Lead of the winner in log-likelihood.

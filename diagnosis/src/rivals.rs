@@ -76,15 +76,18 @@ pub(crate) fn fit_rivals(
                     judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
                 };
                 let mut gain = lead(&rival);
+                let mut effect = effect.clone();
                 if gain.z < WITHIN_REACH {
                     // A rival that may be near is fitted as well as the winner was.
                     let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
                     let again = lead(&polished);
                     if again.sum < gain.sum {
                         gain = again;
+                        effect =
+                            polished.model.effects.into_iter().next_back().expect("a rival has an effect");
                     }
                 }
-                Rival { name: effect.name, z: gain.z, lead: gain.sum }
+                Rival { name: effect.name, effect, z: gain.z, lead: gain.sum }
             })
             .collect();
         // Needed only where a rival comes near, and the same for all of them.
@@ -126,6 +129,12 @@ pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -
         }
     }
     class
+}
+
+/// The rival that explains surely more than the effect found, if there is one.
+pub(crate) fn overtaker(found: &Found) -> Option<&Rival> {
+    let ahead = found.rivals.iter().filter(|r| r.z < -BEHIND_Z && r.lead < -BEHIND);
+    ahead.min_by(|a, b| a.lead.total_cmp(&b.lead))
 }
 
 /// Standard errors that the nearest rival outside an effect's class is behind.

@@ -94,47 +94,157 @@ impl Weighing {
     }
 }
 
-/// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
+/// Weighs what the search found, with rivals that explain more in their place, and again without what is unsure as long
+/// as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
-    let best = without_unsure(s, bench, &refit, held, excitation);
+    let scales = Scales { bench, refit: &refit, held, excitation };
+    let found = scales.once(s, None);
+    let found = scales.with_overtakers(s, found);
+    let best = scales.without_unsure(s, found);
     if !best.stands_for_swing() {
         return best;
     }
     // No model of the axis holds what goes its own way.
     s.last = bench.fit_slow(Model::default(), &[&s.null.noise]);
-    let refitted = once(s, bench, &refit, held, excitation, best.hertz);
+    let refitted = scales.once(s, best.hertz);
     let dropped = best.dropped.into_iter().chain(best.effects).collect();
     Weighing { dropped, swing: best.swing, ..refitted }
 }
 
-fn without_unsure(
-    s: &mut Search,
-    bench: &Bench,
-    refit: &Candidate,
-    held: &[Track],
-    excitation: &Excitation,
-) -> Weighing {
-    let mut best = once(s, bench, refit, held, excitation, None);
-    loop {
-        let least = best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
-        let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
-            return best;
-        };
-        let mut model = s.last.model.clone();
-        model.effects.remove(i);
-        let without = bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
-        let (before, known) = (std::mem::replace(&mut s.last, without), s.lost.len());
-        prune(s, bench, held, &best.patched.noise);
-        let mut next = once(s, bench, refit, held, excitation, best.hertz);
-        if next.surest() <= best.surest() {
-            s.last = before;
-            s.lost.truncate(known);
-            return best;
+/// What every model is weighed with.
+struct Scales<'a> {
+    bench: &'a Bench<'a>,
+    refit: &'a Candidate,
+    held: &'a [Track],
+    excitation: &'a Excitation,
+}
+
+impl Scales<'_> {
+    /// Another model in place of the best so far, if it is better; otherwise the search stays as it was.
+    fn instead(
+        &self,
+        s: &mut Search,
+        model: Model,
+        best: &Weighing,
+        is_better: impl Fn(&Weighing) -> bool,
+    ) -> Option<Weighing> {
+        let other = self.bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
+        let (before, known) = (std::mem::replace(&mut s.last, other), s.lost.len());
+        prune(s, self.bench, self.held, &best.patched.noise);
+        let next = self.once(s, best.hertz);
+        if is_better(&next) {
+            return Some(next);
         }
-        next.dropped = best.dropped;
-        next.dropped.push(best.effects.remove(i));
-        best = next;
+        s.last = before;
+        s.lost.truncate(known);
+        None
+    }
+
+    /// The first effects found are chosen under the noise of a model that lacks the others: a rival may be ahead at last.
+    fn with_overtakers(&self, s: &mut Search, mut best: Weighing) -> Weighing {
+        for _ in 0..best.effects.len() {
+            let ahead = best.effects.iter().enumerate().find_map(|(i, weighed)| {
+                rivals::overtaker(&weighed.found).map(|rival| (i, rival.effect.clone()))
+            });
+            let Some((i, effect)) = ahead else { return best };
+            let mut model = s.last.model.clone();
+            model.effects[i] = effect;
+            let left = best.table.patched.holdout;
+            let leaves_less = |next: &Weighing| next.table.patched.holdout < left && next.surest() >= NAMED;
+            match self.instead(s, model, &best, leaves_less) {
+                Some(next) => best = next,
+                None => return best,
+            }
+        }
+        best
+    }
+
+    fn without_unsure(&self, s: &mut Search, mut best: Weighing) -> Weighing {
+        loop {
+            let least =
+                best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
+            let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
+                return best;
+            };
+            let mut model = s.last.model.clone();
+            model.effects.remove(i);
+            let Some(mut next) = self.instead(s, model, &best, |next| next.surest() > best.surest()) else {
+                return best;
+            };
+            next.dropped = best.dropped;
+            next.dropped.push(best.effects.remove(i));
+            best = next;
+        }
+    }
+
+    /// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
+    fn once(&self, s: &mut Search, hertz: Option<f64>) -> Weighing {
+        let Self { bench, refit, held, excitation } = *self;
+        let nominal = bench.nominal;
+        let mut found = std::mem::take(&mut s.found);
+        let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
+        rivals::fit_rivals(bench, &patched, &s.last, held, &mut found);
+        let estimator = Estimator::new(bench.tracks, &patched.noise, bench.scale);
+        let on_fit = residuals(nominal, &estimator, bench.tracks, false, refit, &patched);
+        let on_held = residuals(nominal, &estimator, held, true, refit, &patched);
+        let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
+            fit: estimator.rms(a, bench.tracks),
+            holdout: estimator.rms(b, held),
+        };
+        let (inertia, _, _) = values::scale(nominal, &patched);
+        let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+        let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
+        let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
+        let table = FitTable {
+            metric: "force_rmse".into(),
+            unit: nominal.rig.kind.force().into(),
+            nominal: both(&on_fit.nominal, &on_held.nominal),
+            refit: both(&on_fit.refit, &on_held.refit),
+            patched: both(&on_fit.patched, &on_held.patched),
+            force_rms: both(&on_fit.force, &on_held.force),
+            // Nothing can take more than there is; some resamplings of few segments would.
+            holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
+        };
+        let left = s.last.noise.slow * inertia * inertia;
+        let leftover = Leftover {
+            of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
+            unexplained: above(table.patched.holdout, floor) / above(table.refit.holdout, floor),
+        };
+        let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
+        let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
+        let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
+        let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
+        let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, &on_fit)));
+        let swing = hertz.and_then(|hertz| unnamed::swing(&estimator, hertz, &left_by(held, &on_held)));
+        let effects = found
+            .into_iter()
+            .enumerate()
+            .map(|(i, found)| {
+                let class = rivals::class(&found, excitation, leaves_much);
+                let nearest = rivals::nearest(&found, &class);
+                let evidence = confidence::evidence(&found, leftover);
+                let parameters = values::parameters(bench, &patched, i);
+                let is_there = values::is_there(found.effect.name, &parameters);
+                let undecided = nearest < rivals::BEHIND_Z;
+                let most = if undecided { UNDECIDED } else { 1.0 };
+                let confidence = confidence::confidence(&evidence).min(most);
+                Weighed { found, class, evidence, confidence, parameters, is_there, undecided }
+            })
+            .collect();
+        Weighing {
+            effects,
+            dropped: Vec::new(),
+            patched,
+            estimator,
+            on_fit,
+            on_held,
+            table,
+            floor,
+            understood,
+            hertz,
+            swing,
+        }
     }
 }
 
@@ -145,79 +255,4 @@ fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'
 /// Mean square of a residual above what counting makes of it.
 fn above(residual: f64, floor: f64) -> f64 {
     (residual.powi(2) - floor.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
-}
-
-/// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
-fn once(
-    s: &mut Search,
-    bench: &Bench,
-    refit: &Candidate,
-    held: &[Track],
-    excitation: &Excitation,
-    hertz: Option<f64>,
-) -> Weighing {
-    let nominal = bench.nominal;
-    let mut found = std::mem::take(&mut s.found);
-    let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
-    rivals::fit_rivals(bench, &patched, &s.last, held, &mut found);
-    let estimator = Estimator::new(bench.tracks, &patched.noise, bench.scale);
-    let on_fit = residuals(nominal, &estimator, bench.tracks, false, refit, &patched);
-    let on_held = residuals(nominal, &estimator, held, true, refit, &patched);
-    let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
-        fit: estimator.rms(a, bench.tracks),
-        holdout: estimator.rms(b, held),
-    };
-    let (inertia, _, _) = values::scale(nominal, &patched);
-    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
-    let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
-    let table = FitTable {
-        metric: "force_rmse".into(),
-        unit: nominal.rig.kind.force().into(),
-        nominal: both(&on_fit.nominal, &on_held.nominal),
-        refit: both(&on_fit.refit, &on_held.refit),
-        patched: both(&on_fit.patched, &on_held.patched),
-        force_rms: both(&on_fit.force, &on_held.force),
-        // Nothing can take more than there is; some resamplings of few segments would.
-        holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
-    };
-    let left = s.last.noise.slow * inertia * inertia;
-    let leftover = Leftover {
-        of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
-        unexplained: above(table.patched.holdout, floor) / above(table.refit.holdout, floor),
-    };
-    let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
-    let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
-    let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
-    let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
-    let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, &on_fit)));
-    let swing = hertz.and_then(|hertz| unnamed::swing(&estimator, hertz, &left_by(held, &on_held)));
-    let effects = found
-        .into_iter()
-        .enumerate()
-        .map(|(i, found)| {
-            let class = rivals::class(&found, excitation, leaves_much);
-            let nearest = rivals::nearest(&found, &class);
-            let evidence = confidence::evidence(&found, leftover);
-            let parameters = values::parameters(bench, &patched, i);
-            let is_there = values::is_there(found.effect.name, &parameters);
-            let undecided = nearest < rivals::BEHIND_Z;
-            let most = if undecided { UNDECIDED } else { 1.0 };
-            let confidence = confidence::confidence(&evidence).min(most);
-            Weighed { found, class, evidence, confidence, parameters, is_there, undecided }
-        })
-        .collect();
-    Weighing {
-        effects,
-        dropped: Vec::new(),
-        patched,
-        estimator,
-        on_fit,
-        on_held,
-        table,
-        floor,
-        understood,
-        hertz,
-        swing,
-    }
 }
