@@ -232,6 +232,9 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
     }
 }
 
+/// Largest part of the travel over which bristles bend: microns of a slide, tenths of a degree of a turn.
+const BRISTLES: f64 = 0.03;
+
 /// How near, as a part of it, the end of what a value may be is to be at it.
 const AT_END: f64 = 0.05;
 
@@ -243,6 +246,12 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
             let value = effect.shape[*key];
             value < low * (1.0 + AT_END) || value > high * (1.0 - AT_END)
         })
+}
+
+/// Part of the travel over which bristles bend, where that is more than bristles do: such a spring creeps.
+pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
+    let part = effect.shape_or("deflection", 0.0) / span.travel();
+    (effect.name == N::PreslidingFriction && part > BRISTLES).then_some(part)
 }
 
 /// Whether the likelihood of an effect's first shape value has several optima.
@@ -279,7 +288,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drift_settles_neither_at_once_nor_long_after_the_end() {
+    fn a_drift_settles_neither_at_once_nor_long_after_the_end_and_bristles_are_short() {
         let span = Span {
             speed: 10.0,
             speed_floor: 0.1,
@@ -303,6 +312,9 @@ mod tests {
             assert!(at_end(name, 1.0) && at_end(name, 250.0));
             assert!(!at_end(name, 2.0) && !at_end(name, 15.0) && !at_end(name, 100.0));
         }
+        let bristles =
+            |deflection| creeps(&Effect::shaped(N::PreslidingFriction, &[("deflection", deflection)]), &span);
+        assert_eq!((bristles(1e-3), bristles(0.3), bristles(2.0)), (None, None, Some(0.1)));
         assert!(!at_end(N::ElectricalLag, 1e-6), "what is instant may be no lag, and is judged by its size");
     }
 }

@@ -123,14 +123,27 @@ impl Nominal {
         }
     }
 
-    /// What a coefficient of an effect may be for the effect to be what its name says.
-    pub(crate) fn limits(&self, name: EffectName) -> (f64, f64) {
+    /// What the coefficient of an effect's term may be for the effect to be what its name says.
+    pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
         let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
         match name {
             EffectName::GainDrift => {
                 // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
                 let least = 0.6 * gain.abs() / self.gain_reach();
                 (-least, least)
+            }
+            // What warms changes both frictions alike.
+            EffectName::FrictionDrift if term > 0 && self.holds(EffectName::ViscousFriction) => {
+                let viscous = self.most_friction(self.rig.model.viscous);
+                (-0.9 * viscous, 3.0 * viscous)
+            }
+            EffectName::AsymmetricFriction if term == 0 && self.holds(EffectName::ViscousFriction) => {
+                let viscous = self.most_friction(self.rig.model.viscous);
+                (-viscous, viscous)
+            }
+            EffectName::AsymmetricFriction if term > 0 && self.holds(EffectName::CoulombFriction) => {
+                let dry = self.most_friction(self.rig.model.coulomb);
+                (-dry, dry)
             }
             EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
                 let dry = self.rig.model.coulomb.unwrap_or(0.0) / (self.rig.actuator.gain / gain).abs();
@@ -146,6 +159,12 @@ impl Nominal {
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
+    }
+
+    /// Most that a friction of the rig may be over the inertia: twice what the rig says.
+    fn most_friction(&self, value: Option<f64>) -> f64 {
+        let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
+        2.0 * value.unwrap_or(0.0) * (gain / self.rig.actuator.gain).abs()
     }
 
     /// Largest part of the command that may do nothing. Where the inertia is hardly known, a drive that ignores its command
@@ -301,8 +320,8 @@ impl Model {
             }
         }
         for column in &mut columns {
-            if let Key::Term { effect, .. } = column.key {
-                (column.prior.low, column.prior.high) = nominal.limits(self.effects[effect].name);
+            if let Key::Term { effect, term } = column.key {
+                (column.prior.low, column.prior.high) = nominal.limits(self.effects[effect].name, term);
             }
         }
         let mut push = |key: Key, input: Input, own: bool| {

@@ -123,7 +123,7 @@ pub(crate) fn score(
     let coefficients = Factor::new(&sums.information).solve(&sums.score);
     let mut gain = 0.5 * dot(&coefficients, &sums.score);
     if coefficients.len() == 1 {
-        let (low, high) = nominal.limits(effect.name);
+        let (low, high) = nominal.limits(effect.name, 0);
         let x = coefficients[0].clamp(low, high);
         gain = x * sums.score[0] - 0.5 * x * x * sums.information.at(0, 0);
     }

@@ -5,6 +5,7 @@ use crate::confidence::{self, Evidence, Leftover};
 use crate::effects::EffectName;
 use crate::estimate::Estimator;
 use crate::excitation::Excitation;
+use crate::library;
 use crate::model::Model;
 use crate::noise::Colour;
 use crate::pipeline::{Found, Search, prune};
@@ -39,6 +40,8 @@ pub(crate) struct Weighed {
     pub(crate) is_there: bool,
     /// Whether more effects than a class may hold explain it as well.
     pub(crate) undecided: bool,
+    /// Part of the travel over which it bends, or what explains as much does, where that is more than bristles do.
+    pub(crate) creeps: Option<f64>,
 }
 
 /// The model that stands, its effects weighed, and its residuals.
@@ -69,7 +72,7 @@ impl Weighing {
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
     pub(crate) fn rests_on_evidence(&self, weighed: &Weighed) -> bool {
-        self.understood && weighed.is_there && !self.stands_for_swing()
+        self.understood && weighed.is_there && weighed.creeps.is_none() && !self.stands_for_swing()
     }
 
     fn stands_for_swing(&self) -> bool {
@@ -84,6 +87,11 @@ impl Weighing {
             Some("with it the model still leaves too much of the force to have understood it".into())
         } else if !weighed.is_there {
             Some("its size cannot be told from zero".into())
+        } else if let Some(part) = weighed.creeps {
+            Some(format!(
+                "it would bend over {:.0} % of the travel, as a spring that creeps does",
+                100.0 * part
+            ))
         } else if weighed.undecided {
             Some("more effects than a class may hold explain it as well".into())
         } else if weighed.confidence < NAMED {
@@ -229,7 +237,14 @@ impl Scales<'_> {
                 let undecided = nearest < rivals::BEHIND_Z;
                 let most = if undecided { UNDECIDED } else { 1.0 };
                 let confidence = confidence::confidence(&evidence).min(most);
-                Weighed { found, class, evidence, confidence, parameters, is_there, undecided }
+                let creeps = found
+                    .rivals
+                    .iter()
+                    .filter(|rival| class.contains(&rival.name))
+                    .map(|rival| &rival.effect)
+                    .chain([&found.effect])
+                    .find_map(|effect| library::creeps(effect, bench.span));
+                Weighed { found, class, evidence, confidence, parameters, is_there, undecided, creeps }
             })
             .collect();
         Weighing {
