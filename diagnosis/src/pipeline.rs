@@ -51,7 +51,7 @@ const SHARE: f64 = 0.05;
 const FAIR_SHARE: f64 = 0.1;
 /// What explains this part is most of what was left out, and this many standard errors are sure.
 const MOST_SHARE: f64 = 0.5;
-const SURE: f64 = 4.0;
+const SURE: f64 = 3.0;
 /// Factors on an effect that are the same size.
 const SAME_SIZE: std::ops::Range<f64> = 0.75..1.33;
 /// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
