@@ -45,6 +45,8 @@ pub(crate) struct Nominal {
 
 /// How many standard deviations a nominal value may move in a refit.
 const REACH: f64 = 3.0;
+/// The same of gain over inertia: a refit that stops at the end of it makes a drift of the rest.
+const RATIO_REACH: f64 = 3.5;
 /// How many standard deviations a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
@@ -101,7 +103,7 @@ impl Nominal {
         match key {
             Key::Gain => {
                 let (mean, sd) = self.anchor.unwrap_or((self.gain(), self.gain_sd()));
-                let (a, b) = (mean / (1.0 + REACH * sd), mean / (1.0 - REACH * sd).max(0.05));
+                let (a, b) = (mean / (1.0 + RATIO_REACH * sd), mean / (1.0 - RATIO_REACH * sd).max(0.05));
                 Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
             }
             Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
