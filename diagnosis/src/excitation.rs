@@ -92,6 +92,8 @@ impl Excitation {
             N::MassImbalance if self.turns < ONE_TURN => Some(N::PositionSpring),
             N::StribeckFriction if self.is_one_speed() => Some(N::QuadraticDrag),
             N::QuadraticDrag if self.is_one_speed() => Some(N::StribeckFriction),
+            N::FrictionDrift if self.is_one_speed() => Some(N::GainDrift),
+            N::GainDrift if self.is_one_speed() => Some(N::FrictionDrift),
             _ => None,
         }
     }

@@ -33,6 +33,94 @@ fn variable(track: &Track, name: &str, turn: Option<f64>) -> Vec<f64> {
     }
 }
 
+/// A recording with its residual and the variable that a map is over.
+struct Seen<'a> {
+    track: &'a Track,
+    residual: &'a [f64],
+    values: Vec<f64>,
+}
+
+impl<'a> Seen<'a> {
+    fn all((tracks, residuals): (&'a [Track], &'a [Vec<f64>]), name: &str, turn: Option<f64>) -> Vec<Self> {
+        let one = |(track, residual): (&'a Track, &'a Vec<f64>)| Seen {
+            track,
+            residual,
+            values: variable(track, name, turn),
+        };
+        tracks.iter().zip(residuals).map(one).collect()
+    }
+
+    fn moving(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.track.blocks()).filter(|j| !self.track.rest[*j])
+    }
+}
+
+/// Bins of a variable.
+struct Bins {
+    low: f64,
+    high: f64,
+}
+
+/// Mean residual of each bin, moving forward and backward.
+type Means = Vec<[Option<f64>; 2]>;
+
+impl Bins {
+    /// Between the outermost of some values, less three in a thousand.
+    fn of(seen: &[Seen]) -> Self {
+        let mut all: Vec<f64> = seen.iter().flat_map(|one| one.values.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        let at = |p: usize| all[(all.len() - 1) * p / 1000];
+        Self { low: at(3), high: at(997).max(at(3) + 1e-12) }
+    }
+
+    fn edges(&self) -> Vec<f64> {
+        (0..=BINS).map(|i| self.low + (self.high - self.low) * i as f64 / BINS as f64).collect()
+    }
+
+    /// Bin of a block and its way.
+    fn place(&self, one: &Seen, j: usize) -> (usize, usize) {
+        let part = (one.values[j] - self.low) / (self.high - self.low);
+        let bin = (part * BINS as f64).floor().clamp(0.0, (BINS - 1) as f64) as usize;
+        (bin, usize::from(one.track.v[j] < 0.0))
+    }
+
+    fn means<'a>(&self, seen: impl Iterator<Item = &'a Seen<'a>>) -> Means {
+        let mut sums = vec![[(0.0, 0usize); 2]; BINS];
+        for one in seen {
+            for j in one.moving() {
+                let (bin, way) = self.place(one, j);
+                sums[bin][way].0 += one.residual[j];
+                sums[bin][way].1 += 1;
+            }
+        }
+        let mean = |cell: (f64, usize)| (cell.1 >= LEAST).then(|| cell.0 / cell.1 as f64);
+        sums.into_iter().map(|cells| cells.map(mean)).collect()
+    }
+
+    /// What means take from each segment of a recording, and the square of all that there is.
+    fn gains(&self, means: &Means, one: &Seen) -> (Vec<f64>, f64) {
+        let (mut gains, mut whole) = (vec![0.0; one.track.segment_count()], 0.0);
+        for (gain, w) in gains.iter_mut().zip(one.track.segments.windows(2)) {
+            for j in (w[0]..w[1]).filter(|j| !one.track.rest[*j]) {
+                let (bin, way) = self.place(one, j);
+                let guess = means[bin][way].unwrap_or(0.0);
+                *gain += one.residual[j].powi(2) - (one.residual[j] - guess).powi(2);
+                whole += one.residual[j].powi(2);
+            }
+        }
+        (gains, whole)
+    }
+
+    /// Whether each recording is told something by the others: a slow disturbance looks like a map of one or two.
+    fn repeats(&self, seen: &[Seen]) -> bool {
+        (0..seen.len()).all(|r| {
+            let others = seen.iter().enumerate().filter(|(i, _)| *i != r).map(|(_, one)| one);
+            let (gains, _) = self.gains(&self.means(others), &seen[r]);
+            seen.len() < 2 || gains.iter().sum::<f64>() > 0.0
+        })
+    }
+}
+
 /// Averages residuals over bins on the fitted recordings and asks the held-out ones whether that was luck.
 pub(crate) fn maps(
     fit: (&[Track], &[Vec<f64>]),
@@ -46,42 +134,14 @@ pub(crate) fn maps(
     names
         .into_iter()
         .map(|name| {
-            let values: Vec<Vec<f64>> = fit.0.iter().map(|t| variable(t, name, turn)).collect();
-            let mut all: Vec<f64> = values.iter().flatten().copied().collect();
-            all.sort_by(f64::total_cmp);
-            let at = |p: usize| all[(all.len() - 1) * p / 1000];
-            let (low, high) = (at(3), at(997).max(at(3) + 1e-12));
-            let edges: Vec<f64> = (0..=BINS).map(|i| low + (high - low) * i as f64 / BINS as f64).collect();
-            let bin = |x: f64| {
-                (((x - low) / (high - low) * BINS as f64).floor().clamp(0.0, (BINS - 1) as f64)) as usize
-            };
-            let mut sums = vec![[(0.0, 0usize); 2]; BINS];
-            for ((track, residual), values) in fit.0.iter().zip(fit.1).zip(&values) {
-                for j in 0..track.blocks() {
-                    if !track.rest[j] {
-                        let cell = &mut sums[bin(values[j])][usize::from(track.v[j] < 0.0)];
-                        cell.0 += residual[j];
-                        cell.1 += 1;
-                    }
-                }
-            }
-            let mean = |cell: (f64, usize)| (cell.1 >= LEAST).then(|| cell.0 / cell.1 as f64);
-            let mut gains = Vec::new();
-            let mut whole = 0.0;
-            for (track, residual) in held.0.iter().zip(held.1) {
-                let values = variable(track, name, turn);
-                for w in track.segments.windows(2) {
-                    let mut gain = 0.0;
-                    for j in w[0]..w[1] {
-                        if track.rest[j] {
-                            continue;
-                        }
-                        let guess = mean(sums[bin(values[j])][usize::from(track.v[j] < 0.0)]).unwrap_or(0.0);
-                        gain += residual[j].powi(2) - (residual[j] - guess).powi(2);
-                        whole += residual[j].powi(2);
-                    }
-                    gains.push(gain);
-                }
+            let (fit, held) = (Seen::all(fit, name, turn), Seen::all(held, name, turn));
+            let bins = Bins::of(&fit);
+            let means = bins.means(fit.iter());
+            let (mut gains, mut whole) = (Vec::new(), 0.0);
+            for one in &held {
+                let (of_one, square) = bins.gains(&means, one);
+                gains.extend(of_one);
+                whole += square;
             }
             // In units of a segment's mean square, so that the limit per witness means the same everywhere.
             let unit = (whole / gains.len().max(1) as f64).max(1e-300);
@@ -89,11 +149,11 @@ pub(crate) fn maps(
             let gain: Gain = bootstrap(&gains);
             Map {
                 variable: name,
-                edges,
-                forward: sums.iter().map(|s| mean(s[0])).collect(),
-                backward: sums.iter().map(|s| mean(s[1])).collect(),
+                edges: bins.edges(),
+                forward: means.iter().map(|cells| cells[0]).collect(),
+                backward: means.iter().map(|cells| cells[1]).collect(),
                 carries: if whole > 0.0 { gain.sum / gains.len() as f64 } else { 0.0 },
-                significant: gain.low > 0.0 && gain.z > 2.6,
+                significant: gain.low > 0.0 && gain.z > 2.6 && bins.repeats(&fit),
             }
         })
         .collect()

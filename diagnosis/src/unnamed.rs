@@ -17,8 +17,8 @@ const FEWEST_CYCLES: f64 = 12.0;
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 /// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what comes from outside with
-/// about as much at the most, and what a lag or a short delay leaves is less than the drive makes.
-const DRIVEN: f64 = 1.2;
+/// half as much again at the most, and what a lag or a short delay leaves is less than the drive makes.
+const DRIVEN: f64 = 2.25;
 
 /// A force at one frequency on the held-out recordings.
 #[derive(Debug, Clone, Copy, PartialEq)]
