@@ -79,6 +79,28 @@ fn strong_effects_are_named_with_their_values() {
 }
 
 #[test]
+fn an_effect_as_large_as_the_force_is_named_alone() {
+    // Under what it leaves, a null knows neither the speed nor where the axis rests.
+    let cases: [(&'static str, f64, &str, f64); 2] =
+        [("command_deadband", 3.0, "half_width", 0.036), ("encoder_eccentricity", 4.0, "amplitude", 0.12)];
+    for (effect, size, parameter, truth) in cases {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { size, ..setup(effect) });
+        let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, [effect], "{}", outcome.summary());
+        let value = outcome.report.effects[0].parameters[parameter].value;
+        assert!((value / truth - 1.0).abs() < 0.1, "{effect}: {parameter} {value} instead of {truth}");
+    }
+}
+
+#[test]
+fn a_spring_that_creeps_is_not_named_after_bristles() {
+    let outcome = run(&rig(OFF, OFFSET), &setup("creep_spring"));
+    assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
+    let mut reasons = outcome.report.hypotheses.iter().filter_map(|h| h.rejected_because.as_deref());
+    assert!(reasons.any(|reason| reason.contains("creeps")), "{}", outcome.summary());
+}
+
+#[test]
 fn the_same_input_gives_the_same_answer_to_the_last_digit() {
     let rig = rig(OFF, OFFSET);
     let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");
