@@ -259,12 +259,14 @@ pub(crate) fn effect_inputs(
         }
         return vec![track.rows_input(&signal)];
     }
+    // Bristles bend on where the speed is too small for its sign to be told.
+    let bends = effect.name == EffectName::PreslidingFriction;
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
         let state = State {
             position: track.x[j],
-            velocity: if track.rest[j] { 0.0 } else { track.v[j] },
+            velocity: if track.rest[j] && !bends { 0.0 } else { track.v[j] },
             drive: 1.0,
             command: 1.0,
             tilt: track.tilt.as_ref().map_or(0.0, |tilt| tilt[j]),
@@ -273,6 +275,10 @@ pub(crate) fn effect_inputs(
             dt: track.span[j],
         };
         law.terms(&state, &mut out);
+        if bends && track.rest[j] {
+            // What dry friction does at rest is not in the model: bristles alone hold.
+            out[0] -= track.v[j].signum();
+        }
         for (column, term) in columns.iter_mut().zip(&out) {
             column.push(*term);
         }
