@@ -41,6 +41,8 @@ pub(crate) struct Nominal {
     pub(crate) external: f64,
     /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard deviation).
     pub(crate) anchor: Option<(f64, f64)>,
+    /// Whether the refit explains most of the force.
+    pub(crate) is_balanced: bool,
 }
 
 /// How many standard deviations a nominal value may move in a refit.
@@ -50,9 +52,9 @@ const RATIO_REACH: f64 = 3.5;
 /// How many standard deviations a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
-/// Largest part of the command that may do nothing, where the inertia is known and where it is not.
+/// Largest part of the command that may do nothing, where forces are in balance and where they are not.
 const IGNORED: f64 = 0.8;
-const IGNORED_UNANCHORED: f64 = 0.35;
+const IGNORED_UNBALANCED: f64 = 0.35;
 
 impl Nominal {
     /// Gain over inertia as the rig states it.
@@ -169,10 +171,10 @@ impl Nominal {
         2.0 * value.unwrap_or(0.0) * (gain / self.rig.actuator.gain).abs()
     }
 
-    /// Largest part of the command that may do nothing. Where the inertia is hardly known, a drive that ignores its command
-    /// explains any balance of forces, and so explains nothing.
+    /// Largest part of the command that may do nothing. Where the inertia is hardly known or the forces are far from balance,
+    /// a drive that ignores its command explains anything, and so explains nothing.
     pub(crate) fn most_ignored(&self) -> f64 {
-        if self.anchor.is_some() { IGNORED_UNANCHORED } else { IGNORED }
+        if self.is_balanced && self.anchor.is_none() { IGNORED } else { IGNORED_UNBALANCED }
     }
 
     /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.

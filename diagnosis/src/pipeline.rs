@@ -3,6 +3,7 @@
 use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
 use crate::estimate::Estimator;
+use crate::fit::Fit;
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::Noise;
 use crate::library::{self, Span};
@@ -167,13 +168,22 @@ fn smooth_fitted(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track])
     null::resmooth(tracks, &totals, &candidate.noise, 1.0 / nominal.rig.encoder.counts_per_unit);
 }
 
+/// Part of the command's force that a refit may leave for the forces to be in balance.
+const BALANCED: f64 = 0.5;
+
+fn is_balanced(refit: &Fit, tracks: &[Track], noise: &Noise, scale: f64) -> bool {
+    let estimator = Estimator::new(tracks, noise, scale);
+    let left = forces(&estimator, tracks, &refit.totals(tracks), 1.0);
+    estimator.rms(&left, tracks) < BALANCED * scale
+}
+
 /// Looks for lost counts in every recording under the null, and again with the noise that is left without them.
 fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise, scale: f64) {
     let mut noise = *noise;
     for _ in 0..2 {
         for track in tracks.iter_mut() {
             let alone = std::slice::from_ref(&*track);
-            let fit = crate::fit::Fit::new(&Model::default(), nominal, alone, &noise);
+            let fit = Fit::new(&Model::default(), nominal, alone, &noise);
             let residual = fit.residual(0);
             track.lost = crate::steps::find(track, &fit, 0, &residual, span.count);
         }
@@ -181,7 +191,7 @@ fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Nois
             return;
         }
         let model = Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])] };
-        let totals = crate::fit::Fit::new(&model, nominal, tracks, &noise).totals(tracks);
+        let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
         noise = crate::noise::estimate(tracks, &totals, &noise, scale, Colour::White);
     }
 }
@@ -194,13 +204,14 @@ pub(crate) fn search(
 ) -> Result<Search, InputError> {
     let mut tracks: Vec<Track> = fit.iter().map(|r| Track::new(r, rig)).collect();
     let mut held: Vec<Track> = held.iter().map(|r| Track::new(r, rig)).collect();
-    let mut nominal = Nominal { rig: rig.clone(), external: 0.0, anchor: None };
+    let mut nominal = Nominal { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false };
     progress("refitting the nominal model", 0.1);
-    let (noise, _) = null::settle(&mut nominal, &mut tracks);
+    let (noise, refit) = null::settle(&mut nominal, &mut tracks);
     let scale = null::command_scale(&nominal, &tracks);
+    nominal.is_balanced = is_balanced(&refit, &tracks, &noise, scale);
     let span = Span::of(&tracks, &nominal);
     find_steps(&nominal, &span, &mut tracks, &noise, scale);
-    let first = crate::fit::Fit::new(&Model::default(), &nominal, &tracks, &noise);
+    let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
     smooth_held(&first, &nominal, &mut held, scale);
     find_steps(&nominal, &span, &mut held, &noise, scale);
@@ -336,7 +347,7 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
         left(c, held, &laid.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
     };
     let square = |left: &[Vec<f64>], tracks: &[Track]| estimator.rms(left, tracks).powi(2);
-    let null = crate::fit::Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
+    let null = Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
     let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
     let inertia = values::scale(bench.nominal, last).0;
     let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
@@ -352,7 +363,7 @@ fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
         .map(|i| {
             let mut less = last.model.clone();
             let effect = less.effects.remove(i);
-            let fit = crate::fit::Fit::new(&less, bench.nominal, bench.tracks, &last.noise);
+            let fit = Fit::new(&less, bench.nominal, bench.tracks, &last.noise);
             let without = Candidate { model: less, noise: last.noise, fit, merit: 0.0 };
             let without_fit = fit_costs(&without);
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
