@@ -177,6 +177,12 @@ impl Nominal {
         if self.is_balanced && self.anchor.is_none() { IGNORED } else { IGNORED_UNBALANCED }
     }
 
+    /// Whether less of a recording's command is left than may be; `effective` is what is left, per row.
+    pub(crate) fn ignores_too_much(&self, track: &Track, effective: &[f64]) -> bool {
+        let taken: f64 = effective.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum();
+        taken > self.most_ignored() * track.command.iter().map(|u| u.abs()).sum::<f64>()
+    }
+
     /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.
     pub(crate) fn dry_deceleration(&self) -> f64 {
         let j =

@@ -26,12 +26,10 @@ pub(crate) fn added_inputs(model: &Model, nominal: &Nominal, track: &Track, effe
         let mut with = model.effects.clone();
         with.push(effect.clone());
         let after = effective_command(track, &with).expect("the effect acts on the command");
-        let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
-        let taken: f64 = after.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum();
-        let whole: f64 = track.command.iter().map(|u| u.abs()).sum();
-        if taken > nominal.most_ignored() * whole {
+        if nominal.ignores_too_much(track, &after) {
             return vec![Input::Held(vec![0.0; track.blocks()])];
         }
+        let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
     let drive = track.rows_input(command);
