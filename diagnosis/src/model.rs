@@ -53,7 +53,7 @@ const RATIO_REACH: f64 = 3.5;
 const FARTHEST: f64 = 2.5;
 
 /// Largest part of the command that may do nothing, where forces are in balance and where they are not.
-const IGNORED: f64 = 0.8;
+const IGNORED: f64 = 0.9;
 const IGNORED_UNBALANCED: f64 = 0.35;
 
 impl Nominal {
@@ -177,10 +177,19 @@ impl Nominal {
         if self.is_balanced && self.anchor.is_none() { IGNORED } else { IGNORED_UNBALANCED }
     }
 
-    /// Whether less of a recording's command is left than may be; `effective` is what is left, per row.
-    pub(crate) fn ignores_too_much(&self, track: &Track, effective: &[f64]) -> bool {
-        let taken: f64 = effective.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum();
-        taken > self.most_ignored() * track.command.iter().map(|u| u.abs()).sum::<f64>()
+    /// Whether an effect, beside others, leaves less of the command of some recordings than may be left.
+    pub(crate) fn ignores_too_much(&self, tracks: &[Track], others: &[Effect], effect: &Effect) -> bool {
+        if !matches!(effect.name, EffectName::CommandDeadband | EffectName::CommandSaturation) {
+            return false;
+        }
+        let all: Vec<Effect> = others.iter().chain([effect]).cloned().collect();
+        let (mut taken, mut whole) = (0.0, 0.0);
+        for track in tracks {
+            let effective = effective_command(track, &all).expect("the effect acts on the command");
+            taken += effective.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum::<f64>();
+            whole += track.command.iter().map(|u| u.abs()).sum::<f64>();
+        }
+        taken > self.most_ignored() * whole
     }
 
     /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.

@@ -168,13 +168,18 @@ fn smooth_fitted(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track])
     null::resmooth(tracks, &totals, &candidate.noise, 1.0 / nominal.rig.encoder.counts_per_unit);
 }
 
-/// Part of the command's force that a refit may leave for the forces to be in balance.
+/// Part of the force that a refit may leave for the forces to be in balance.
 const BALANCED: f64 = 0.5;
 
-fn is_balanced(refit: &Fit, tracks: &[Track], noise: &Noise, scale: f64) -> bool {
+fn is_balanced(refit: &Fit, nominal: &Nominal, tracks: &[Track], noise: &Noise, scale: f64) -> bool {
     let estimator = Estimator::new(tracks, noise, scale);
     let left = forces(&estimator, tracks, &refit.totals(tracks), 1.0);
-    estimator.rms(&left, tracks) < BALANCED * scale
+    let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let still: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
+    let (all, less) = (forces(&estimator, tracks, &still, 1.0), forces(&estimator, tracks, &drives, 1.0));
+    let force: Vec<Vec<f64>> =
+        all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+    estimator.rms(&left, tracks) < BALANCED * estimator.rms(&force, tracks)
 }
 
 /// Looks for lost counts in every recording under the null, and again with the noise that is left without them.
@@ -208,7 +213,7 @@ pub(crate) fn search(
     progress("refitting the nominal model", 0.1);
     let (noise, refit) = null::settle(&mut nominal, &mut tracks);
     let scale = null::command_scale(&nominal, &tracks);
-    nominal.is_balanced = is_balanced(&refit, &tracks, &noise, scale);
+    nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = Span::of(&tracks, &nominal);
     find_steps(&nominal, &span, &mut tracks, &noise, scale);
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
@@ -241,16 +246,16 @@ pub(crate) fn search(
                 continue;
             }
             let (mut own_tracks, mut own_held) = (tracks.clone(), held.clone());
-            smooth_fitted(&with, &nominal, &mut own_tracks);
+            smooth_fitted(&finalist, &nominal, &mut own_tracks);
             let own = Bench::new(&nominal, &own_tracks, &span, scale);
-            let slow = own.fit_slow(finalist.model.clone(), &[&with.noise, &finalist.noise]);
-            smooth_held(&slow, &nominal, &mut own_held, scale);
             let finalist = own.fit(finalist.model, &finalist.noise, Colour::White);
+            smooth_held(&finalist, &nominal, &mut own_held, scale);
             let judged = judge_all(&own, &finalist, &own_held).pop().expect("the last effect is judged");
             if let Some(reason) = judged.weakness() {
                 lost.push((name, judged.holdout.sum, reason));
                 continue;
             }
+            let slow = own.fit_slow(finalist.model.clone(), &[&with.noise, &finalist.noise]);
             taken = Some((finalist, slow, own_tracks, own_held));
             break;
         }

@@ -19,16 +19,13 @@ pub(crate) struct Score {
 pub(crate) type Terms = Vec<Vec<Vec<f64>>>;
 
 /// Inputs that an effect would add to a model over one recording; for command effects the change of the command.
-pub(crate) fn added_inputs(model: &Model, nominal: &Nominal, track: &Track, effect: &Effect) -> Vec<Input> {
+pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec<Input> {
     let before = effective_command(track, &model.effects);
     let command = before.as_deref().unwrap_or(&track.command);
     if crate::effects::CommandLaw::new(effect).is_some() {
         let mut with = model.effects.clone();
         with.push(effect.clone());
         let after = effective_command(track, &with).expect("the effect acts on the command");
-        if nominal.ignores_too_much(track, &after) {
-            return vec![Input::Held(vec![0.0; track.blocks()])];
-        }
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
@@ -37,21 +34,12 @@ pub(crate) fn added_inputs(model: &Model, nominal: &Nominal, track: &Track, effe
 }
 
 /// Responses of an effect's terms under the noise of a fit.
-pub(crate) fn responses(
-    fit: &Fit,
-    model: &Model,
-    nominal: &Nominal,
-    tracks: &[Track],
-    effect: &Effect,
-) -> Terms {
+pub(crate) fn responses(fit: &Fit, model: &Model, tracks: &[Track], effect: &Effect) -> Terms {
     tracks
         .iter()
         .zip(&fit.prepared)
         .map(|(track, one)| {
-            added_inputs(model, nominal, track, effect)
-                .iter()
-                .map(|input| one.gains.response(track, input))
-                .collect()
+            added_inputs(model, track, effect).iter().map(|input| one.gains.response(track, input)).collect()
         })
         .collect()
 }
@@ -110,7 +98,10 @@ pub(crate) fn score(
     effect: &Effect,
     nominal: &Nominal,
 ) -> Score {
-    let terms = responses(fit, model, nominal, tracks, effect);
+    if nominal.ignores_too_much(tracks, &model.effects, effect) {
+        return Score { gain: 0.0 };
+    }
+    let terms = responses(fit, model, tracks, effect);
     let sums = project(fit, residuals, &terms, own_phase(effect.name));
     if crate::effects::CommandLaw::new(effect).is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.

@@ -4,7 +4,7 @@ use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
 use crate::kalman::Noise;
 use crate::library::{self, Span};
-use crate::model::{Model, Nominal, effective_command};
+use crate::model::{Model, Nominal};
 use crate::noise::{self, Colour};
 use crate::periodic::{self, golden};
 use crate::screen;
@@ -229,14 +229,9 @@ impl<'a> Bench<'a> {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();
-        let ignores = |model: &Model| {
-            self.tracks.iter().any(|track| {
-                let effective = effective_command(track, &model.effects);
-                effective.is_some_and(|effective| self.nominal.ignores_too_much(track, &effective))
-            })
-        };
         let merit = |model: &Model| {
-            if ignores(model) {
+            let (effect, others) = model.effects.split_last().expect("there is an effect to polish");
+            if self.nominal.ignores_too_much(self.tracks, others, effect) {
                 return f64::NEG_INFINITY;
             }
             Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood

@@ -93,14 +93,6 @@ fn an_effect_as_large_as_the_force_is_named_alone() {
 }
 
 #[test]
-fn a_spring_that_creeps_is_not_named_after_bristles() {
-    let outcome = run(&rig(OFF, OFFSET), &setup("creep_spring"));
-    assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
-    let mut reasons = outcome.report.hypotheses.iter().filter_map(|h| h.rejected_because.as_deref());
-    assert!(reasons.any(|reason| reason.contains("creeps")), "{}", outcome.summary());
-}
-
-#[test]
 fn the_same_input_gives_the_same_answer_to_the_last_digit() {
     let rig = rig(OFF, OFFSET);
     let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");

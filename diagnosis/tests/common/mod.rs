@@ -216,11 +216,6 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                     force = through.signum() * 0.8 * ceiling;
                 }
             }
-            if is("creep_spring") {
-                // A spring whose rest follows the travel.
-                z += (q - z) * dt / 0.5;
-                force -= 1.5e-4 * s * (q - z);
-            }
             if is("outside") {
                 // A hysteresis that follows the slow past of the speed: nothing in the library.
                 z += (v - z) * dt / 0.08;
