@@ -161,11 +161,15 @@ fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], s
     }
 }
 
-/// Smooths fitted recordings with a model fitted to them: what a null leaves out is noise to its smoother, and next to
-/// rest and reversals such a smoother knows neither the speed nor its sign.
-fn smooth_fitted(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track]) {
-    let totals = candidate.fit.totals(tracks);
-    null::resmooth(tracks, &totals, &candidate.noise, 1.0 / nominal.rig.encoder.counts_per_unit);
+/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
+/// its smoother, and next to rest and reversals such a smoother knows neither the speed nor its sign.
+fn in_its_own_motion(tracks: &[Track], candidate: Candidate, on: &Bench) -> (Vec<Track>, Candidate) {
+    let mut own = tracks.to_vec();
+    let count = 1.0 / on.nominal.rig.encoder.counts_per_unit;
+    null::resmooth(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count);
+    let bench = Bench { tracks: &own, ..*on };
+    let again = bench.fit(candidate.model, &candidate.noise, Colour::White);
+    (own, again)
 }
 
 /// Part of the force that a refit may leave for the forces to be in balance.
@@ -245,10 +249,9 @@ pub(crate) fn search(
                 lost.push((name, gain, "what it explains is no more than a slow disturbance would".into()));
                 continue;
             }
-            let (mut own_tracks, mut own_held) = (tracks.clone(), held.clone());
-            smooth_fitted(&finalist, &nominal, &mut own_tracks);
+            let (own_tracks, finalist) = in_its_own_motion(&tracks, finalist, &on);
             let own = Bench::new(&nominal, &own_tracks, &span, scale);
-            let finalist = own.fit(finalist.model, &finalist.noise, Colour::White);
+            let mut own_held = held.clone();
             smooth_held(&finalist, &nominal, &mut own_held, scale);
             let judged = judge_all(&own, &finalist, &own_held).pop().expect("the last effect is judged");
             if let Some(reason) = judged.weakness() {
@@ -277,7 +280,6 @@ pub(crate) fn search(
         lost,
     };
     prune(&mut s, &bench, &held, &white.noise);
-    smooth_held(&s.last, &nominal, &mut held, scale);
     (s.fit_tracks, s.held_tracks) = (tracks, held);
     Ok(s)
 }

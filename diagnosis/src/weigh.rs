@@ -72,7 +72,24 @@ impl Weighing {
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
     pub(crate) fn rests_on_evidence(&self, weighed: &Weighed) -> bool {
-        self.understood && weighed.is_there && weighed.creeps.is_none() && !self.stands_for_swing()
+        self.understood
+            && weighed.is_there
+            && weighed.creeps.is_none()
+            && self.same_joint(weighed).is_none()
+            && !self.stands_for_swing()
+    }
+
+    /// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
+    /// next to reversals the other takes.
+    fn same_joint(&self, weighed: &Weighed) -> Option<EffectName> {
+        let of_joint = |name| {
+            matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip)
+        };
+        let more = |other: &&Weighed| {
+            of_joint(other.found.effect.name) && other.found.holdout.sum > weighed.found.holdout.sum
+        };
+        let found = self.effects.iter().find(more).filter(|_| of_joint(weighed.found.effect.name));
+        found.map(|other| other.found.effect.name)
     }
 
     fn stands_for_swing(&self) -> bool {
@@ -92,6 +109,8 @@ impl Weighing {
                 "it would bend over {:.0} % of the travel, as a spring that creeps does",
                 100.0 * part
             ))
+        } else if let Some(joint) = self.same_joint(weighed) {
+            Some(format!("beside {joint} it is the form of the same joint"))
         } else if weighed.undecided {
             Some("more effects than a class may hold explain it as well".into())
         } else if weighed.confidence < NAMED {
