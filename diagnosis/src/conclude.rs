@@ -1,5 +1,6 @@
 //! From what the search found and what was weighed to the report: places, the verdict, what to record next.
 
+use crate::effects::CommandLaw;
 use crate::error::InputError;
 use crate::excitation::Excitation;
 use crate::locate::{self, Map};
@@ -77,9 +78,11 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something, unless what was
     // found explains nearly all.
     let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
+    // A command that is another one explains anything.
+    let is_another = weighing.effects.iter().any(|e| CommandLaw::new(&e.found.effect).is_some());
     let foreign = judged.holdout > FOREIGN * table.force_rms.holdout
         && judged.fit > FOREIGN * table.force_rms.fit
-        && table.patched.holdout > LITTLE_FORCE * table.force_rms.holdout;
+        && (is_another || table.patched.holdout > LITTLE_FORCE * table.force_rms.holdout);
     if foreign {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,

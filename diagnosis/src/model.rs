@@ -52,9 +52,11 @@ const RATIO_REACH: f64 = 3.5;
 /// How many standard deviations a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
-/// Largest part of the command that may do nothing, where forces are in balance and where they are not.
+/// Largest part of the command that may do nothing: where forces are in balance, where the inertia is hardly known, and
+/// where forces are not in balance.
 const IGNORED: f64 = 0.9;
-const IGNORED_UNBALANCED: f64 = 0.35;
+const IGNORED_UNANCHORED: f64 = 0.35;
+const IGNORED_UNBALANCED: f64 = 0.2;
 
 impl Nominal {
     /// Gain over inertia as the rig states it.
@@ -174,12 +176,16 @@ impl Nominal {
     /// Largest part of the command that may do nothing. Where the inertia is hardly known or the forces are far from balance,
     /// a drive that ignores its command explains anything, and so explains nothing.
     pub(crate) fn most_ignored(&self) -> f64 {
-        if self.is_balanced && self.anchor.is_none() { IGNORED } else { IGNORED_UNBALANCED }
+        match (self.anchor, self.is_balanced) {
+            (Some(_), _) => IGNORED_UNANCHORED,
+            (None, true) => IGNORED,
+            (None, false) => IGNORED_UNBALANCED,
+        }
     }
 
     /// Whether an effect, beside others, leaves less of the command of some recordings than may be left.
     pub(crate) fn ignores_too_much(&self, tracks: &[Track], others: &[Effect], effect: &Effect) -> bool {
-        if !matches!(effect.name, EffectName::CommandDeadband | EffectName::CommandSaturation) {
+        if CommandLaw::new(effect).is_none() {
             return false;
         }
         let all: Vec<Effect> = others.iter().chain([effect]).cloned().collect();
