@@ -167,10 +167,11 @@ impl Nominal {
         }
     }
 
-    /// Most that a friction of the rig may be over the inertia: twice what the rig says.
+    /// Most that a friction of the rig may be over the inertia: twice what the rig says, anything where it says nought.
     fn most_friction(&self, value: Option<f64>) -> f64 {
         let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
-        2.0 * value.unwrap_or(0.0) * (gain / self.rig.actuator.gain).abs()
+        let most = 2.0 * value.unwrap_or(0.0) * (gain / self.rig.actuator.gain).abs();
+        if most > 0.0 { most } else { f64::INFINITY }
     }
 
     /// Largest part of the command that may do nothing. Where the inertia is hardly known or the forces are far from balance,
