@@ -4,7 +4,7 @@
 //! judge.
 
 use crate::effects::EffectName as N;
-use crate::pipeline::Found;
+use crate::found::Found;
 use std::collections::BTreeMap;
 
 /// What speaks for and against a name, by key; logarithms are natural.

@@ -98,3 +98,23 @@ impl Excitation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_one_speed_one_length_and_less_than_a_turn_cannot_tell() {
+        let rich = Excitation { speeds: 50.0, strokes: 20.0, turns: 9.0 };
+        let twins = [
+            (Excitation { speeds: 1.5, ..rich }, N::StribeckFriction, N::QuadraticDrag),
+            (Excitation { speeds: 1.5, ..rich }, N::FrictionDrift, N::GainDrift),
+            (Excitation { strokes: 1.5, ..rich }, N::PreslidingFriction, N::Backlash),
+            (Excitation { turns: 0.5, ..rich }, N::PositionSpring, N::MassImbalance),
+        ];
+        for (poor, a, b) in twins {
+            assert_eq!((poor.twin(a), poor.twin(b)), (Some(b), Some(a)));
+            assert_eq!((rich.twin(a), rich.twin(b)), (None, None));
+        }
+    }
+}

@@ -113,10 +113,13 @@ impl Bins {
 
     /// Whether each recording is told something by the others: a slow disturbance looks like a map of one or two.
     fn repeats(&self, seen: &[Seen]) -> bool {
+        if seen.len() < 2 {
+            return true;
+        }
         (0..seen.len()).all(|r| {
             let others = seen.iter().enumerate().filter(|(i, _)| *i != r).map(|(_, one)| one);
             let (gains, _) = self.gains(&self.means(others), &seen[r]);
-            seen.len() < 2 || gains.iter().sum::<f64>() > 0.0
+            gains.iter().sum::<f64>() > 0.0
         })
     }
 }
@@ -204,4 +207,54 @@ pub(crate) fn range(values: &[f64], weights: &[f64]) -> Option<(f64, f64)> {
         })
     };
     Some((at(0.05)?.0, at(0.95)?.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    /// A slide to and fro, and its residual by the function of travel and time.
+    fn seen(residual: impl Fn(f64, f64) -> f64) -> (Track, Vec<f64>) {
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let time_s: Vec<f64> = (0..4001).map(|i| f64::from(i) * 2.5e-3).collect();
+        let position_counts = time_s.iter().map(|t| (1000.0 * (2.0 * t).sin()).round()).collect();
+        let command = vec![0.0; time_s.len()];
+        let recording = Recording {
+            file: "t".into(),
+            time_s,
+            command,
+            position_counts,
+            tilt_rad: None,
+            reference_counts: None,
+            force: None,
+        };
+        let mut track = Track::new(&recording, &rig);
+        track.v = track.start.iter().map(|t| 2.0 * (2.0 * t).cos()).collect();
+        let residual = track.x.iter().zip(&track.start).map(|(x, t)| residual(*x, *t)).collect();
+        (track, residual)
+    }
+
+    fn repeats(all: &[(Track, Vec<f64>)]) -> bool {
+        let seen: Vec<Seen> = all
+            .iter()
+            .map(|(track, residual)| Seen { track, residual, values: variable(track, "travel", None) })
+            .collect();
+        Bins::of(&seen).repeats(&seen)
+    }
+
+    #[test]
+    fn a_map_repeats_where_each_recording_is_told_by_the_others() {
+        let stiffness = || seen(|x, _| x);
+        assert!(repeats(&[stiffness(), stiffness()]));
+        assert!(!repeats(&[stiffness(), seen(|x, _| -x)]));
+        let random = |seed: u64| {
+            let mut random = crate::judge::Random::new(seed);
+            let steps: Vec<f64> = (0..40).map(|_| random.below(2001) as f64 / 1000.0 - 1.0).collect();
+            seen(move |_, t| steps[(t * 3.0) as usize])
+        };
+        assert!(!repeats(&[random(3), random(5), random(11)]), "a slow disturbance is no map");
+        assert!(repeats(&[stiffness()]), "one recording has nothing to repeat in");
+    }
 }

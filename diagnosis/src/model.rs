@@ -64,6 +64,16 @@ impl Nominal {
         self.rig.actuator.gain / self.rig.model.inertia
     }
 
+    /// Gain over inertia as far as it is known: by the anchor, where there is one.
+    pub(crate) fn known_gain(&self) -> f64 {
+        self.anchor.map_or(self.gain(), |(value, _)| value)
+    }
+
+    /// The inertia that goes with it and the rig's gain.
+    fn known_inertia(&self) -> f64 {
+        self.anchor.map_or(self.rig.model.inertia, |(value, _)| (self.rig.actuator.gain / value).abs())
+    }
+
     /// Factor by which gain over inertia may differ from its nominal value.
     pub(crate) fn gain_reach(&self) -> f64 {
         1.0 + REACH * self.gain_sd()
@@ -91,8 +101,7 @@ impl Nominal {
 
     fn priors(&self, key: Key, noise: &Noise) -> Prior {
         let rig = &self.rig;
-        // Forces become accelerations by the inertia that goes with the anchor.
-        let j = self.anchor.map_or(rig.model.inertia, |(value, _)| rig.actuator.gain / value);
+        let j = self.known_inertia();
         let common = rig.inertia_sd().min(self.anchor.map_or(f64::INFINITY, |(_, sd)| sd));
         let relative = |value: f64, sd: f64| {
             let mean = value / j;
@@ -131,7 +140,7 @@ impl Nominal {
 
     /// What the coefficient of an effect's term may be for the effect to be what its name says.
     pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
-        let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
+        let gain = self.known_gain();
         match name {
             EffectName::GainDrift => {
                 // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
@@ -152,7 +161,7 @@ impl Nominal {
                 (-dry, dry)
             }
             EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
-                let dry = self.rig.model.coulomb.unwrap_or(0.0) / (self.rig.actuator.gain / gain).abs();
+                let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
                 (-0.9 * dry, 3.0 * dry)
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
@@ -169,8 +178,7 @@ impl Nominal {
 
     /// Most that a friction of the rig may be over the inertia: twice what the rig says, anything where it says nought.
     fn most_friction(&self, value: Option<f64>) -> f64 {
-        let gain = self.anchor.map_or(self.gain(), |anchor| anchor.0);
-        let most = 2.0 * value.unwrap_or(0.0) * (gain / self.rig.actuator.gain).abs();
+        let most = 2.0 * value.unwrap_or(0.0) / self.known_inertia();
         if most > 0.0 { most } else { f64::INFINITY }
     }
 
@@ -201,9 +209,8 @@ impl Nominal {
 
     /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.
     pub(crate) fn dry_deceleration(&self) -> f64 {
-        let j =
-            self.anchor.map_or(self.rig.model.inertia, |(value, _)| (self.rig.actuator.gain / value).abs());
-        self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale()) / j
+        let dry = self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale());
+        dry / self.known_inertia()
     }
 
     /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
@@ -283,14 +290,13 @@ pub(crate) fn effect_inputs(
         }
         return vec![track.rows_input(&signal)];
     }
-    // Bristles bend on where the speed is too small for its sign to be told.
-    let bends = effect.name == EffectName::PreslidingFriction;
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
         let state = State {
             position: track.x[j],
-            velocity: if track.rest[j] && !bends { 0.0 } else { track.v[j] },
+            velocity: track.v[j],
+            rest: track.rest[j],
             drive: 1.0,
             command: 1.0,
             tilt: track.tilt.as_ref().map_or(0.0, |tilt| tilt[j]),
@@ -299,10 +305,6 @@ pub(crate) fn effect_inputs(
             dt: track.span[j],
         };
         law.terms(&state, &mut out);
-        if bends && track.rest[j] {
-            // What dry friction does at rest is not in the model: bristles alone hold.
-            out[0] -= track.v[j].signum();
-        }
         for (column, term) in columns.iter_mut().zip(&out) {
             column.push(*term);
         }
@@ -374,4 +376,34 @@ pub(crate) fn total(track: &Track, columns: &[Column], theta: &[f64]) -> Total {
         }
     }
     total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nominal(viscous: f64, coulomb: f64) -> Nominal {
+        let rig = Rig::of_values(0.01, viscous, coulomb);
+        Nominal { rig, external: 0.0, anchor: None, is_balanced: true }
+    }
+
+    #[test]
+    fn what_differs_or_drifts_stays_within_what_the_rigs_frictions_allow() {
+        let (asymmetric, drift) = (EffectName::AsymmetricFriction, EffectName::FrictionDrift);
+        let known = nominal(0.02, 0.05);
+        let near = |(low, high): (f64, f64), (a, b): (f64, f64)| {
+            assert!((low - a).abs() < 1e-9 && (high - b).abs() < 1e-9, "{low} {high}");
+        };
+        near(known.limits(asymmetric, 0), (-4.0, 4.0));
+        near(known.limits(asymmetric, 1), (-10.0, 10.0));
+        near(known.limits(drift, 0), (-4.5, 15.0));
+        near(known.limits(drift, 1), (-3.6, 12.0));
+        // Gain over inertia twice the rig's: half the inertia, twice the deceleration.
+        let anchored = Nominal { anchor: Some((20.0, 0.3)), ..known };
+        near(anchored.limits(asymmetric, 0), (-8.0, 8.0));
+        let nought = nominal(0.0, 0.0);
+        for term in [0, 1] {
+            assert_eq!(nought.limits(asymmetric, term), (f64::NEG_INFINITY, f64::INFINITY));
+        }
+    }
 }

@@ -124,8 +124,7 @@ pub(crate) fn command_scale(nominal: &Nominal, tracks: &[Track]) -> f64 {
         square += track.command.iter().map(|u| u * u).sum::<f64>();
         rows += track.command.len() as f64;
     }
-    let gain = nominal.anchor.map_or(nominal.gain(), |anchor| anchor.0);
-    gain.abs() * (square / rows).sqrt().max(1e-12)
+    nominal.known_gain().abs() * (square / rows).sqrt().max(1e-12)
 }
 
 /// Finds noise, motion and refitted values together, a few times round, from a first look without friction.

@@ -2,9 +2,9 @@
 //! the other.
 
 use crate::estimate::Estimator;
+use crate::found::lay_all;
 use crate::judge::{self, Gain};
 use crate::model::{Nominal, total};
-use crate::pipeline::lay_all;
 use crate::select::Candidate;
 use crate::track::{Total, Track};
 use crate::values;
@@ -21,6 +21,16 @@ pub(crate) fn forces(
         .zip(totals)
         .map(|(track, total)| estimator.residual(track, total).into_iter().map(|a| a * inertia).collect())
         .collect()
+}
+
+/// The drive's force per block, as an estimator of this bandwidth sees it.
+pub(crate) fn drive_force(nominal: &Nominal, estimator: &Estimator, tracks: &[Track]) -> Vec<Vec<f64>> {
+    let drive: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
+    let j0 = nominal.rig.model.inertia;
+    let all = forces(estimator, tracks, &none, j0);
+    let less = forces(estimator, tracks, &drive, j0);
+    all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect()
 }
 
 /// Residual force per recording and block under the three models, and the drive's force, all by one estimator.
@@ -50,8 +60,6 @@ pub(crate) fn residuals(
             total(track, &columns, &theta)
         })
         .collect();
-    let drive: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
-    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
     let lay = |c: &Candidate| -> Vec<Total> {
         if held {
             lay_all(c, nominal, tracks, &c.noise).into_iter().map(|laid| laid.total).collect()
@@ -59,13 +67,9 @@ pub(crate) fn residuals(
             c.fit.totals(tracks)
         }
     };
-    let j0 = nominal.rig.model.inertia;
-    let all = forces(estimator, tracks, &none, j0);
-    let less = forces(estimator, tracks, &drive, j0);
-    let force = all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
     Residuals {
-        force,
-        nominal: forces(estimator, tracks, &at_nominal, j0),
+        force: drive_force(nominal, estimator, tracks),
+        nominal: forces(estimator, tracks, &at_nominal, nominal.rig.model.inertia),
         refit: forces(estimator, tracks, &lay(refit), values::scale(nominal, refit).0),
         patched: forces(estimator, tracks, &lay(patched), values::scale(nominal, patched).0),
     }

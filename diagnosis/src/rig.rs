@@ -238,3 +238,15 @@ impl Rig {
         self.uncertainty.weight.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
 }
+
+#[cfg(test)]
+impl Rig {
+    /// A rotary rig of these values with a gain of 0.1 and a thousand counts per rad.
+    pub(crate) fn of_values(inertia: f64, viscous: f64, coulomb: f64) -> Self {
+        let text = format!(
+            "format = 1\nkind = \"rotary\"\n[model]\ninertia = {inertia}\nviscous = {viscous}\ncoulomb = {coulomb}\n\
+             [actuator]\ngain = 0.1\ncommand_unit = \"A\"\n[encoder]\ncounts_per_unit = 1000.0\n"
+        );
+        Self::parse(&text, "a test").expect("the rig is right")
+    }
+}

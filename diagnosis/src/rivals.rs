@@ -3,11 +3,11 @@
 use crate::effects::{Effect, EffectName};
 use crate::excitation::Excitation;
 use crate::fit::Fit;
+use crate::found::{Found, Rival, fit_costs, lay_all};
 use crate::judge;
 use crate::model::Nominal;
 use crate::noise::Colour;
 use crate::periodic::is_periodic;
-use crate::pipeline::{Found, Rival, fit_costs, lay_all};
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
 use rayon::prelude::*;

@@ -72,11 +72,7 @@ fn needs_dry(name: N) -> bool {
     )
 }
 
-impl<'a> Bench<'a> {
-    pub(crate) fn new(nominal: &'a Nominal, tracks: &'a [Track], span: &'a Span, scale: f64) -> Self {
-        Self { nominal, tracks, span, scale }
-    }
-
+impl Bench<'_> {
     /// Fits a model with noise of its own, starting from known noise.
     pub(crate) fn fit(&self, model: Model, from: &Noise, colour: Colour) -> Candidate {
         let first = Fit::new(&model, self.nominal, self.tracks, from);

@@ -5,10 +5,11 @@ use crate::confidence::{self, Evidence, Leftover};
 use crate::effects::EffectName;
 use crate::estimate::Estimator;
 use crate::excitation::Excitation;
+use crate::found::Found;
 use crate::library;
 use crate::model::Model;
 use crate::noise::Colour;
-use crate::pipeline::{Found, Search, prune};
+use crate::pipeline::{Search, prune};
 use crate::report::{Both, FitTable, Parameter};
 use crate::residuals::{Residuals, relative_gain, residuals};
 use crate::rivals;
@@ -79,17 +80,9 @@ impl Weighing {
             && !self.stands_for_swing()
     }
 
-    /// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
-    /// next to reversals the other takes.
     fn same_joint(&self, weighed: &Weighed) -> Option<EffectName> {
-        let of_joint = |name| {
-            matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip)
-        };
-        let more = |other: &&Weighed| {
-            of_joint(other.found.effect.name) && other.found.holdout.sum > weighed.found.holdout.sum
-        };
-        let found = self.effects.iter().find(more).filter(|_| of_joint(weighed.found.effect.name));
-        found.map(|other| other.found.effect.name)
+        let gained = |weighed: &Weighed| (weighed.found.effect.name, weighed.found.holdout.sum);
+        same_joint(gained(weighed), self.effects.iter().map(gained))
     }
 
     fn stands_for_swing(&self) -> bool {
@@ -119,6 +112,18 @@ impl Weighing {
             None
         }
     }
+}
+
+/// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
+/// next to reversals the other takes. Effects with what they gain.
+fn same_joint(
+    (name, gain): (EffectName, f64),
+    mut all: impl Iterator<Item = (EffectName, f64)>,
+) -> Option<EffectName> {
+    let of_joint =
+        |name| matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip);
+    let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
+    all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }
 
 /// Weighs what the search found, with rivals that explain more in their place, and again without what is unsure as long
@@ -289,4 +294,22 @@ fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'
 /// Mean square of a residual above what counting makes of it.
 fn above(residual: f64, floor: f64) -> f64 {
     (residual.powi(2) - floor.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_has_one_name() {
+        let all = [
+            (EffectName::DriveCompliance, 40.0),
+            (EffectName::Backlash, 900.0),
+            (EffectName::Cogging, 5000.0),
+        ];
+        let joint = |of: usize| same_joint(all[of], all.into_iter());
+        assert_eq!(joint(0), Some(EffectName::Backlash));
+        assert_eq!(joint(1), None, "the one that explains most keeps its name");
+        assert_eq!(joint(2), None, "cogging is no joint");
+    }
 }

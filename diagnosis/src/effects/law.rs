@@ -11,6 +11,8 @@ pub struct State {
     pub position: f64,
     /// rad/s or m/s.
     pub velocity: f64,
+    /// Whether the sign of the velocity is unknown: friction is a reaction then and not in the model.
+    pub rest: bool,
     /// Force that the command asks for: gain · effective command, N·m or N.
     pub drive: f64,
     /// Effective command, in the rig's unit.
@@ -149,36 +151,40 @@ impl Law {
     /// The terms for this step; `out` has one place per name.
     pub fn terms(&mut self, s: &State, out: &mut [f64]) {
         use EffectName as N;
-        let way = sign(s.velocity);
+        let velocity = if s.rest { 0.0 } else { s.velocity };
+        let way = sign(velocity);
         match self.name {
-            N::ViscousFriction => out[0] = -s.velocity,
+            N::ViscousFriction => out[0] = -velocity,
             N::CoulombFriction => out[0] = -way,
             N::AsymmetricFriction => {
-                out[0] = -s.velocity.abs();
+                out[0] = -velocity.abs();
                 if let Some(dry) = out.get_mut(1) {
                     *dry = -way.abs();
                 }
             }
-            N::StribeckFriction => out[0] = -way * (-(s.velocity.abs() / self.a).powf(self.b)).exp(),
+            N::StribeckFriction => out[0] = -way * (-(velocity.abs() / self.a).powf(self.b)).exp(),
             N::PreslidingFriction => {
                 // Dahl with exponent 1: dz/dq = (1 − z·sgn v)/deflection, so z relaxes towards the sign of motion.
-                let z = way + (self.state[0] - way) * (-(s.velocity * s.dt).abs() / self.a).exp();
-                let mean = 0.5 * (z + self.state[0]);
-                self.state[0] = if way == 0.0 { self.state[0] } else { z };
-                out[0] = if way == 0.0 { -self.state[0] } else { way - mean };
+                // Bristles bend on where the sign is too unsure for dry friction, and hold alone there.
+                let bends = sign(s.velocity);
+                let z = bends + (self.state[0] - bends) * (-(s.velocity * s.dt).abs() / self.a).exp();
+                out[0] = way - 0.5 * (z + self.state[0]);
+                self.state[0] = z;
             }
-            N::QuadraticDrag => out[0] = -s.velocity * s.velocity.abs(),
+            N::QuadraticDrag => out[0] = -velocity * velocity.abs(),
             N::LoadDependentFriction => out[0] = -way * s.external.abs(),
             N::PositionDependentFriction => legendre(self.along(s.position), -way, out),
-            N::PositionDependentDamping => legendre(self.along(s.position), -s.velocity, out),
+            N::PositionDependentDamping => legendre(self.along(s.position), -velocity, out),
             N::FrictionDrift => {
                 let settled = 1.0 - (-s.time / self.a).exp();
                 out[0] = -way * settled;
-                out[1] = -s.velocity * settled;
+                out[1] = -velocity * settled;
             }
             N::GainDrift => out[0] = s.drive * (1.0 - (-s.time / self.a).exp()),
-            N::Cogging | N::MassImbalance | N::EncoderEccentricity => self.harmonics(s, 1.0, out),
-            N::TorqueRipple => self.harmonics(s, s.drive, out),
+            N::Cogging | N::MassImbalance | N::EncoderEccentricity => {
+                self.harmonics(s.position, velocity * s.dt, 1.0, out)
+            }
+            N::TorqueRipple => self.harmonics(s.position, velocity * s.dt, s.drive, out),
             N::TiltGravity => out[0] = s.tilt.sin(),
             N::PositionSpring => {
                 let x = s.position - self.a;
@@ -203,9 +209,9 @@ impl Law {
     }
 
     /// Means over the step: a wave that is passed within it averages out.
-    fn harmonics(&self, s: &State, times: f64, out: &mut [f64]) {
+    fn harmonics(&self, position: f64, passed: f64, times: f64, out: &mut [f64]) {
         for (pair, wave) in out.chunks_exact_mut(2).zip(&self.waves) {
-            let (cos, sin) = wave_mean(*wave, s.position, s.velocity * s.dt);
+            let (cos, sin) = wave_mean(*wave, position, passed);
             pair[0] = times * cos;
             pair[1] = times * sin;
         }
@@ -262,5 +268,41 @@ pub(crate) fn legendre(x: f64, times: f64, out: &mut [f64]) {
         let n = (k + 1) as f64;
         let next = ((2.0 * n + 1.0) * x * now - n * before) / (n + 1.0);
         (before, now) = (now, next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bristles() -> Law {
+        Law::new(&Effect::shaped(EffectName::PreslidingFriction, &[("deflection", 1.0)])).unwrap()
+    }
+
+    /// The bristles' force after a long slide forward and one step.
+    fn after_a_slide(velocity: f64, rest: bool) -> f64 {
+        let (mut law, mut out) = (bristles(), [0.0]);
+        law.terms(&State { velocity: 100.0, dt: 1.0, ..State::default() }, &mut out);
+        law.terms(&State { velocity, rest, dt: 1e-3, ..State::default() }, &mut out);
+        out[0]
+    }
+
+    #[test]
+    fn bristles_take_the_place_of_dry_friction_where_its_sign_is_unknown() {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+        assert!(near(after_a_slide(0.1, false), 0.0), "sliding on, dry friction is whole");
+        assert!(near(after_a_slide(-0.1, false), -2.0), "turned round, the bristles still push back");
+        for velocity in [0.1, 0.0, -0.1] {
+            assert!(near(after_a_slide(velocity, true), -1.0), "at rest they hold alone");
+        }
+    }
+
+    #[test]
+    fn at_rest_nothing_that_depends_on_speed_acts() {
+        for name in [EffectName::ViscousFriction, EffectName::QuadraticDrag, EffectName::StribeckFriction] {
+            let (mut law, mut out) = (Law::new(&Effect::shaped(name, &[])).unwrap(), [1.0]);
+            law.terms(&State { velocity: 3.0, rest: true, dt: 1e-3, ..State::default() }, &mut out);
+            assert_eq!(out[0], 0.0, "{name}");
+        }
     }
 }

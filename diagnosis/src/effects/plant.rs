@@ -67,6 +67,7 @@ impl Plant {
         let state = State {
             position: self.position,
             velocity,
+            rest: false,
             drive,
             command: effective,
             tilt: around.tilt,

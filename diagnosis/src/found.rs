@@ -1,0 +1,211 @@
+//! An effect as it came through the search, and what speaks for it on fitted and on held-out recordings. Nothing here fits
+//! noise or chooses between effects.
+
+use crate::effects::{Effect, EffectName};
+use crate::estimate::Estimator;
+use crate::fit::Fit;
+use crate::judge::{self, Gain, Laid};
+use crate::kalman::{Noise, tolerant};
+use crate::library;
+use crate::model::{Key, Model, Nominal};
+use crate::periodic;
+use crate::residuals::{forces, relative_gain};
+use crate::select::{Bench, Candidate};
+use crate::track::{Total, Track};
+use crate::values;
+
+/// An effect as it came through the search, before it is judged.
+#[derive(Clone)]
+pub(crate) struct Found {
+    pub(crate) effect: Effect,
+    /// Fitted rivals: (name, merit less than the winner's, held-out and fit margin in standard errors).
+    pub(crate) rivals: Vec<Rival>,
+    /// Held-out gain of the full model over the model without it.
+    pub(crate) holdout: Gain,
+    /// The same on the fitted recordings.
+    pub(crate) fit: Gain,
+    /// How much less force it leaves on held-out recordings, over the square of what is left.
+    pub(crate) force: Gain,
+    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
+    pub(crate) share: f64,
+    /// Whether one of its values stands at the end of what is possible.
+    pub(crate) at_bound: bool,
+    /// Whether its waves, if it has any, are those of teeth or poles.
+    pub(crate) is_comb: bool,
+    /// Size that it would have on each recording, over the size that it has on all, fitted ones first.
+    pub(crate) sizes: Vec<f64>,
+}
+
+/// Part of the refit's residual above the noise that an effect must explain to be named.
+const SHARE: f64 = 0.05;
+/// Below this part it must also stand out by [`CERTAIN`]: the form of a larger effect is never quite right.
+const FAIR_SHARE: f64 = 0.1;
+/// What explains this part is most of what was left out, and this many standard errors are sure.
+const MOST_SHARE: f64 = 0.5;
+const SURE: f64 = 3.0;
+/// Factors on an effect that are the same size.
+const SAME_SIZE: std::ops::Range<f64> = 0.75..1.33;
+/// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
+const LEAST_SHARE: f64 = 0.01;
+const CERTAIN: f64 = 6.0;
+
+impl Found {
+    /// Whether it stands out of every stretch of every recording, however little it explains beside larger effects.
+    pub(crate) fn is_certain(&self) -> bool {
+        self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
+    }
+
+    /// Standard errors of its gain on fitted or on held-out recordings, whichever are fewer.
+    pub(crate) fn least_z(&self) -> f64 {
+        self.holdout.z.max(self.holdout.steady).min(self.fit.z.max(self.fit.steady))
+    }
+
+    /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
+    fn stands_out(&self) -> bool {
+        self.least_z() >= CERTAIN
+    }
+
+    /// Whether it carries to the held-out recordings: by likelihood, or, where it is most of what was left out, by the force
+    /// that it leaves and the same size as on the fitted ones. Next to reversals a law of slightly another form may be less
+    /// likely at many blocks and yet leave a third of the force.
+    fn carries(&self) -> bool {
+        let likely = self.holdout.low > 0.0 && self.holdout.z.max(self.holdout.steady) >= 2.0;
+        let is_same = self.sizes.iter().all(|size| SAME_SIZE.contains(size));
+        likely || (self.force.low > 0.0 && is_same && self.share >= MOST_SHARE && self.fit.z >= SURE)
+    }
+
+    /// Why an effect may not be named, if it may not.
+    pub(crate) fn weakness(&self) -> Option<String> {
+        if !self.carries() {
+            return Some("its gain does not carry to the held-out recordings".into());
+        }
+        if self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0 {
+            return Some("its gain rests on few moments of the fitted recordings".into());
+        }
+        if self.share < SHARE && !(self.share >= LEAST_SHARE && self.is_certain()) {
+            return Some(format!(
+                "it explains {:.1} % of what the noise leaves, less than 5 %",
+                100.0 * self.share
+            ));
+        }
+        if self.share < FAIR_SHARE && !self.stands_out() {
+            return Some(format!(
+                "it explains {:.1} % of what the noise leaves, and not surely enough for so little",
+                100.0 * self.share
+            ));
+        }
+        if !self.is_comb {
+            return Some(
+                "its orders follow each other without a gap, as at places along the travel, not at teeth or poles"
+                    .into(),
+            );
+        }
+        self.at_bound.then(|| "its values stand at the end of what is possible".into())
+    }
+}
+
+/// How far a rival is behind.
+#[derive(Clone, Debug)]
+pub(crate) struct Rival {
+    pub(crate) name: EffectName,
+    /// Its shape, as well fitted as it was compared.
+    pub(crate) effect: Effect,
+    /// Mean lead of the winner over its standard error, over all segments.
+    pub(crate) z: f64,
+    /// Lead of the winner in log-likelihood.
+    pub(crate) lead: f64,
+}
+
+/// Lays a model on every held-out recording.
+pub(crate) fn lay_all(c: &Candidate, nominal: &Nominal, tracks: &[Track], noise: &Noise) -> Vec<Laid> {
+    tracks.iter().map(|track| judge::lay(c, nominal, track, noise)).collect()
+}
+
+/// Costs per segment of a model on the recordings it was fitted to, under some noise.
+pub(crate) fn fit_costs(c: &Candidate) -> Vec<f64> {
+    let mut out = Vec::new();
+    for (one, places) in c.fit.prepared.iter().zip(&c.fit.places) {
+        for (square, (weight, count)) in one.squares(places, &c.fit.solution.x).iter().zip(one.weights()) {
+            out.push(0.5 * count * tolerant(square / weight / count).0);
+        }
+    }
+    out
+}
+
+/// What speaks for each effect of a model.
+pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
+    let with = lay_all(last, bench.nominal, held, &last.noise);
+    let with_fit = fit_costs(last);
+    let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);
+    let left = |c: &Candidate, tracks: &[Track], totals: &[Total]| {
+        forces(&estimator, tracks, totals, values::scale(bench.nominal, c).0)
+    };
+    let left_on_fit = |c: &Candidate| left(c, bench.tracks, &c.fit.totals(bench.tracks));
+    let left_on_held = |c: &Candidate, laid: &[Laid]| {
+        left(c, held, &laid.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
+    };
+    let square = |left: &[Vec<f64>], tracks: &[Track]| estimator.rms(left, tracks).powi(2);
+    let null = Fit::new(&Model::default(), bench.nominal, bench.tracks, &last.noise);
+    let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+    let inertia = values::scale(bench.nominal, last).0;
+    let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
+    let explainable = |whole: f64, tracks: &[Track]| {
+        let floor = (estimator.counting(tracks, &last.noise, count) * inertia).powi(2);
+        (whole - floor).max(0.02 * whole).max(1e-300)
+    };
+    let of_null = left_on_held(&null, &lay_all(&null, bench.nominal, held, &last.noise));
+    let held_out = explainable(square(&of_null, held), held);
+    let fitted = explainable(square(&left_on_fit(&null), bench.tracks), bench.tracks);
+    let (left_held_out, left_fitted) = (left_on_held(last, &with), left_on_fit(last));
+    (0..last.model.effects.len())
+        .map(|i| {
+            let mut less = last.model.clone();
+            let effect = less.effects.remove(i);
+            let fit = Fit::new(&less, bench.nominal, bench.tracks, &last.noise);
+            let without = Candidate { model: less, noise: last.noise, fit, merit: 0.0 };
+            let without_fit = fit_costs(&without);
+            let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
+            let laid = lay_all(&without, bench.nominal, held, &last.noise);
+            let holdout = judge::compare(&with, &laid);
+            // What one recording hardly plays another may be made for.
+            let (less_held_out, less_fitted) = (left_on_held(&without, &laid), left_on_fit(&without));
+            let share = ((square(&less_held_out, held) - square(&left_held_out, held)) / held_out)
+                .max((square(&less_fitted, bench.tracks) - square(&left_fitted, bench.tracks)) / fitted);
+            let force = relative_gain(&estimator, held, &less_held_out, &left_held_out);
+            let mut sizes = sizes_on(&estimator, bench.tracks, &left_fitted, &less_fitted);
+            sizes.extend(sizes_on(&estimator, held, &left_held_out, &less_held_out));
+            let is_bound =
+                last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
+                    *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
+                });
+            let at_bound = is_bound || library::is_at_end(&effect, bench.span);
+            let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
+            Found {
+                effect,
+                rivals: Vec::new(),
+                holdout,
+                fit: judge::bootstrap(&gains),
+                force,
+                share,
+                at_bound,
+                is_comb,
+                sizes,
+            }
+        })
+        .collect()
+}
+
+/// Factors on what an effect does on each recording, which is the difference of what is left with it and without it, that
+/// would leave the least.
+fn sizes_on(estimator: &Estimator, tracks: &[Track], with: &[Vec<f64>], without: &[Vec<f64>]) -> Vec<f64> {
+    let one = |(track, (with, without)): (&Track, (&Vec<f64>, &Vec<f64>))| {
+        let (mut along, mut square) = (0.0, 0.0);
+        for (j, _) in estimator.moving(track).iter().enumerate().filter(|(_, moving)| **moving) {
+            let done = without[j] - with[j];
+            along += done * with[j];
+            square += done * done;
+        }
+        1.0 + along / f64::max(square, 1e-300)
+    };
+    tracks.iter().zip(with.iter().zip(without)).map(one).collect()
+}
