@@ -81,7 +81,7 @@ impl Span {
 
     /// Least command at which a grip lets go: what slips under friction alone never held.
     fn least_grip(&self, nominal: &Nominal) -> f64 {
-        (nominal.dry_deceleration() / nominal.gain().abs()).clamp(0.05 * self.command, 0.5 * self.command)
+        (nominal.dry_deceleration() / nominal.gain().abs()).clamp(0.02 * self.command, 0.5 * self.command)
     }
 
     pub(crate) fn travel(&self) -> f64 {
@@ -159,9 +159,12 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         ),
         N::RollerSlip => {
             let mut out = Vec::new();
-            for time in [0.3e-3, 1.5e-3, 6e-3] {
+            let own = [("coast", nominal.dry_deceleration()), ("ratio", 1.0)];
+            let machine = nominal.machine();
+            for creep in [0.002, 0.008, 0.03].map(|part| part * span.speed) {
                 for limit in logarithmic(span.least_grip(nominal), 0.945 * span.command, 12) {
-                    out.push(Effect::shaped(name, &[("limit", limit), ("creep_time", time)]));
+                    let shape = [("limit", limit), ("creep", creep)];
+                    out.push(Effect::shaped(name, &[shape.as_slice(), &own, &machine].concat()));
                 }
             }
             out
@@ -178,12 +181,12 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             out
         }
         N::Backlash => {
-            let fixed = [("per_command", nominal.gain()), ("dry", nominal.dry_deceleration())];
+            let machine = nominal.machine();
             let mut out = Vec::new();
             for coast in [0.6, 1.5].map(|part| part * nominal.dry_deceleration()) {
                 for gap in logarithmic(2.0 * span.count, span.widest_gap(), 16) {
                     let shape = [("gap", gap), ("coast", coast), ("contact_hz", 180.0), ("ratio", 1.0)];
-                    out.push(Effect::shaped(name, &[shape.as_slice(), &fixed].concat()));
+                    out.push(Effect::shaped(name, &[shape.as_slice(), &machine].concat()));
                 }
             }
             out
@@ -214,7 +217,15 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::FrictionDrift | N::GainDrift => vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)],
         N::CommandDeadband => vec![("half_width", 0.001 * span.command, span.dead)],
         N::CommandSaturation => vec![("limit", 0.9 * span.clip * span.command, span.command)],
-        N::RollerSlip => vec![("limit", 0.03 * span.command, span.command), ("creep_time", 5e-5, 0.05)],
+        N::RollerSlip => {
+            let dry = effect.shape_or("dry", 1.0);
+            vec![
+                ("limit", 0.01 * span.command, span.command),
+                ("creep", 1e-4 * span.speed, 0.3 * span.speed),
+                ("coast", 0.2 * dry, 4.0 * dry),
+                ("ratio", RATIOS.0, RATIOS.1),
+            ]
+        }
         N::CommandDelay => vec![("delay", 1e-6, 0.06)],
         N::ElectricalLag => vec![("time_constant", 1e-6, 0.2)],
         N::PositionSpring if effect.shape_or("one_sided", 0.0) > 0.5 => Vec::new(),
@@ -223,7 +234,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
             vec![
                 ("gap", span.count, 2.0 * span.widest_gap()),
                 ("coast", 0.2 * dry, 4.0 * dry),
-                ("ratio", 0.2, 5.0),
+                ("ratio", RATIOS.0, RATIOS.1),
                 ("contact_hz", 30.0, 600.0),
             ]
         }
@@ -231,6 +242,9 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         _ => Vec::new(),
     }
 }
+
+/// Inertia of a load over its motor's.
+const RATIOS: (f64, f64) = (0.2, 5.0);
 
 /// Largest part of the travel over which bristles bend: microns of a slide, tenths of a degree of a turn.
 const BRISTLES: f64 = 0.03;

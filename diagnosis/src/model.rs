@@ -213,6 +213,20 @@ impl Nominal {
         dry / self.known_inertia()
     }
 
+    /// What the law of a second mass takes from the whole machine, per inertia.
+    pub(crate) fn machine(&self) -> [(&'static str, f64); 6] {
+        let model = &self.rig.model;
+        let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
+        [
+            ("per_command", self.known_gain()),
+            ("dry", self.dry_deceleration()),
+            ("viscous", per_inertia(model.viscous)),
+            ("per_force", per_inertia(Some(self.external))),
+            ("weight", per_inertia(model.weight)),
+            ("offset", per_inertia(model.offset)),
+        ]
+    }
+
     /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
     pub(crate) fn force_scale(&self) -> f64 {
         let limit = self.rig.actuator.limit.map_or(0.0, |limit| 0.1 * limit * self.rig.actuator.gain.abs());
@@ -280,11 +294,16 @@ pub(crate) fn effect_inputs(
         let (block, step) = (track.rows_per_block, track.rows_per_step(SECOND_MASS_STEP_S));
         let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
         for (j, (command, hold)) in blocks.enumerate() {
-            let velocity = track.v[j.min(n - 1)];
+            let (tilt, external) = (track.tilt_at(j.min(n - 1)), track.force_at(j.min(n - 1)));
+            let mut passed = 0.0;
             for (command, hold) in command.chunks(step).zip(hold.chunks(step)) {
                 let dt: f64 = hold.iter().sum();
+                let velocity = track.velocity_within(j.min(n - 1), passed + 0.5 * dt);
+                passed += dt;
                 let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / dt;
-                law.terms(&State { drive: mean, command: mean, velocity, dt, ..State::default() }, &mut out);
+                let state =
+                    State { drive: mean, command: mean, velocity, tilt, external, dt, ..State::default() };
+                law.terms(&state, &mut out);
                 signal.extend(std::iter::repeat_n(out[0], command.len()));
             }
         }
@@ -299,8 +318,8 @@ pub(crate) fn effect_inputs(
             rest: track.rest[j],
             drive: 1.0,
             command: 1.0,
-            tilt: track.tilt.as_ref().map_or(0.0, |tilt| tilt[j]),
-            external: track.force.as_ref().map_or(0.0, |force| force[j]),
+            tilt: track.tilt_at(j),
+            external: track.force_at(j),
             time: track.start[j] + 0.5 * track.span[j],
             dt: track.span[j],
         };

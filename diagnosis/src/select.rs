@@ -1,5 +1,6 @@
 //! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
 
+use crate::descend::descend;
 use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
 use crate::kalman::Noise;
@@ -218,6 +219,15 @@ impl Bench<'_> {
         best
     }
 
+    /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
+    fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
+        let (effect, others) = model.effects.split_last().expect("there is an effect to polish");
+        if self.nominal.ignores_too_much(self.tracks, others, effect) {
+            return f64::NEG_INFINITY;
+        }
+        Fit::new(model, self.nominal, self.tracks, noise).log_likelihood
+    }
+
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
     pub(crate) fn polish_one(&self, candidate: &Candidate) -> Candidate {
         let last = candidate.model.effects.len() - 1;
@@ -225,13 +235,7 @@ impl Bench<'_> {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();
-        let merit = |model: &Model| {
-            let (effect, others) = model.effects.split_last().expect("there is an effect to polish");
-            if self.nominal.ignores_too_much(self.tracks, others, effect) {
-                return f64::NEG_INFINITY;
-            }
-            Fit::new(model, self.nominal, self.tracks, &candidate.noise).log_likelihood
-        };
+        let merit = |model: &Model| self.merit_of(model, &candidate.noise);
         let mut best = candidate.fit.log_likelihood;
         let movable = library::movable(&candidate.model.effects[last], self.span);
         // The score test holds the gain and looks near by: delays, drifts and events have optima that lie apart.
@@ -258,28 +262,26 @@ impl Bench<'_> {
                 }
             }
         }
-        for round in 0..2 {
-            for (key, low, high) in movable.iter().copied() {
-                let at = model.effects[last].shape[key];
-                let reach = if round == 0 { 1.6_f64 } else { 1.15 };
-                let (a, b) = ((at / reach).max(low).ln(), (at * reach).min(high).ln());
-                if b <= a {
-                    continue;
-                }
-                let with = |x: f64| {
-                    let mut trial = model.clone();
-                    trial.effects[last].shape.insert(key.to_owned(), x.exp());
-                    trial
-                };
-                let x = golden(a, b, if round == 0 { 8 } else { 6 }, |x| merit(&with(x)));
-                let trial = with(x);
-                let value = merit(&trial);
-                if value > best {
-                    best = value;
-                    model = trial;
-                }
+        for (key, low, high) in movable.iter().copied() {
+            let at = model.effects[last].shape[key];
+            let (a, b) = ((at / 1.6).max(low).ln(), (at * 1.6).min(high).ln());
+            if b <= a {
+                continue;
+            }
+            let with = |x: f64| {
+                let mut trial = model.clone();
+                trial.effects[last].shape.insert(key.to_owned(), x.exp());
+                trial
+            };
+            let x = golden(a, b, 8, |x| merit(&with(x)));
+            let trial = with(x);
+            let value = merit(&trial);
+            if value > best {
+                best = value;
+                model = trial;
             }
         }
+        let model = descend(self, model, &candidate.noise, best, &merit);
         self.fit(model, &candidate.noise, Colour::White)
     }
 }

@@ -165,6 +165,21 @@ impl Track {
         n as f64 / (self.start[n - 1] + self.span[n - 1])
     }
 
+    /// Mean tilt over a block, rad, and mean load, N·m or N; nought where not recorded.
+    pub(crate) fn tilt_at(&self, block: usize) -> f64 {
+        self.tilt.as_ref().map_or(0.0, |tilt| tilt[block])
+    }
+    pub(crate) fn force_at(&self, block: usize) -> f64 {
+        self.force.as_ref().map_or(0.0, |force| force[block])
+    }
+
+    /// Velocity at a time since the start of a block, s, between those in the middles of the blocks.
+    pub(crate) fn velocity_within(&self, block: usize, time: f64) -> f64 {
+        let part = time / self.span[block] - 0.5;
+        let other = if part < 0.0 { block.saturating_sub(1) } else { (block + 1).min(self.blocks() - 1) };
+        self.v[block] + part.abs() * (self.v[other] - self.v[block])
+    }
+
     /// Rows that fit into a step of `seconds`, at least one and at most a block.
     pub(crate) fn rows_per_step(&self, seconds: f64) -> usize {
         let rows = seconds * self.block_rate() * self.rows_per_block as f64;

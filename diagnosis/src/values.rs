@@ -8,9 +8,6 @@ use crate::select::{Bench, Candidate};
 use crate::solve::Square;
 use std::collections::BTreeMap;
 
-/// Part of the dry friction that is the load's, and its standard deviation: nothing in the motor's motion tells it.
-const LOAD_FRICTION: (f64, f64) = (0.5, 0.2);
-
 /// Relative standard deviation of a value for the form of its law alone: the machine's law is never quite ours, and an
 /// interval that only noise makes is too narrow. From recordings of machines with other laws of the same names, none of
 /// which judges.
@@ -310,20 +307,16 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             put("limit", v, s, command);
         }
         N::RollerSlip => {
-            // The grip carries the load's part of what the drive has left above friction, and the load's own friction:
-            // half of the whole, give or take, for all that motion tells.
+            // The load's part of what the drive would need to press as hard.
             let (limit, s) = shape("limit");
             let ratio_of_load = (term(0).0 / ratio).abs();
             let part = ratio_of_load / (1.0 + ratio_of_load);
             let part_sd = (term(0).1 / ratio).abs() / (1.0 + ratio_of_load).powi(2);
             let drive = limit * inertia * ratio.abs();
-            let dry = fit.value(Key::Coulomb).map_or(0.0, |x| x.abs() * inertia);
-            let value = part * drive + (LOAD_FRICTION.0 - part) * dry;
-            let sd = ((part * s / limit * drive).powi(2)
-                + (part_sd * (drive - dry)).powi(2)
-                + (LOAD_FRICTION.1 * dry).powi(2)
-                + (value * common).powi(2))
-            .sqrt();
+            let value = part * drive;
+            let sd =
+                ((part * s / limit * drive).powi(2) + (part_sd * drive).powi(2) + (value * common).powi(2))
+                    .sqrt();
             put("ceiling", value, sd, force.into());
         }
         N::CommandDelay => {

@@ -191,7 +191,7 @@ impl Law {
                 out[0] = if self.b > 0.5 { -x.max(0.0) } else { -x };
             }
             N::Backlash => out[0] = self.load.through_gap(s),
-            N::RollerSlip => out[0] = self.load.by_grip(s.command, s.dt),
+            N::RollerSlip => out[0] = self.load.by_grip(s),
             N::DriveCompliance => out[0] = self.resonate(s.drive, s.dt),
             N::MissedCounts => {
                 for (term, time) in out.iter_mut().zip(&self.times) {

@@ -1,14 +1,14 @@
 //! The part of the machine beyond a gap or a grip: a second mass that is seen only by what the motor feels of it.
 //!
 //! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J and f = F/J against the
-//! motion. A load that brakes itself by a, reached through a force T, makes of it r·(d − y − (f − a)) more, y = T/(p·J).
-//! The motor's lead w over its load follows w″ = (1 + r)·(d − y − (f − a)) while both go the same way, and the load's
-//! friction turns with the load. Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to
-//! a ceiling, friction taken as shared like the inertia. Both are driven by the command, so that little noise of the
+//! motion. A load that brakes itself by a, reached through a force T, makes of it r·(d − y − (f − a) − e/r) more, where
+//! y = T/(p·J) and e = E/J of the forces E that act on the load. The motor's lead w over its load follows
+//! w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the same way, and the load's friction turns with the load. Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to
+//! a ceiling. Both are driven by the command, so that little noise of the
 //! measured motion enters, and bounded, so that nothing drifts.
 
+use super::Effect;
 use super::law::State;
-use super::{Effect, PerStep};
 use std::f64::consts::TAU;
 
 /// The load's motion against the motor's.
@@ -20,44 +20,52 @@ pub(crate) struct Load {
     contact: f64,
     /// Load inertia over motor inertia.
     ratio: f64,
-    /// Acceleration of the whole machine per unit of command, its deceleration by dry friction, and the load's by its own.
+    /// Acceleration of the whole machine per unit of command, and its deceleration by dry and viscous friction.
     per_command: f64,
     dry: f64,
+    viscous: f64,
+    /// Acceleration of the whole machine per unit of the measured load, by its weight, and by its offset.
+    per_force: f64,
+    weight: f64,
+    offset: f64,
+    /// Deceleration of the load by its own dry friction, and its friction over that of the whole machine, per inertia.
     coast: f64,
+    share: f64,
     /// Command that the grip carries at its ceiling, in the command's unit.
     limit: f64,
-    /// Time in which the creep follows the command, s.
-    creep_time: f64,
-    /// What is left of a difference to the creep after a step.
-    creep_left: PerStep<f64>,
+    /// Half the creep at which the grip slips, rad/s or m/s.
+    creep: f64,
     /// Lead over the load and its rate; none before the first command.
     lead: Option<(f64, f64)>,
-    /// Creep as a part of that at which the grip is at its ceiling.
-    creep: f64,
 }
 
 /// Damping of the contact: it bounces once or twice.
 const DAMPING: f64 = 0.3;
 /// Time in which friction stops what it holds, s.
 const HOLDING: f64 = 1e-3;
-/// Longest step against the contact's frequency, rad.
+/// Longest step against the contact's frequency, rad, and of a grip, s.
 const STEP: f64 = 0.35;
+const GRIP_STEP_S: f64 = 4e-4;
 
 impl Load {
     pub(crate) fn new(effect: &Effect) -> Self {
         let get = |key: &str, otherwise: f64| effect.shape_or(key, otherwise);
+        let (dry, coast) = (get("dry", 0.0), get("coast", 0.0));
         Self {
             half: 0.5 * get("gap", 0.0),
             contact: TAU * get("contact_hz", 200.0),
             ratio: get("ratio", 1.0),
             per_command: get("per_command", 1.0),
-            dry: get("dry", 0.0),
-            coast: get("coast", 0.0),
+            dry,
+            viscous: get("viscous", 0.0),
+            per_force: get("per_force", 0.0),
+            weight: get("weight", 0.0),
+            offset: get("offset", 0.0),
+            coast,
+            share: if dry > 0.0 { coast / dry } else { 1.0 },
             limit: get("limit", f64::INFINITY),
-            creep_time: get("creep_time", 1e-3),
-            creep_left: PerStep::new(),
+            creep: get("creep", 1e-3),
             lead: None,
-            creep: 0.0,
         }
     }
 
@@ -69,35 +77,134 @@ impl Load {
         let steps = (s.dt * self.contact / STEP).ceil().clamp(1.0, 400.0);
         let h = s.dt / steps;
         let whole = 1.0 + self.ratio;
-        let way = if s.velocity == 0.0 { 0.0 } else { s.velocity.signum() };
-        let motor_friction = (whole * self.dry - self.ratio * self.coast) * way;
+        let friction = self.friction(s.velocity);
+        let pulled = self.pulled(s) / self.ratio;
+        let apart = whole * pulled + (whole - self.ratio * self.share) * friction;
         let mut sum = 0.0;
         for _ in 0..steps as usize {
             let over = lead - lead.clamp(-self.half, self.half);
             let push = self.contact * (self.contact * over + 2.0 * DAMPING * rate) / whole;
             // A flank pushes and never pulls.
             let carried = if over * push > 0.0 { push } else { 0.0 };
-            // Near rest the load's friction holds rather than brakes.
-            let load_way = ((s.velocity - rate) / (self.coast * HOLDING).max(1e-12)).clamp(-1.0, 1.0);
-            rate += (whole * (drive - carried) - motor_friction + self.coast * load_way) * h;
+            let brake = self.brake(s.velocity - rate);
+            rate += (whole * (drive - carried) - apart + brake) * h;
             lead += rate * h;
             sum += drive - carried;
         }
         self.lead = Some((lead, rate));
-        (sum / steps - (self.dry - self.coast) * way) / self.per_command
+        (sum / steps - (1.0 - self.share) * friction - pulled) / self.per_command
     }
 
     /// Command that drives the motor alone, beyond what the grip carries: little while it creeps, much while it slips.
-    pub(crate) fn by_grip(&mut self, command: f64, dt: f64) -> f64 {
-        let wanted = command / self.limit;
-        let held = self.creep.clamp(-1.0, 1.0);
-        let time = self.creep_time.max(1e-9);
-        self.creep = if self.creep.abs() < 1.0 {
-            wanted + (self.creep - wanted) * self.creep_left.of(dt, |dt| (-dt / time).exp())
-        } else {
-            self.creep + (wanted - held) * dt / time
-        };
-        let carried = 0.5 * (held + self.creep.clamp(-1.0, 1.0));
-        command - self.limit * carried
+    pub(crate) fn by_grip(&mut self, s: &State) -> f64 {
+        let drive = s.command * self.per_command;
+        let most = self.limit * self.per_command;
+        let (_, mut rate) = self.lead.unwrap_or((0.0, 0.0));
+        let steps = (s.dt / GRIP_STEP_S).ceil().clamp(1.0, 50.0);
+        let h = s.dt / steps;
+        let whole = 1.0 + self.ratio;
+        let friction = self.friction(s.velocity);
+        let pulled = self.pulled(s) / self.ratio;
+        let apart = whole * pulled + (whole - self.ratio * self.share) * friction;
+        let mut sum = 0.0;
+        for _ in 0..steps as usize {
+            let brake = self.brake(s.velocity - rate);
+            let pushed = rate + (whole * drive - apart + brake) * h;
+            // What the grip carries at the end of the step: it follows faster than a step is long.
+            let creep = after_grip(pushed / self.creep, whole * most.abs() * h / self.creep);
+            rate = creep * self.creep;
+            sum += drive - most.abs() * carried(creep);
+        }
+        self.lead = Some((0.0, rate));
+        (sum / steps - (1.0 - self.share) * friction - pulled) / self.per_command
+    }
+
+    /// Acceleration of the whole machine by what pulls at its load.
+    fn pulled(&self, s: &State) -> f64 {
+        self.per_force * s.external + self.weight * s.tilt.sin() + self.offset
+    }
+
+    /// Deceleration of the whole machine by its friction.
+    fn friction(&self, velocity: f64) -> f64 {
+        let way = if velocity == 0.0 { 0.0 } else { velocity.signum() };
+        self.dry * way + self.viscous * velocity
+    }
+
+    /// Deceleration of the load by its own friction; near rest it holds rather than brakes.
+    fn brake(&self, velocity: f64) -> f64 {
+        let way = (velocity / (self.coast * HOLDING).max(1e-12)).clamp(-1.0, 1.0);
+        self.coast * way + self.share * self.viscous * velocity
+    }
+}
+
+/// Part of its ceiling that a rolling contact carries at a creep, as a part of half the creep at which it slips (Carter
+/// 1926: the zone that sticks shrinks as the creep grows).
+fn carried(creep: f64) -> f64 {
+    if creep.abs() < 2.0 { creep - 0.25 * creep * creep.abs() } else { creep.signum() }
+}
+
+/// The creep x at which x + most · carried(x) = pushed: one implicit step.
+fn after_grip(pushed: f64, most: f64) -> f64 {
+    let size = pushed.abs();
+    let x = if size >= 2.0 + most {
+        size - most
+    } else {
+        // The smaller root of ¼·most·x² − (1 + most)·x + size = 0, written so that nothing cancels.
+        let b = 1.0 + most;
+        2.0 * size / (b + (b * b - most * size).max(0.0).sqrt())
+    };
+    x * pushed.signum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{Effect, EffectName};
+
+    const RATIO: f64 = 1.5;
+
+    fn grip() -> Load {
+        let shape = [
+            ("limit", 0.5),
+            ("creep", 0.05),
+            ("ratio", RATIO),
+            ("per_command", 100.0),
+            ("dry", 10.0),
+            ("coast", 10.0),
+            ("per_force", 20.0),
+        ];
+        Load::new(&Effect::shaped(EffectName::RollerSlip, &shape))
+    }
+
+    /// Command that drives the motor alone after a while at one speed.
+    fn settled(command: f64, external: f64) -> f64 {
+        let mut load = grip();
+        let state = State { command, external, velocity: 5.0, dt: 1e-3, ..State::default() };
+        (0..2000).map(|_| load.by_grip(&state)).last().expect("some steps")
+    }
+
+    #[test]
+    fn one_step_of_the_grip_ends_where_it_carries_what_it_was_pushed_by() {
+        for most in [0.0, 0.3, 4.0, 200.0] {
+            for pushed in [-300.0, -1.0, 0.0, 0.7, 2.0 + 0.9 * most, 2.0 + most, 3.0 + 2.0 * most] {
+                let x = after_grip(pushed, most);
+                assert!((x + most * carried(x) - pushed).abs() < 1e-9 * (1.0 + pushed.abs() + most));
+            }
+        }
+    }
+
+    #[test]
+    fn a_grip_below_its_ceiling_drives_the_load_and_above_it_the_motor() {
+        // At its ceiling the grip carries half a unit of command as acceleration of both together.
+        assert!(settled(0.2, 0.0).abs() < 1e-3, "it holds");
+        assert!((settled(2.0, 0.0) - 1.5).abs() < 0.05, "what is beyond the ceiling drives the motor alone");
+    }
+
+    #[test]
+    fn what_pulls_at_the_load_goes_through_the_grip() {
+        // A load that is held back by F needs F more through the grip: it lets go although the command is small.
+        let held_back = settled(0.35, -2.0);
+        let pulled = -2.0 * 20.0 / 100.0;
+        assert!((held_back - (0.35 - 0.5 - pulled / RATIO)).abs() < 0.05, "{held_back}");
     }
 }

@@ -79,7 +79,7 @@ impl Effect {
                 &["time_constant"]
             }
             EffectName::CommandSaturation => &["limit"],
-            EffectName::RollerSlip => &["limit", "creep_time"],
+            EffectName::RollerSlip => &["limit", "creep", "coast", "ratio"],
             EffectName::Backlash => &["gap", "coast", "contact_hz", "ratio"],
             EffectName::DriveCompliance => &["resonance_hz", "damping"],
             EffectName::CommandDelay => &["delay"],
