@@ -62,14 +62,14 @@ fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
 }
 
 impl Estimator {
-    /// Blocks that move and are further from rest than the estimator reaches: at rest friction is a reaction, and a
+    /// Blocks that move, of which the model knows something, and that are further from rest than the estimator reaches: at rest friction is a reaction, and a
     /// low-pass would carry it over.
     pub(crate) fn moving(&self, track: &Track) -> Vec<bool> {
         let reach = (0.4 / self.bandwidth_hz * track.block_rate()).ceil() as usize;
         let n = track.blocks();
         let mut out = vec![true; n];
         for j in 0..n {
-            if track.rest[j] {
+            if track.rest[j] || track.unknown[j] {
                 out[j.saturating_sub(reach)..(j + reach + 1).min(n)].fill(false);
             }
         }
@@ -78,7 +78,7 @@ impl Estimator {
         out[..end].fill(false);
         out[n - end..].fill(false);
         if out.iter().filter(|x| **x).count() * 20 < n {
-            return track.rest.iter().map(|rest| !rest).collect();
+            return track.rest.iter().zip(&track.unknown).map(|(rest, unknown)| !rest && !unknown).collect();
         }
         out
     }

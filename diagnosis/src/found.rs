@@ -6,6 +6,7 @@ use crate::estimate::Estimator;
 use crate::fit::Fit;
 use crate::judge::{self, Gain, Laid};
 use crate::kalman::{Noise, tolerant};
+use crate::known::known;
 use crate::library;
 use crate::model::{Key, Model, Nominal};
 use crate::periodic;
@@ -43,6 +44,10 @@ const FAIR_SHARE: f64 = 0.1;
 /// What explains this part is most of what was left out, and this many standard errors are sure.
 const MOST_SHARE: f64 = 0.5;
 const SURE: f64 = 3.0;
+/// What explains this part, and takes half of the held-out mean square with it, may rest on few moments there: counts are
+/// lost now and then.
+const NEARLY_ALL: f64 = 0.9;
+const HALF: f64 = 0.5;
 /// Factors on an effect that are the same size.
 const SAME_SIZE: std::ops::Range<f64> = 0.75..1.33;
 /// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
@@ -71,7 +76,9 @@ impl Found {
     fn carries(&self) -> bool {
         let likely = self.holdout.low > 0.0 && self.holdout.z.max(self.holdout.steady) >= 2.0;
         let is_same = self.sizes.iter().all(|size| SAME_SIZE.contains(size));
-        likely || (self.force.low > 0.0 && is_same && self.share >= MOST_SHARE && self.fit.z >= SURE)
+        let takes_most = self.force.low > 0.0 && self.share >= MOST_SHARE;
+        let takes_all = self.force.sum >= HALF && self.share >= NEARLY_ALL && self.holdout.sum > 0.0;
+        likely || (is_same && (takes_most || takes_all) && self.fit.z >= SURE)
     }
 
     /// Why an effect may not be named, if it may not.
@@ -134,6 +141,7 @@ pub(crate) fn fit_costs(c: &Candidate) -> Vec<f64> {
 
 /// What speaks for each effect of a model.
 pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<Found> {
+    let held: &[Track] = &known(held, &last.model, bench.span);
     let with = lay_all(last, bench.nominal, held, &last.noise);
     let with_fit = fit_costs(last);
     let estimator = Estimator::new(bench.tracks, &last.noise, bench.scale);

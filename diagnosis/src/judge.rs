@@ -109,7 +109,7 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
         }
     }
     let (mut m, mut b) = (Square::zero(p), vec![0.0; p]);
-    for segment in &one.segments {
+    for (segment, _) in one.segments.iter().zip(track.known_segments()).filter(|(_, known)| *known) {
         for i in 0..p {
             b[i] += segment.at(i, p);
             for j in 0..p {
@@ -185,7 +185,12 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
         .squares(&places, &step)
         .iter()
         .zip(one.weights())
-        .map(|(square, (_, count))| 0.5 * count * tolerant(square / count).0)
+        .zip(track.known_segments())
+        .map(
+            |((square, (_, count)), known)| {
+                if known { 0.5 * count * tolerant(square / count).0 } else { 0.0 }
+            },
+        )
         .collect();
     Laid { total: total(track, &one.columns, &theta), costs }
 }

@@ -173,7 +173,11 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         N::ElectricalLag => one("time_constant", logarithmic((0.2 * span.row).max(1e-5), 0.05, 9)),
         N::TiltGravity if span.tilt => vec![Effect::shaped(name, &[])],
         N::PositionSpring => {
-            let mut out = vec![Effect::shaped(name, &[("from", 0.0)])];
+            // A rig without an offset has no other term for a spring that is not at rest where the recording starts. Where
+            // the inertia is hardly known one more term explains slow motion as well as forces in balance do.
+            let is_free = nominal.rig.model.offset.is_none() && nominal.anchor.is_none();
+            let preload = f64::from(u8::from(is_free));
+            let mut out = vec![Effect::shaped(name, &[("from", 0.0), ("preload", preload)])];
             for part in [0.25, 0.5, 0.75] {
                 let from = span.low + part * span.travel();
                 out.push(Effect::shaped(name, &[("from", from), ("one_sided", 1.0)]));

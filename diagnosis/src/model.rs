@@ -162,7 +162,7 @@ impl Nominal {
             }
             EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
                 let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
-                (-0.9 * dry, 3.0 * dry)
+                (-0.9 * (1.0 + REACH * self.rig.coulomb_sd()) * dry, 3.0 * dry)
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
             EffectName::TorqueRipple => (-0.45 * gain.abs(), 0.45 * gain.abs()),
@@ -171,6 +171,7 @@ impl Nominal {
             }
             EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
             EffectName::MissedCounts => (0.5, 1.5),
+            EffectName::PositionSpring if term > 0 => (f64::NEG_INFINITY, f64::INFINITY),
             name if crate::library::positive(name) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
@@ -415,7 +416,7 @@ mod tests {
         };
         near(known.limits(asymmetric, 0), (-4.0, 4.0));
         near(known.limits(asymmetric, 1), (-10.0, 10.0));
-        near(known.limits(drift, 0), (-4.5, 15.0));
+        near(known.limits(drift, 0), (-0.9 * (1.0 + 3.0 * 0.5) * 5.0, 15.0));
         near(known.limits(drift, 1), (-3.6, 12.0));
         // Gain over inertia twice the rig's: half the inertia, twice the deceleration.
         let anchored = Nominal { anchor: Some((20.0, 0.3)), ..known };

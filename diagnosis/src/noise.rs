@@ -49,6 +49,7 @@ fn excerpt(track: &Track, total: &Total, from: usize, to: usize) -> Excerpt {
         v: Vec::new(),
         rest: track.rest[from..to].to_vec(),
         stuck: track.stuck[from..to].to_vec(),
+        unknown: vec![false; to - from],
         segments: vec![0, to - from],
         lost: Vec::new(),
         speed_floor: track.speed_floor,

@@ -4,9 +4,9 @@ use crate::effects::{Effect, EffectName};
 use crate::error::InputError;
 use crate::estimate::Estimator;
 use crate::fit::Fit;
-use crate::found::{Found, judge_all};
-use crate::judge;
+use crate::found::{Found, judge_all, lay_all};
 use crate::kalman::Noise;
+use crate::known::known;
 use crate::library::Span;
 use crate::model::{Model, Nominal};
 use crate::noise::Colour;
@@ -40,16 +40,14 @@ pub(crate) struct Search {
 }
 
 /// Smooths held-out recordings with a fitted model; `scale` is the acceleration that the command makes.
-fn smooth_held(candidate: &Candidate, nominal: &Nominal, tracks: &mut [Track], scale: f64) {
+fn smooth_held(candidate: &Candidate, nominal: &Nominal, span: &Span, tracks: &mut [Track], scale: f64) {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
     let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
     null::resmooth(tracks, &drives, &crate::noise::guess(tracks, scale), count);
     for _ in 0..3 {
-        let totals: Vec<Total> = tracks
-            .iter()
-            .map(|track| judge::lay(candidate, nominal, track, &candidate.noise).total)
-            .collect();
+        let laid = lay_all(candidate, nominal, &known(tracks, &candidate.model, span), &candidate.noise);
+        let totals: Vec<Total> = laid.into_iter().map(|laid| laid.total).collect();
         null::resmooth(tracks, &totals, &candidate.noise, count);
     }
 }
@@ -131,7 +129,7 @@ fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Op
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, on);
         let own = Bench { tracks: &tracks, ..*on };
         let mut held = now.held.clone();
-        smooth_held(&white, on.nominal, &mut held, on.scale);
+        smooth_held(&white, on.nominal, on.span, &mut held, on.scale);
         let judged = judge_all(&own, &white, &held).pop().expect("the last effect is judged");
         if let Some(reason) = judged.weakness() {
             lost.names.push((name, judged.holdout.sum, reason));
@@ -160,7 +158,7 @@ pub(crate) fn search(
     find_steps(&nominal, &span, &mut tracks, &noise, scale);
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
-    smooth_held(&first, &nominal, &mut held, scale);
+    smooth_held(&first, &nominal, &span, &mut held, scale);
     find_steps(&nominal, &span, &mut held, &noise, scale);
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
     let white = bench.fit(Model::default(), &noise, Colour::White);

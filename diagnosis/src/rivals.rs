@@ -5,6 +5,7 @@ use crate::excitation::Excitation;
 use crate::fit::Fit;
 use crate::found::{Found, Rival, fit_costs, lay_all};
 use crate::judge;
+use crate::known::known;
 use crate::model::Nominal;
 use crate::noise::Colour;
 use crate::periodic::is_periodic;
@@ -46,7 +47,6 @@ pub(crate) fn fit_rivals(
     found: &mut [Found],
 ) {
     let best = bench.fit(last.model.clone(), &last.noise, Colour::White);
-    let own = costs(&best, bench.nominal, held);
     for i in 0..found.len() {
         let mut less = best.model.clone();
         less.effects.remove(i);
@@ -71,8 +71,12 @@ pub(crate) fn fit_rivals(
                 let model = with(effect);
                 let fit = Fit::new(&model, bench.nominal, bench.tracks, &best.noise);
                 let rival = Candidate { model, noise: best.noise, fit, merit: 0.0 };
+                // Both are judged where both know something.
+                let held = known(held, &best.model, bench.span);
+                let held = known(&held, &rival.model, bench.span);
+                let own = costs(&best, bench.nominal, &held);
                 let lead = |rival: &Candidate| {
-                    let theirs = costs(rival, bench.nominal, held);
+                    let theirs = costs(rival, bench.nominal, &held);
                     judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
                 };
                 let mut gain = lead(&rival);

@@ -55,6 +55,7 @@ fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
         N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
         N::PositionDependentFriction | N::PositionDependentDamping => effect.shape_or("degree", 3.0) as usize,
         N::FrictionDrift | N::AsymmetricFriction => 2,
+        N::PositionSpring => 1 + usize::from(effect.shape_or("preload", 0.0) > 0.5),
         N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag => 0,
         _ => 1,
     };

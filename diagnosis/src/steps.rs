@@ -12,6 +12,8 @@ const OVER_IMPACT: f64 = 1.3;
 const MOST: usize = 80;
 const FEWEST: usize = 2;
 const REACH: usize = 40;
+/// Least size, counts: what falls into the middle of a block shows as little as half.
+const LEAST: f64 = 0.45;
 /// Gain of log-likelihood of a second part of a jump, in the next block.
 const PER_PART: f64 = 4.0;
 /// How often what is left is looked through again: a large jump hides its neighbours.
@@ -28,7 +30,7 @@ pub(crate) fn find(track: &Track, fit: &Fit, r: usize, residual: &[f64], count: 
         let before = jumps.len();
         for (j, size) in templates.peaks(track, &left) {
             let is_new = jumps.iter().all(|k| k.abs_diff(j) > 1);
-            if jumps.len() < MOST && size.abs() > 0.7 * count && is_new {
+            if jumps.len() < MOST && size.abs() > LEAST * count && is_new {
                 jumps.push(j);
             }
         }
@@ -235,7 +237,7 @@ fn together(
 ) -> (Vec<usize>, Vec<f64>, Vec<f64>) {
     let mut all = Jumps::new(track, fit, r, jumps);
     let stands = |(size, response): (&f64, &Vec<f64>)| {
-        0.5 * size * size * dot(response, response) > PER_JUMP && size.abs() > 0.7 * count
+        0.5 * size * size * dot(response, response) > PER_JUMP && size.abs() > LEAST * count
     };
     let stand: Vec<bool> = all.sizes(residual).iter().zip(&all.responses).map(stands).collect();
     all.keep(&stand);

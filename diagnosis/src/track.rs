@@ -51,6 +51,8 @@ pub(crate) struct Track {
     pub(crate) rest: Vec<bool>,
     /// Blocks in the middle of a rest: friction is a reaction there and cancels every input.
     pub(crate) stuck: Vec<bool>,
+    /// Blocks of which the model that is judged knows nothing.
+    pub(crate) unknown: Vec<bool>,
     /// Bounds of the segments that gains are counted in, as block indices; one more than segments.
     pub(crate) segments: Vec<usize>,
     /// Travel that the encoder seems to have lost so far, where steps were found.
@@ -97,6 +99,7 @@ impl Track {
             v: vec![0.0; n],
             rest: vec![false; n],
             stuck: vec![false; n],
+            unknown: vec![false; n],
             segments: Vec::new(),
             lost: vec![0.0; n],
             speed_floor: 0.0,
@@ -228,6 +231,14 @@ impl Track {
             })
             .sum();
         sum / m as f64 * count
+    }
+
+    /// Whether each segment is known all but for a few blocks.
+    pub(crate) fn known_segments(&self) -> impl Iterator<Item = bool> + '_ {
+        self.segments.windows(2).map(|w| {
+            let unknown = self.unknown[w[0]..w[1]].iter().filter(|x| **x).count();
+            10 * unknown <= w[1] - w[0]
+        })
     }
 
     /// The segment of a block.

@@ -6,6 +6,7 @@ use crate::effects::EffectName;
 use crate::estimate::Estimator;
 use crate::excitation::Excitation;
 use crate::found::Found;
+use crate::known::known;
 use crate::library;
 use crate::model::Model;
 use crate::noise::Colour;
@@ -216,10 +217,11 @@ impl Scales<'_> {
         let nominal = bench.nominal;
         let mut found = std::mem::take(&mut s.found);
         let patched = bench.fit(s.last.model.clone(), &s.last.noise, Colour::White);
+        let known: &[Track] = &known(held, &patched.model, bench.span);
         rivals::fit_rivals(bench, &patched, &s.last, held, &mut found);
         let estimator = Estimator::new(bench.tracks, &patched.noise, bench.scale);
         let on_fit = residuals(nominal, &estimator, bench.tracks, false, refit, &patched);
-        let on_held = residuals(nominal, &estimator, held, true, refit, &patched);
+        let on_held = residuals(nominal, &estimator, known, true, refit, &patched);
         let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
             fit: estimator.rms(a, bench.tracks),
             holdout: estimator.rms(b, held),
@@ -227,7 +229,7 @@ impl Scales<'_> {
         let (inertia, _, _) = values::scale(nominal, &patched);
         let count = 1.0 / nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
-        let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
+        let helps = relative_gain(&estimator, known, &on_held.refit, &on_held.patched);
         let table = FitTable {
             metric: "force_rmse".into(),
             unit: nominal.rig.kind.force().into(),
@@ -238,13 +240,15 @@ impl Scales<'_> {
             // Nothing can take more than there is; some resamplings of few segments would.
             holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
         };
+        let (refit_held, left_held) =
+            (estimator.rms(&on_held.refit, known), estimator.rms(&on_held.patched, known));
         let left = s.last.noise.slow * inertia * inertia;
         let leftover = Leftover {
             of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
-            unexplained: above(table.patched.holdout, floor) / above(table.refit.holdout, floor),
+            unexplained: above(left_held, floor) / above(refit_held, floor),
         };
-        let part_of_force = table.patched.holdout / table.force_rms.holdout.max(1e-300);
-        let helps_much = table.patched.holdout < MUCH_OF_REFIT * table.refit.holdout;
+        let part_of_force = left_held / estimator.rms(&on_held.force, known).max(1e-300);
+        let helps_much = left_held < MUCH_OF_REFIT * refit_held;
         let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
         let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, &on_fit)));

@@ -98,7 +98,9 @@ impl Law {
             N::TiltGravity => vec!["weight".into()],
             N::PositionSpring => {
                 (a, b) = (get("from", 0.0), get("one_sided", 0.0));
-                vec!["stiffness".into()]
+                // Where it is at rest is not known: a force that is there at the start.
+                let both = ["stiffness".to_owned(), "preload".to_owned()];
+                both.into_iter().take(if get("preload", 0.0) > 0.5 { 2 } else { 1 }).collect()
             }
             N::Backlash | N::RollerSlip => vec!["inertia_ratio".into()],
             N::DriveCompliance => {
@@ -189,6 +191,9 @@ impl Law {
             N::PositionSpring => {
                 let x = s.position - self.a;
                 out[0] = if self.b > 0.5 { -x.max(0.0) } else { -x };
+                if let Some(preload) = out.get_mut(1) {
+                    *preload = 1.0;
+                }
             }
             N::Backlash => out[0] = self.load.through_gap(s),
             N::RollerSlip => out[0] = self.load.by_grip(s),

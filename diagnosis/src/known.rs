@@ -1,0 +1,65 @@
+//! What held-out recordings may judge: a law of the travel says nothing of travel where no fitted recording has been.
+
+use crate::effects::EffectName as N;
+use crate::library::Span;
+use crate::model::Model;
+use crate::track::Track;
+use std::borrow::Cow;
+
+/// Part of the fitted travel by which a recording may go beyond it.
+const BEYOND: f64 = 0.03;
+
+/// Recordings with the blocks marked of which a model knows nothing.
+pub(crate) fn known<'a>(tracks: &'a [Track], model: &Model, span: &Span) -> Cow<'a, [Track]> {
+    let follows = |name| matches!(name, N::PositionDependentFriction | N::PositionDependentDamping);
+    let reach = BEYOND * span.travel();
+    let is_unknown = |x: &f64| *x < span.low - reach || *x > span.high + reach;
+    let goes_beyond = |track: &Track| track.x.iter().any(is_unknown);
+    if !model.effects.iter().any(|effect| follows(effect.name)) || !tracks.iter().any(goes_beyond) {
+        return Cow::Borrowed(tracks);
+    }
+    let mut tracks = tracks.to_vec();
+    for track in &mut tracks {
+        track.unknown = track.x.iter().map(is_unknown).collect();
+    }
+    Cow::Owned(tracks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effect;
+    use crate::model::Nominal;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    fn slide(to: f64) -> Track {
+        let time_s: Vec<f64> = (0..401).map(|i| f64::from(i) * 2.5e-3).collect();
+        let recording = Recording {
+            file: "a test".into(),
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.iter().map(|t| (1000.0 * to * t).round()).collect(),
+            time_s,
+            tilt_rad: None,
+            reference_counts: None,
+            force: None,
+        };
+        Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
+    }
+
+    #[test]
+    fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let span = Span::of(&[slide(10.0)], &nominal);
+        let model = |name| Model { effects: vec![Effect::shaped(name, &[])] };
+        let unknown = |to: f64, name| {
+            let tracks = [slide(to)];
+            let tracks = known(&tracks, &model(name), &span);
+            tracks[0].unknown.iter().filter(|x| **x).count() as f64 / tracks[0].blocks() as f64
+        };
+        assert_eq!(unknown(10.2, N::PositionDependentFriction), 0.0);
+        assert!((unknown(20.0, N::PositionDependentFriction) - 0.485).abs() < 0.02);
+        assert_eq!(unknown(20.0, N::QuadraticDrag), 0.0);
+    }
+}
