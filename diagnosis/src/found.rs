@@ -44,6 +44,8 @@ const FAIR_SHARE: f64 = 0.1;
 /// What explains this part is most of what was left out, and this many standard errors are sure.
 const MOST_SHARE: f64 = 0.5;
 const SURE: f64 = 3.0;
+/// Standard errors on the fitted recordings of what may carry beside another.
+const PROMISING: f64 = 2.5;
 /// What explains this part, and takes half of the held-out mean square with it, may rest on few moments there: counts are
 /// lost now and then.
 const NEARLY_ALL: f64 = 0.9;
@@ -55,9 +57,10 @@ const LEAST_SHARE: f64 = 0.01;
 const CERTAIN: f64 = 6.0;
 
 impl Found {
-    /// Whether it stands out of every stretch of every recording, however little it explains beside larger effects.
+    /// Whether it stands out of every stretch of the held-out recordings and surely of the others, however little it explains
+    /// beside larger effects.
     pub(crate) fn is_certain(&self) -> bool {
-        self.holdout.z.min(self.holdout.steady).min(self.fit.z) >= CERTAIN
+        self.holdout.z.min(self.holdout.steady).min(self.fit.z.max(self.fit.steady)) >= CERTAIN
     }
 
     /// Standard errors of its gain on fitted or on held-out recordings, whichever are fewer.
@@ -79,6 +82,12 @@ impl Found {
         let takes_most = self.force.low > 0.0 && self.share >= MOST_SHARE;
         let takes_all = self.force.sum >= HALF && self.share >= NEARLY_ALL && self.holdout.sum > 0.0;
         likely || (is_same && (takes_most || takes_all) && self.fit.z >= SURE)
+    }
+
+    /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and no worse than nothing
+    /// on the others.
+    pub(crate) fn promises(&self) -> bool {
+        self.fit.z >= PROMISING && self.holdout.sum > 0.0 && self.holdout.z >= 1.0 && self.share >= SHARE
     }
 
     /// Why an effect may not be named, if it may not.

@@ -161,8 +161,8 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             let mut out = Vec::new();
             let own = [("coast", nominal.dry_deceleration()), ("ratio", 1.0)];
             let machine = nominal.machine();
-            for creep in [0.002, 0.008, 0.03].map(|part| part * span.speed) {
-                for limit in logarithmic(span.least_grip(nominal), 0.945 * span.command, 12) {
+            for creep in [0.003, 0.02].map(|part| part * span.speed) {
+                for limit in logarithmic(span.least_grip(nominal), 0.945 * span.command, 10) {
                     let shape = [("limit", limit), ("creep", creep)];
                     out.push(Effect::shaped(name, &[shape.as_slice(), &own, &machine].concat()));
                 }

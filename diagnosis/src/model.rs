@@ -272,8 +272,9 @@ pub(crate) fn direction(track: &Track) -> Vec<f64> {
     track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
 }
 
-/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz.
+/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
 const SECOND_MASS_STEP_S: f64 = 4e-4;
+const GRIP_STEP_S: f64 = 1e-3;
 
 /// The inputs of one effect on force or sensor over a recording.
 pub(crate) fn effect_inputs(
@@ -292,7 +293,8 @@ pub(crate) fn effect_inputs(
         // What a second mass does is faster than a block.
         let mut out = vec![0.0];
         let mut signal = Vec::with_capacity(command.len());
-        let (block, step) = (track.rows_per_block, track.rows_per_step(SECOND_MASS_STEP_S));
+        let longest = if effect.name == EffectName::RollerSlip { GRIP_STEP_S } else { SECOND_MASS_STEP_S };
+        let (block, step) = (track.rows_per_block, track.rows_per_step(longest));
         let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
         for (j, (command, hold)) in blocks.enumerate() {
             let (tilt, external) = (track.tilt_at(j.min(n - 1)), track.force_at(j.min(n - 1)));

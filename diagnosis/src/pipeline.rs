@@ -107,9 +107,17 @@ struct Lost {
     tried: usize,
 }
 
-/// The model with one more effect, if there is one that carries to the held-out recordings; at most `most` may have been
-/// tried by then.
-fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Option<Standing> {
+/// The model with one more effect.
+struct Next {
+    standing: Standing,
+    /// Whether the effect carries to the held-out recordings, rather than being likely to beside another.
+    carries: bool,
+}
+
+/// The model with one more effect, if there is one that carries or, failing that, promises to; at most `most` may have
+/// been tried by then.
+fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Option<Next> {
+    let mut promising = None;
     let candidates = on.screen(&now.white, &|_| true);
     let mut finalists = on.finalists(&now.white, &candidates);
     on.polish(&mut finalists);
@@ -131,14 +139,21 @@ fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Op
         let mut held = now.held.clone();
         smooth_held(&white, on.nominal, on.span, &mut held, on.scale);
         let judged = judge_all(&own, &white, &held).pop().expect("the last effect is judged");
-        if let Some(reason) = judged.weakness() {
-            lost.names.push((name, judged.holdout.sum, reason));
-            continue;
+        let weakness = judged.weakness();
+        if weakness.is_none() || (promising.is_none() && judged.promises()) {
+            let slow = own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]);
+            let carries = weakness.is_none();
+            let next = Next { standing: Standing { white, slow, tracks, held }, carries };
+            if carries {
+                return Some(next);
+            }
+            promising = Some(next);
         }
-        let slow = own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]);
-        return Some(Standing { white, slow, tracks, held });
+        if let Some(reason) = weakness {
+            lost.names.push((name, judged.holdout.sum, reason));
+        }
     }
-    None
+    promising
 }
 
 pub(crate) fn search(
@@ -165,12 +180,19 @@ pub(crate) fn search(
     let slow = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut now = Standing { white, slow, tracks, held };
     let mut lost = Lost::default();
+    let mut before = None;
     for step in 0..MOST {
         progress("searching for what was left out", 0.15 + 0.2 * step as f64);
         let on = Bench { nominal: &nominal, tracks: &now.tracks, span: &span, scale };
         let Some(next) = with_one_more(&now, &on, &mut lost, TRIED * (step + 1)) else { break };
-        now = next;
+        if !next.carries && before.is_some() {
+            break;
+        }
+        // Of two effects as large as each other neither carries alone: what promises stands until one more step decides.
+        let last = std::mem::replace(&mut now, next.standing);
+        before = (!next.carries).then_some(last);
     }
+    let now = before.unwrap_or(now);
     progress("judging on held-out recordings", 0.8);
     let Standing { white, slow, tracks, held } = now;
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };

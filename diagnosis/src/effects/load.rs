@@ -45,7 +45,7 @@ const DAMPING: f64 = 0.3;
 const HOLDING: f64 = 1e-3;
 /// Longest step against the contact's frequency, rad, and of a grip, s.
 const STEP: f64 = 0.35;
-const GRIP_STEP_S: f64 = 4e-4;
+const GRIP_STEP_S: f64 = 1.2e-3;
 
 impl Load {
     pub(crate) fn new(effect: &Effect) -> Self {
