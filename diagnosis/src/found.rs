@@ -226,3 +226,76 @@ fn sizes_on(estimator: &Estimator, tracks: &[Track], with: &[Vec<f64>], without:
     };
     tracks.iter().zip(with.iter().zip(without)).map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gain(sum: f64, low: f64, z: f64) -> Gain {
+        Gain { sum, low, high: 2.0 * sum, z, steady: z }
+    }
+
+    /// An effect that is sure everywhere.
+    fn found() -> Found {
+        Found {
+            effect: Effect::shaped(EffectName::QuadraticDrag, &[]),
+            rivals: Vec::new(),
+            holdout: gain(500.0, 300.0, 8.0),
+            fit: gain(900.0, 600.0, 9.0),
+            force: gain(0.9, 0.6, 5.0),
+            share: 0.9,
+            at_bound: false,
+            is_comb: true,
+            sizes: vec![1.0, 1.02, 0.95],
+        }
+    }
+
+    fn may_be_named(change: impl FnOnce(&mut Found)) -> bool {
+        let mut found = found();
+        change(&mut found);
+        found.weakness().is_none()
+    }
+
+    #[test]
+    fn what_rests_on_few_moments_carries_only_where_it_is_nearly_all_and_as_large_everywhere() {
+        let rare = |found: &mut Found| {
+            found.holdout = gain(500.0, -1.0, 1.6);
+            found.force.low = -1e-6;
+            found.share = 0.95;
+        };
+        assert!(may_be_named(rare));
+        assert!(!may_be_named(|found| {
+            rare(found);
+            found.share = 0.8;
+        }));
+        assert!(!may_be_named(|found| {
+            rare(found);
+            found.sizes[2] = 0.5;
+        }));
+        assert!(!may_be_named(|found| {
+            rare(found);
+            found.fit = gain(900.0, 100.0, 2.0);
+        }));
+    }
+
+    #[test]
+    fn a_small_part_must_be_certain() {
+        assert!(may_be_named(|found| found.share = 0.04));
+        assert!(!may_be_named(|found| found.share = 0.005));
+        assert!(!may_be_named(|found| {
+            found.share = 0.04;
+            found.holdout = gain(50.0, 20.0, 4.0);
+        }));
+    }
+
+    #[test]
+    fn what_promises_is_sure_where_it_was_fitted_and_harms_nowhere() {
+        let mut half = found();
+        half.holdout = gain(300.0, -20.0, 1.5);
+        half.force.low = -0.1;
+        half.share = 0.3;
+        assert!(half.weakness().is_some() && half.promises());
+        half.holdout = gain(-10.0, -50.0, -0.5);
+        assert!(!half.promises());
+    }
+}

@@ -226,7 +226,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
             vec![
                 ("limit", 0.01 * span.command, span.command),
                 ("creep", 1e-4 * span.speed, 0.3 * span.speed),
-                ("coast", 0.2 * dry, 4.0 * dry),
+                ("coast", 0.35 * dry, 2.5 * dry),
                 ("ratio", RATIOS.0, RATIOS.1),
             ]
         }
@@ -265,6 +265,15 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
             value < low * (1.0 + AT_END) || value > high * (1.0 - AT_END)
         })
 }
+
+/// Whether values of a shape go together: a grip holds its load against the load's own friction, or it never held.
+pub(crate) fn is_possible(effect: &Effect) -> bool {
+    let get = |key: &str| effect.shape_or(key, 0.0);
+    effect.name != N::RollerSlip || get("limit") * get("per_command").abs() >= HOLDS * get("coast")
+}
+
+/// What a grip carries at the least over its load's own friction, of which the rig tells no more than this.
+const HOLDS: f64 = 0.9;
 
 /// Part of the travel over which bristles bend, where that is more than bristles do: such a spring creeps.
 pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
@@ -306,7 +315,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drift_settles_neither_at_once_nor_long_after_the_end_and_bristles_are_short() {
+    fn drifts_settle_within_the_recording_bristles_are_short_and_grips_hold() {
         let span = Span {
             speed: 10.0,
             speed_floor: 0.1,
@@ -333,6 +342,11 @@ mod tests {
         let bristles =
             |deflection| creeps(&Effect::shaped(N::PreslidingFriction, &[("deflection", deflection)]), &span);
         assert_eq!((bristles(1e-3), bristles(0.3), bristles(2.0)), (None, None, Some(0.1)));
+        let grip = |limit, coast| {
+            let shape = [("limit", limit), ("coast", coast), ("per_command", -10.0)];
+            is_possible(&Effect::shaped(N::RollerSlip, &shape))
+        };
+        assert!(grip(0.5, 5.0) && !grip(0.5, 6.0), "what cannot move its load is no grip");
         assert!(!at_end(N::ElectricalLag, 1e-6), "what is instant may be no lag, and is judged by its size");
     }
 }

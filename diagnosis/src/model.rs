@@ -166,9 +166,9 @@ impl Nominal {
             }
             // A commutation that loses much of the torque at some angle is broken rather than rippled.
             EffectName::TorqueRipple => (-0.45 * gain.abs(), 0.45 * gain.abs()),
-            EffectName::Backlash | EffectName::RollerSlip => {
-                ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
-            }
+            EffectName::Backlash => ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain)),
+            // A small mass that always slips is a friction of another form, not a drive that lets go.
+            EffectName::RollerSlip => ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain)),
             EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
             EffectName::MissedCounts => (0.5, 1.5),
             EffectName::PositionSpring if term > 0 => (f64::NEG_INFINITY, f64::INFINITY),

@@ -196,7 +196,6 @@ pub(crate) fn search(
     progress("judging on held-out recordings", 0.8);
     let Standing { white, slow, tracks, held } = now;
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
-    let last = bench.fit_slow(white.model.clone(), &[&slow.noise, &white.noise]);
     let null = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
     let mut s = Search {
         nominal: nominal.clone(),
@@ -204,7 +203,7 @@ pub(crate) fn search(
         held_tracks: Vec::new(),
         span: span.clone(),
         null,
-        last,
+        last: slow,
         found: Vec::new(),
         lost: lost.names,
     };

@@ -135,12 +135,6 @@ pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -
     class
 }
 
-/// The rival that explains surely more than the effect found, if there is one.
-pub(crate) fn overtaker(found: &Found) -> Option<&Rival> {
-    let ahead = found.rivals.iter().filter(|r| r.z < -BEHIND_Z && r.lead < -BEHIND);
-    ahead.min_by(|a, b| a.lead.total_cmp(&b.lead))
-}
-
 /// Standard errors that the nearest rival outside an effect's class is behind.
 pub(crate) fn nearest(found: &Found, class: &[EffectName]) -> f64 {
     found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(f64::INFINITY, f64::min)

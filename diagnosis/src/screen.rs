@@ -2,6 +2,7 @@
 
 use crate::effects::Effect;
 use crate::fit::{Fit, dot};
+use crate::library;
 use crate::model::{Model, Nominal, effect_inputs, effective_command, own_phase};
 use crate::select::PER_COEFFICIENT;
 use crate::solve::{Factor, Square};
@@ -98,7 +99,7 @@ pub(crate) fn score(
     effect: &Effect,
     nominal: &Nominal,
 ) -> Score {
-    if nominal.ignores_too_much(tracks, &model.effects, effect) {
+    if !library::is_possible(effect) || nominal.ignores_too_much(tracks, &model.effects, effect) {
         return Score { gain: 0.0 };
     }
     let terms = responses(fit, model, tracks, effect);

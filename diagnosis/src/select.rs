@@ -227,7 +227,7 @@ impl Bench<'_> {
     /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
     fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
         let (effect, others) = model.effects.split_last().expect("there is an effect to polish");
-        if self.nominal.ignores_too_much(self.tracks, others, effect) {
+        if !library::is_possible(effect) || self.nominal.ignores_too_much(self.tracks, others, effect) {
             return f64::NEG_INFINITY;
         }
         Fit::new(model, self.nominal, self.tracks, noise).log_likelihood

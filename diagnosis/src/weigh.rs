@@ -127,13 +127,11 @@ fn same_joint(
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }
 
-/// Weighs what the search found, with rivals that explain more in their place, and again without what is unsure as long
-/// as that makes the rest surer.
+/// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
     let scales = Scales { bench, refit: &refit, held, excitation };
     let found = scales.once(s, None);
-    let found = scales.with_overtakers(s, found);
     let best = scales.without_unsure(s, found);
     if !best.stands_for_swing() {
         return best;
@@ -154,43 +152,18 @@ struct Scales<'a> {
 }
 
 impl Scales<'_> {
-    /// Another model in place of the best so far, if it is better; otherwise the search stays as it was.
-    fn instead(
-        &self,
-        s: &mut Search,
-        model: Model,
-        best: &Weighing,
-        is_better: impl Fn(&Weighing) -> bool,
-    ) -> Option<Weighing> {
+    /// Another model in place of the best so far, if it is surer; otherwise the search stays as it was.
+    fn instead(&self, s: &mut Search, model: Model, best: &Weighing) -> Option<Weighing> {
         let other = self.bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, other), s.lost.len());
         prune(s, self.bench, self.held, &best.patched.noise);
         let next = self.once(s, best.hertz);
-        if is_better(&next) {
+        if next.surest() > best.surest() {
             return Some(next);
         }
         s.last = before;
         s.lost.truncate(known);
         None
-    }
-
-    /// The first effects found are chosen under the noise of a model that lacks the others: a rival may be ahead at last.
-    fn with_overtakers(&self, s: &mut Search, mut best: Weighing) -> Weighing {
-        for _ in 0..best.effects.len() {
-            let ahead = best.effects.iter().enumerate().find_map(|(i, weighed)| {
-                rivals::overtaker(&weighed.found).map(|rival| (i, rival.effect.clone()))
-            });
-            let Some((i, effect)) = ahead else { return best };
-            let mut model = s.last.model.clone();
-            model.effects[i] = effect;
-            let left = best.table.patched.holdout;
-            let leaves_less = |next: &Weighing| next.table.patched.holdout < left && next.surest() >= NAMED;
-            match self.instead(s, model, &best, leaves_less) {
-                Some(next) => best = next,
-                None => return best,
-            }
-        }
-        best
     }
 
     fn without_unsure(&self, s: &mut Search, mut best: Weighing) -> Weighing {
@@ -202,7 +175,7 @@ impl Scales<'_> {
             };
             let mut model = s.last.model.clone();
             model.effects.remove(i);
-            let Some(mut next) = self.instead(s, model, &best, |next| next.surest() > best.surest()) else {
+            let Some(mut next) = self.instead(s, model, &best) else {
                 return best;
             };
             next.dropped = best.dropped;

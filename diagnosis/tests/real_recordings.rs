@@ -62,6 +62,8 @@ fn emps_ripple_of_2_5_mm_is_found_where_friction_is_known_or_did_not_run() {
         diagnosis::diagnose_recordings(&rig, &[read("train.csv")], &[read("pulses.csv")], &|_, _| ())
             .expect("the recordings are usable");
     println!("{}", outcome.summary());
+    // A ball screw that was never seen to let go.
+    assert!(!names(&outcome).contains(&EffectName::RollerSlip));
     let cogging = outcome.report.effects.iter().find(|e| e.name == EffectName::Cogging);
     let cogging = cogging.expect("the ripple is named");
     let period = cogging.parameters["period"].value;

@@ -1,6 +1,6 @@
 //! What stands between the command as recorded and the command that makes torque.
 
-use super::{Effect, EffectName, PerStep};
+use super::{Effect, EffectName};
 use std::collections::VecDeque;
 
 /// An effect on the command, with its state. Steps may be of any length: each answer is the mean over its step.
@@ -17,7 +17,7 @@ pub enum CommandLaw {
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },
     /// A first-order lag, s.
     #[allow(missing_docs)]
-    Lag { time_constant: f64, state: Option<f64>, kept: PerStep<(f64, f64)> },
+    Lag { time_constant: f64, state: Option<f64> },
 }
 
 impl CommandLaw {
@@ -32,9 +32,7 @@ impl CommandLaw {
             EffectName::CommandDelay => {
                 Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 }
             }
-            EffectName::ElectricalLag => {
-                Self::Lag { time_constant: get("time_constant"), state: None, kept: PerStep::new() }
-            }
+            EffectName::ElectricalLag => Self::Lag { time_constant: get("time_constant"), state: None },
             _ => return None,
         })
     }
@@ -73,13 +71,11 @@ impl CommandLaw {
                 }
                 if dt > 0.0 { sum / dt } else { command }
             }
-            Self::Lag { time_constant, state, kept } => {
+            Self::Lag { time_constant, state } => {
                 let before = state.unwrap_or(command);
-                let (rest, mean) = kept.of(dt, |dt| {
-                    let ratio = dt / time_constant.max(1e-12);
-                    let rest = (-ratio).exp();
-                    (rest, if ratio > 1e-9 { (1.0 - rest) / ratio } else { 1.0 })
-                });
+                let ratio = dt / time_constant.max(1e-12);
+                let rest = (-ratio).exp();
+                let mean = if ratio > 1e-9 { (1.0 - rest) / ratio } else { 1.0 };
                 *state = Some(command + (before - command) * rest);
                 command + (before - command) * mean
             }

@@ -1,7 +1,7 @@
 //! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
 
 use super::load::Load;
-use super::{Effect, EffectName, PerStep};
+use super::{Effect, EffectName};
 use std::f64::consts::TAU;
 
 /// Where the plant is during one step.
@@ -46,8 +46,6 @@ pub struct Law {
     state: [f64; 3],
     /// What hangs on the motor by a gap or a grip.
     load: Load,
-    /// Transition of the resonator for a step of `dt`: kept because steps repeat.
-    resonator: PerStep<[f64; 6]>,
 }
 
 impl Law {
@@ -123,7 +121,7 @@ impl Law {
         };
         let state = [0.0; 3];
         let load = Load::new(effect);
-        Some(Self { name: effect.name, a, b, waves, times, names, state, load, resonator: PerStep::new() })
+        Some(Self { name: effect.name, a, b, waves, times, names, state, load })
     }
 
     /// Names of the terms, in order.
@@ -229,7 +227,7 @@ impl Law {
             return 0.0;
         }
         let (omega, zeta) = (self.a, self.b);
-        let m = self.resonator.of(dt, |dt| transition(omega, zeta, dt));
+        let m = transition(omega, zeta, dt);
         if self.state[2] == 0.0 {
             // At the start the spring carries the standing force.
             self.state = [force / (self.a * self.a), 0.0, 1.0];

@@ -8,14 +8,12 @@ mod law;
 mod load;
 mod name;
 mod plant;
-mod step;
 
 pub use command::CommandLaw;
 pub use law::{Law, State};
 pub(crate) use law::{legendre, wave_mean};
 pub use name::{EffectName, Subsystem};
 pub use plant::{Plant, Surroundings};
-pub use step::PerStep;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
