@@ -3,6 +3,7 @@
 use crate::effects::CommandLaw;
 use crate::error::InputError;
 use crate::excitation::Excitation;
+use crate::known;
 use crate::locate::{self, Map};
 use crate::null::command_scale;
 use crate::outcome::{Evidence, Outcome, Series};
@@ -172,7 +173,11 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         unexplained_fraction: unexplained,
         hypotheses,
         place: top_place,
-        separating_experiment: cannot_tell.then(|| prescribe::SPEEDS.to_owned()),
+        separating_experiment: if cannot_tell {
+            Some(prescribe::SPEEDS.to_owned())
+        } else {
+            known::beyond(&held_tracks, &patched.model, &span, nominal.rig.kind.length())
+        },
         reason: match verdict {
             Verdict::InsufficientExcitation => Some(excitation.one_speed()),
             Verdict::Unexplained => swings,

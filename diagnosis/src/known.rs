@@ -3,6 +3,7 @@
 use crate::effects::EffectName as N;
 use crate::library::Span;
 use crate::model::Model;
+use crate::outcome::short;
 use crate::track::Track;
 use std::borrow::Cow;
 
@@ -23,6 +24,32 @@ pub(crate) fn known<'a>(tracks: &'a [Track], model: &Model, span: &Span) -> Cow<
         track.unknown = track.x.iter().map(is_unknown).collect();
     }
     Cow::Owned(tracks)
+}
+
+/// Part of a recording beyond the fitted travel from which on it is told.
+const TOLD: f64 = 0.05;
+
+/// What to record next where held-out recordings go and no fitted one does, if the model asks for travel; `length` is the
+/// unit of the coordinate.
+pub(crate) fn beyond(tracks: &[Track], model: &Model, span: &Span, length: &str) -> Option<String> {
+    let known = known(tracks, model, span);
+    let is_told = |track: &Track| {
+        let unknown = track.unknown.iter().filter(|unknown| **unknown).count();
+        unknown as f64 > TOLD * track.blocks() as f64
+    };
+    if !known.iter().any(is_told) {
+        return None;
+    }
+    let all = || known.iter().flat_map(|track| track.x.iter().copied());
+    let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
+    let tidy = |x: f64| short(if x.abs() < 1e-3 * span.travel() { 0.0 } else { x });
+    Some(format!(
+        "to fit on, strokes over the travel from {} to {} {length}: held-out recordings go there and fitted ones only from {} to {}, so that the profile beyond is not known",
+        tidy(from),
+        tidy(to),
+        tidy(span.low),
+        tidy(span.high)
+    ))
 }
 
 #[cfg(test)]
@@ -61,5 +88,9 @@ mod tests {
         assert_eq!(unknown(10.2, N::PositionDependentFriction), 0.0);
         assert!((unknown(20.0, N::PositionDependentFriction) - 0.485).abs() < 0.02);
         assert_eq!(unknown(20.0, N::QuadraticDrag), 0.0);
+        let profile = model(N::PositionDependentFriction);
+        let told = |to: f64| beyond(&[slide(to)], &profile, &span, "rad");
+        assert_eq!(told(10.2), None);
+        assert!(told(20.0).is_some_and(|text| text.contains("from 0 to 19.95 rad")), "{:?}", told(20.0));
     }
 }

@@ -3,9 +3,9 @@
 //! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J and f = F/J against the
 //! motion. A load that brakes itself by a, reached through a force T, makes of it r·(d − y − (f − a) − e/r) more, where
 //! y = T/(p·J) and e = E/J of the forces E that act on the load. The motor's lead w over its load follows
-//! w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the same way, and the load's friction turns with the load. Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to
-//! a ceiling. Both are driven by the command, so that little noise of the
-//! measured motion enters, and bounded, so that nothing drifts.
+//! w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the same way, and the load's friction turns with the load.
+//! Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to a ceiling. Both are driven by
+//! the command, so that little noise of the measured motion enters, and bounded, so that nothing drifts.
 
 use super::Effect;
 use super::law::State;
@@ -37,6 +37,14 @@ pub(crate) struct Load {
     creep: f64,
     /// Lead over the load and its rate; none before the first command.
     lead: Option<(f64, f64)>,
+}
+
+/// What friction and forces on the load do, as accelerations.
+struct Held {
+    /// To the motor's lead, against it.
+    apart: f64,
+    /// To the motor of a rigid machine and not to one that carries its load by a joint.
+    missed: f64,
 }
 
 /// Damping of the contact: it bounces once or twice.
@@ -77,9 +85,7 @@ impl Load {
         let steps = (s.dt * self.contact / STEP).ceil().clamp(1.0, 400.0);
         let h = s.dt / steps;
         let whole = 1.0 + self.ratio;
-        let friction = self.friction(s.velocity);
-        let pulled = self.pulled(s) / self.ratio;
-        let apart = whole * pulled + (whole - self.ratio * self.share) * friction;
+        let Held { apart, missed } = self.held(s);
         let mut sum = 0.0;
         for _ in 0..steps as usize {
             let over = lead - lead.clamp(-self.half, self.half);
@@ -92,7 +98,7 @@ impl Load {
             sum += drive - carried;
         }
         self.lead = Some((lead, rate));
-        (sum / steps - (1.0 - self.share) * friction - pulled) / self.per_command
+        (sum / steps - missed) / self.per_command
     }
 
     /// Command that drives the motor alone, beyond what the grip carries: little while it creeps, much while it slips.
@@ -103,9 +109,7 @@ impl Load {
         let steps = (s.dt / GRIP_STEP_S).ceil().clamp(1.0, 50.0);
         let h = s.dt / steps;
         let whole = 1.0 + self.ratio;
-        let friction = self.friction(s.velocity);
-        let pulled = self.pulled(s) / self.ratio;
-        let apart = whole * pulled + (whole - self.ratio * self.share) * friction;
+        let Held { apart, missed } = self.held(s);
         let mut sum = 0.0;
         for _ in 0..steps as usize {
             let brake = self.brake(s.velocity - rate);
@@ -116,18 +120,17 @@ impl Load {
             sum += drive - most.abs() * carried(creep);
         }
         self.lead = Some((0.0, rate));
-        (sum / steps - (1.0 - self.share) * friction - pulled) / self.per_command
+        (sum / steps - missed) / self.per_command
     }
 
-    /// Acceleration of the whole machine by what pulls at its load.
-    fn pulled(&self, s: &State) -> f64 {
-        self.per_force * s.external + self.weight * s.tilt.sin() + self.offset
-    }
-
-    /// Deceleration of the whole machine by its friction.
-    fn friction(&self, velocity: f64) -> f64 {
-        let way = if velocity == 0.0 { 0.0 } else { velocity.signum() };
-        self.dry * way + self.viscous * velocity
+    fn held(&self, s: &State) -> Held {
+        let way = if s.velocity == 0.0 { 0.0 } else { s.velocity.signum() };
+        let friction = self.dry * way + self.viscous * s.velocity;
+        let pulled = (self.per_force * s.external + self.weight * s.tilt.sin() + self.offset) / self.ratio;
+        Held {
+            apart: (1.0 + self.ratio) * pulled + (1.0 + self.ratio * (1.0 - self.share)) * friction,
+            missed: (1.0 - self.share) * friction + pulled,
+        }
     }
 
     /// Deceleration of the load by its own friction; near rest it holds rather than brakes.
