@@ -2,7 +2,7 @@
 //! would be one too many.
 
 use crate::locate::Map;
-use crate::outcome::{Outcome, Series, short, unit};
+use crate::outcome::{Outcome, Series, short, short_within, unit};
 use crate::report::{Named, Verdict};
 use crate::rig::Kind;
 use std::fmt::Write as _;
@@ -159,14 +159,15 @@ fn frame(
             "<line class=grid x1={LEFT} x2={WIDE} y1={py:.1} y2={py:.1} /><text x={} y={:.1} text-anchor=end>{}</text>",
             LEFT - 5.0,
             py + 4.0,
-            short(value)
+            short_within(value, y.1 - y.0)
         );
     }
     for i in 0..=5 {
         let value = x.0 + (x.1 - x.0) * f64::from(i) / 5.0;
         let (px, _) = at(value, y.0);
         let anchor = if i == 5 { "end" } else { "middle" };
-        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{}</text>", HIGH + 24.0, short(value));
+        let label = short_within(value, x.1 - x.0);
+        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{label}</text>", HIGH + 24.0);
     }
     let _ = write!(out, "<title>{} over {}</title>", safe(y_label), safe(x_label));
     at

@@ -3,7 +3,7 @@
 use crate::effects::EffectName as N;
 use crate::library::Span;
 use crate::model::Model;
-use crate::outcome::short;
+use crate::outcome::short_within;
 use crate::track::Track;
 use std::borrow::Cow;
 
@@ -42,7 +42,7 @@ pub(crate) fn beyond(tracks: &[Track], model: &Model, span: &Span, length: &str)
     }
     let all = || known.iter().flat_map(|track| track.x.iter().copied());
     let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
-    let tidy = |x: f64| short(if x.abs() < 1e-3 * span.travel() { 0.0 } else { x });
+    let tidy = |x: f64| short_within(x, span.travel());
     Some(format!(
         "to fit on, strokes over the travel from {} to {} {length}: held-out recordings go there and fitted ones only from {} to {}, so that the profile beyond is not known",
         tidy(from),

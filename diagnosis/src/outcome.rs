@@ -162,6 +162,11 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
+/// The same, and nought where it is less than a thousandth of a range.
+pub(crate) fn short_within(x: f64, range: f64) -> String {
+    short(if x.abs() < 1e-3 * range { 0.0 } else { x })
+}
+
 impl Outcome {
     /// The outcome where recordings cannot tell, with the reason.
     pub(crate) fn cannot_tell(rig: &Rig, reason: String) -> Self {

@@ -202,7 +202,7 @@ impl Scales<'_> {
         let (inertia, _, _) = values::scale(nominal, &patched);
         let count = 1.0 / nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
-        let helps = relative_gain(&estimator, known, &on_held.refit, &on_held.patched);
+        let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
         let table = FitTable {
             metric: "force_rmse".into(),
             unit: nominal.rig.kind.force().into(),
