@@ -30,10 +30,6 @@ pub(crate) fn descend(
 ) -> Model {
     let last = model.effects.len() - 1;
     let movable = library::movable(&model.effects[last], bench.span);
-    // One value is a line, and a line was searched.
-    if movable.len() < 2 {
-        return model;
-    }
     for _ in 0..STEPS {
         let step = step(bench, &model, noise);
         let moved = |part: f64| {
