@@ -188,7 +188,7 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             let machine = nominal.machine();
             let mut out = Vec::new();
             for coast in [0.6, 1.5].map(|part| part * nominal.dry_deceleration()) {
-                for gap in logarithmic(2.0 * span.count, span.widest_gap(), 16) {
+                for gap in logarithmic(2.0 * span.count, span.widest_gap(), 12) {
                     let shape = [("gap", gap), ("coast", coast), ("contact_hz", 180.0), ("ratio", 1.0)];
                     out.push(Effect::shaped(name, &[shape.as_slice(), &machine].concat()));
                 }

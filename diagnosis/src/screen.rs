@@ -1,9 +1,9 @@
 //! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
 
 use crate::effects::Effect;
-use crate::fit::{Fit, dot};
+use crate::fit::{Fit, Prepared, dot};
 use crate::library;
-use crate::model::{Model, Nominal, effect_inputs, effective_command, own_phase};
+use crate::model::{Model, Nominal, effect_inputs, effective_command, effective_commands, own_phase};
 use crate::select::PER_COEFFICIENT;
 use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
@@ -19,30 +19,17 @@ pub(crate) struct Score {
 /// Whitened responses of an effect's terms over each recording: `[recording][term][block]`.
 pub(crate) type Terms = Vec<Vec<Vec<f64>>>;
 
-/// Inputs that an effect would add to a model over one recording; for command effects the change of the command.
-pub(crate) fn added_inputs(model: &Model, track: &Track, effect: &Effect) -> Vec<Input> {
+/// Inputs that an effect would add to a model over one recording; `after` is the effective command with it, where it acts
+/// on the command.
+fn added_inputs(model: &Model, track: &Track, effect: &Effect, after: Option<&Vec<f64>>) -> Vec<Input> {
     let before = effective_command(track, &model.effects);
     let command = before.as_deref().unwrap_or(&track.command);
-    if crate::effects::CommandLaw::new(effect).is_some() {
-        let mut with = model.effects.clone();
-        with.push(effect.clone());
-        let after = effective_command(track, &with).expect("the effect acts on the command");
+    if let Some(after) = after {
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
     let drive = track.rows_input(command);
     effect_inputs(track, effect, command, &drive)
-}
-
-/// Responses of an effect's terms under the noise of a fit.
-pub(crate) fn responses(fit: &Fit, model: &Model, tracks: &[Track], effect: &Effect) -> Terms {
-    tracks
-        .iter()
-        .zip(&fit.prepared)
-        .map(|(track, one)| {
-            added_inputs(model, track, effect).iter().map(|input| one.gains.response(track, input)).collect()
-        })
-        .collect()
 }
 
 /// Sums that a score test needs: information of the terms with the model projected out, and their score.
@@ -99,12 +86,21 @@ pub(crate) fn score(
     effect: &Effect,
     nominal: &Nominal,
 ) -> Score {
-    if !library::is_possible(effect) || nominal.ignores_too_much(tracks, &model.effects, effect) {
+    let all: Vec<Effect> = model.effects.iter().chain([effect]).cloned().collect();
+    let effective = effective_commands(tracks, &all);
+    let ignores = |effective: &Vec<Vec<f64>>| nominal.ignores_too_much(tracks, effective);
+    if !library::is_possible(effect) || effective.as_ref().is_some_and(ignores) {
         return Score { gain: 0.0 };
     }
-    let terms = responses(fit, model, tracks, effect);
+    // Responses of the effect's terms under the noise of the fit.
+    let response = |(r, (track, one)): (usize, (&Track, &Prepared))| -> Vec<Vec<f64>> {
+        let after = effective.as_ref().map(|all| &all[r]);
+        let inputs = added_inputs(model, track, effect, after);
+        inputs.iter().map(|input| one.gains.response(track, input)).collect()
+    };
+    let terms: Terms = tracks.iter().zip(&fit.prepared).enumerate().map(response).collect();
     let sums = project(fit, residuals, &terms, own_phase(effect.name));
-    if crate::effects::CommandLaw::new(effect).is_some() {
+    if effective.is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.
         let gain = fit.value(crate::model::Key::Gain).unwrap_or(0.0);
         let value = gain * sums.score[0] - 0.5 * gain * gain * sums.information.at(0, 0);

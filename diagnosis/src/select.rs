@@ -5,7 +5,7 @@ use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
 use crate::kalman::Noise;
 use crate::library::{self, Span};
-use crate::model::{Model, Nominal};
+use crate::model::{Model, Nominal, effective_commands};
 use crate::noise::{self, Colour};
 use crate::periodic::{self, golden};
 use crate::screen;
@@ -226,8 +226,10 @@ impl Bench<'_> {
 
     /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
     fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
-        let (effect, others) = model.effects.split_last().expect("there is an effect to polish");
-        if !library::is_possible(effect) || self.nominal.ignores_too_much(self.tracks, others, effect) {
+        let effect = model.effects.last().expect("there is an effect to polish");
+        let effective = effective_commands(self.tracks, &model.effects);
+        let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);
+        if !library::is_possible(effect) || effective.is_some_and(ignores) {
             return f64::NEG_INFINITY;
         }
         Fit::new(model, self.nominal, self.tracks, noise).log_likelihood

@@ -44,7 +44,7 @@ pub fn run(options: &Options) -> Result<(), String> {
 fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(), String> {
     let start = std::time::Instant::now();
     let (records, unbuilt) = bench::run_cases(options, specs, tool)?;
-    let speed = if options.quick || options.only.is_some() {
+    let speed = if options.quick || options.only.as_deref().is_some_and(|only| only != options::SPEED) {
         None
     } else {
         bench::measure_speed(options.seed, tool).ok()

@@ -41,6 +41,9 @@ impl Default for Options {
     }
 }
 
+/// What `--only` takes for the measurement of the time and no case.
+pub(crate) const SPEED: &str = "speed";
+
 /// The flags, for `--help`.
 pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
 
@@ -49,7 +52,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
-  --only TEXT   only cases whose category or hidden physics contains TEXT
+  --only TEXT   only cases whose category or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
   --write DIR   write the recordings to DIR/cases and the keys to DIR/keys, and run nothing
   --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
   --out DIR     folder for proof.json and proof.md (target)
