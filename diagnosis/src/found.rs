@@ -19,7 +19,7 @@ use crate::values;
 #[derive(Clone)]
 pub(crate) struct Found {
     pub(crate) effect: Effect,
-    /// Fitted rivals: (name, merit less than the winner's, held-out and fit margin in standard errors).
+    /// Others fitted in its place; none before they are.
     pub(crate) rivals: Vec<Rival>,
     /// Held-out gain of the full model over the model without it.
     pub(crate) holdout: Gain,

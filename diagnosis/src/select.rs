@@ -65,6 +65,26 @@ fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
     PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
 }
 
+/// The largest value along one value of a shape between two ends, in its logarithm, and the effect that has it.
+fn along(
+    effect: &Effect,
+    key: &str,
+    (low, high): (f64, f64),
+    steps: usize,
+    value: &dyn Fn(&Effect) -> f64,
+) -> Option<(f64, Effect)> {
+    let with = |x: f64| {
+        let mut trial = effect.clone();
+        trial.shape.insert(key.to_owned(), x.exp());
+        trial
+    };
+    let (a, b) = (low.ln(), high.ln());
+    (b > a).then(|| {
+        let found = with(golden(a, b, steps, |x| value(&with(x))));
+        (value(&found), found)
+    })
+}
+
 /// Effects that change a dry friction, which must be there first.
 fn needs_dry(name: N) -> bool {
     matches!(
@@ -150,21 +170,9 @@ impl Bench<'_> {
             for (key, low, high) in movable.iter().take(if round == 0 { MOVED } else { MOVED_AGAIN }) {
                 let at = effect.shape[*key];
                 let reach = if round == 0 { 2.2_f64 } else { 1.3 };
-                let (a, b) = ((at / reach).max(*low).ln(), (at * reach).min(*high).ln());
-                if b <= a {
-                    continue;
-                }
-                let with = |x: f64| {
-                    let mut trial = effect.clone();
-                    trial.shape.insert((*key).to_owned(), x.exp());
-                    trial
-                };
-                let x = golden(a, b, 9, |x| gain(&with(x)));
-                let trial = with(x);
-                let value = gain(&trial);
-                if value > best {
-                    best = value;
-                    effect = trial;
+                let ends = ((at / reach).max(*low), (at * reach).min(*high));
+                if let Some((value, trial)) = along(&effect, key, ends, 9, &gain).filter(|(v, _)| *v > best) {
+                    (best, effect) = (value, trial);
                 }
             }
             if movable.is_empty() {
@@ -271,21 +279,16 @@ impl Bench<'_> {
         }
         for (key, low, high) in movable.iter().copied() {
             let at = model.effects[last].shape[key];
-            let (a, b) = ((at / 1.6).max(low).ln(), (at * 1.6).min(high).ln());
-            if b <= a {
-                continue;
-            }
-            let with = |x: f64| {
+            let ends = ((at / 1.6).max(low), (at * 1.6).min(high));
+            let with = |effect: &Effect| {
                 let mut trial = model.clone();
-                trial.effects[last].shape.insert(key.to_owned(), x.exp());
+                trial.effects[last] = effect.clone();
                 trial
             };
-            let x = golden(a, b, 8, |x| merit(&with(x)));
-            let trial = with(x);
-            let value = merit(&trial);
-            if value > best {
+            let found = along(&model.effects[last], key, ends, 8, &|effect| merit(&with(effect)));
+            if let Some((value, effect)) = found.filter(|(value, _)| *value > best) {
                 best = value;
-                model = trial;
+                model.effects[last] = effect;
             }
         }
         let model = descend(self, model, &candidate.noise, best, &merit);
