@@ -159,7 +159,7 @@ impl Fit {
     /// Fits a model to recordings.
     pub(crate) fn new(model: &Model, nominal: &Nominal, tracks: &[Track], noise: &Noise) -> Self {
         let prepared: Vec<Prepared> =
-            tracks.iter().map(|track| Prepared::new(model, nominal, track, noise)).collect();
+            tracks.par_iter().map(|track| Prepared::new(model, nominal, track, noise)).collect();
         Self::of(prepared)
     }
 

@@ -307,12 +307,13 @@ pub(crate) fn direction(track: &Track) -> Vec<f64> {
 const SECOND_MASS_STEP_S: f64 = 6e-4;
 const GRIP_STEP_S: f64 = 1e-3;
 
-/// The inputs of one effect on force or sensor over a recording.
+/// The inputs of one effect on force or sensor over a recording; `drive` is the command's, asked for only where the effect
+/// scales it.
 pub(crate) fn effect_inputs(
     track: &Track,
     effect: &Effect,
     command: &[f64],
-    drive_input: &Input,
+    drive: impl FnOnce() -> Input,
 ) -> Vec<Input> {
     if effect.name == EffectName::MissedCounts {
         return vec![Input::Sensor(track.lost.clone())];
@@ -363,13 +364,14 @@ pub(crate) fn effect_inputs(
         }
     }
     let sensor = law.in_sensor();
+    let drive = scales_drive(effect.name).then(drive);
     columns
         .into_iter()
         .map(|column| {
             if sensor {
                 Input::Sensor(column)
-            } else if scales_drive(effect.name) {
-                drive_input.scaled(&column)
+            } else if let Some(drive) = &drive {
+                drive.scaled(&column)
             } else {
                 Input::Held(column)
             }
@@ -402,7 +404,9 @@ impl Model {
             push(Key::External, Input::Held(force.clone()), false);
         }
         for (index, effect) in self.effects.iter().enumerate() {
-            for (term, input) in effect_inputs(track, effect, command, &drive).into_iter().enumerate() {
+            for (term, input) in
+                effect_inputs(track, effect, command, || drive.clone()).into_iter().enumerate()
+            {
                 push(Key::Term { effect: index, term }, input, own_phase(effect.name));
             }
         }

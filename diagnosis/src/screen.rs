@@ -28,8 +28,7 @@ fn added_inputs(model: &Model, track: &Track, effect: &Effect, after: Option<&Ve
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
-    let drive = track.rows_input(command);
-    effect_inputs(track, effect, command, &drive)
+    effect_inputs(track, effect, command, || track.rows_input(command))
 }
 
 /// Sums that a score test needs: information of the terms with the model projected out, and their score.
@@ -98,7 +97,7 @@ pub(crate) fn score(
         let inputs = added_inputs(model, track, effect, after);
         inputs.iter().map(|input| one.gains.response(track, input)).collect()
     };
-    let terms: Terms = tracks.iter().zip(&fit.prepared).enumerate().map(response).collect();
+    let terms: Terms = tracks.par_iter().zip(&fit.prepared).enumerate().map(response).collect();
     let sums = project(fit, residuals, &terms, own_phase(effect.name));
     if effective.is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.

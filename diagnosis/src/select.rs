@@ -118,14 +118,18 @@ impl Bench<'_> {
     }
 
     /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
-    pub(crate) fn screen(&self, now: &Candidate, wanted: &dyn Fn(N) -> bool) -> Vec<(Effect, f64)> {
+    pub(crate) fn screen(&self, now: &Candidate, wanted: &(dyn Fn(N) -> bool + Sync)) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
-        let mut found: Vec<(Effect, f64)> = Vec::new();
-        for name in N::ALL {
-            let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
-            let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
-            if there(*name) || (needs_dry(*name) && !dry) || !wanted(*name) {
-                continue;
+        let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
+        let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
+        let no_losses = self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0));
+        let best_of = |name: &N| -> Option<(Effect, f64)> {
+            if there(*name)
+                || (needs_dry(*name) && !dry)
+                || (*name == N::MissedCounts && no_losses)
+                || !wanted(*name)
+            {
+                return None;
             }
             let best = match name {
                 N::Cogging | N::TorqueRipple => periodic::search(
@@ -143,17 +147,11 @@ impl Bench<'_> {
                         .map(|(effect, score)| (effect, score.gain))
                 }
             };
-            if *name == N::MissedCounts && self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0)) {
-                continue;
-            }
-            if let Some((effect, _)) = best {
-                let (effect, gain) = self.refine(now, &residuals, effect);
-                let worth = gain - cost(&effect, self.tracks.len(), self.span);
-                if worth > 0.0 {
-                    found.push((effect, worth));
-                }
-            }
-        }
+            let (effect, gain) = self.refine(now, &residuals, best?.0);
+            let worth = gain - cost(&effect, self.tracks.len(), self.span);
+            (worth > 0.0).then_some((effect, worth))
+        };
+        let mut found: Vec<(Effect, f64)> = N::ALL.par_iter().filter_map(best_of).collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
     }
