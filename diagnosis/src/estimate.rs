@@ -69,7 +69,7 @@ impl Estimator {
         let n = track.blocks();
         let mut out = vec![true; n];
         for j in 0..n {
-            if track.rest[j] || track.unknown[j] {
+            if track.rest[j] || track.unknown[j] || track.v[j].abs() < track.stops_from {
                 out[j.saturating_sub(reach)..(j + reach + 1).min(n)].fill(false);
             }
         }

@@ -53,6 +53,7 @@ fn excerpt(track: &Track, total: &Total, from: usize, to: usize) -> Excerpt {
         segments: vec![0, to - from],
         lost: Vec::new(),
         speed_floor: track.speed_floor,
+        stops_from: track.stops_from,
     };
     part.x = Vec::new();
     let total = Total { dv: cut(&total.dv), dq: cut(&total.dq), dz: cut(&total.dz) };

@@ -59,6 +59,8 @@ pub(crate) struct Track {
     pub(crate) lost: Vec<f64>,
     /// Speed below which its sign is not known.
     pub(crate) speed_floor: f64,
+    /// Speed from which the rig's dry friction stops the axis within half a block.
+    pub(crate) stops_from: f64,
 }
 
 /// Blocks per second that are wanted: enough for friction, few enough for a minute at 10 kHz.
@@ -103,6 +105,8 @@ impl Track {
             segments: Vec::new(),
             lost: vec![0.0; n],
             speed_floor: 0.0,
+            stops_from: 0.5 * recording.duration_s() / n.max(1) as f64 * rig.model.coulomb.unwrap_or(0.0)
+                / rig.model.inertia,
             row_time: row_time.into(),
             row_hold: row_hold.into(),
         };

@@ -13,9 +13,11 @@ const OVERSAMPLED: f64 = 2.6;
 const FEWEST_CYCLES: f64 = 12.0;
 /// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that does not follow it, for
 /// a light axis gives way to it, and that may be about as fast otherwise: what repeats with the motion swings too, at its
-/// frequency and multiples of it.
+/// frequency and multiples of it. Both grow, as far as `ROOM` times, with how little of the residual is left beside the
+/// swing, for what repeats with the motion leaves much.
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
+const ROOM: f64 = 4.0;
 /// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what comes from outside with
 /// half as much again at the most, and what a lag or a short delay leaves is less than the drive makes.
 const DRIVEN: f64 = 2.25;
@@ -125,10 +127,11 @@ fn fast(all: &[Samples], hertz: f64) -> f64 {
     all.iter().map(fast).sum()
 }
 
-/// Whether a swing may go its own way, for the axis does not move as fast.
-fn is_apart(motion: &[Samples], hertz: f64) -> bool {
+/// Whether a swing that is `part` of the residual may go its own way, for the axis does not move as fast.
+fn is_apart(motion: &[Samples], hertz: f64, part: f64) -> bool {
+    let room = (1.0 / (1.0 - part)).clamp(1.0, ROOM);
     let (whole, there) = (square(motion), explained(motion, hertz));
-    there < GIVES_WAY * whole && fast(motion, hertz) - there < FAST_MOTION * whole
+    there < GIVES_WAY * room * whole && fast(motion, hertz) - there < FAST_MOTION * room * whole
 }
 
 /// The frequency at which a swing would explain the most of what the refit leaves on the fitted recordings.
@@ -162,9 +165,32 @@ pub(crate) fn swing(estimator: &Estimator, hertz: f64, held: &Left) -> Option<Sw
     let hertz = nearby(hertz, apart(&before), &before);
     let swings = explained(&before, hertz);
     let speeds: Vec<Vec<f64>> = held.tracks.iter().map(|track| track.v.clone()).collect();
-    if explained(&of_held(held.force), hertz) > DRIVEN * swings || !is_apart(&of_held(&speeds), hertz) {
+    let whole = square(&before);
+    let part = swings / whole;
+    if explained(&of_held(held.force), hertz) > DRIVEN * swings || !is_apart(&of_held(&speeds), hertz, part) {
         return None;
     }
-    let whole = square(&before);
-    Some(Swing { hertz, part: swings / whole, taken: (swings - explained(&after, hertz)) / whole })
+    Some(Swing { hertz, part, taken: (swings - explained(&after, hertz)) / whole })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_more_swings_the_more_the_axis_may_give_way() {
+        let (hertz, step_s) = (12.0, 0.01);
+        let motion = |there: f64| {
+            let at = |i: u32| {
+                let t = step_s * f64::from(i);
+                (TAU * 0.5 * t).sin() + there.sqrt() * (TAU * hertz * t).sin()
+            };
+            [Samples { step_s, values: (0..2000).map(at).collect() }]
+        };
+        let (still, light, follows) = (motion(0.01), motion(0.1), motion(0.5));
+        assert!(is_apart(&still, hertz, 0.3));
+        assert!(!is_apart(&light, hertz, 0.3));
+        assert!(is_apart(&light, hertz, 0.98));
+        assert!(!is_apart(&follows, hertz, 0.98));
+    }
 }
