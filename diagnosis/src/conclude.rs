@@ -116,10 +116,9 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
                     holdout_gain: one.holdout.sum - rival.lead,
                     evidence: None,
                     class: Vec::new(),
-                    rejected_because: Some(format!(
-                        "{} explains more by {:.1} standard errors",
-                        one.effect.name, rival.z
-                    )),
+                    rejected_because: Some(rival.absence.clone().unwrap_or_else(|| {
+                        format!("{} explains more by {:.1} standard errors", one.effect.name, rival.z)
+                    })),
                 });
             }
         }

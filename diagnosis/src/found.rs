@@ -84,10 +84,10 @@ impl Found {
         likely || (is_same && (takes_most || takes_all) && self.fit.z >= SURE)
     }
 
-    /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and no worse than nothing
-    /// on the others.
+    /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and not surely worse than
+    /// nothing on the others.
     pub(crate) fn promises(&self) -> bool {
-        self.fit.z >= PROMISING && self.holdout.sum > 0.0 && self.holdout.z >= 1.0 && self.share >= SHARE
+        self.fit.z >= PROMISING && self.holdout.z > -1.0 && self.share >= SHARE
     }
 
     /// Why an effect may not be named, if it may not.
@@ -130,6 +130,8 @@ pub(crate) struct Rival {
     pub(crate) z: f64,
     /// Lead of the winner in log-likelihood.
     pub(crate) lead: f64,
+    /// Why it is none although it explains as much.
+    pub(crate) absence: Option<String>,
 }
 
 /// Lays a model on every held-out recording.
@@ -289,13 +291,15 @@ mod tests {
     }
 
     #[test]
-    fn what_promises_is_sure_where_it_was_fitted_and_harms_nowhere() {
+    fn what_promises_is_sure_where_it_was_fitted_and_surely_harms_nowhere() {
         let mut half = found();
         half.holdout = gain(300.0, -20.0, 1.5);
         half.force.low = -0.1;
         half.share = 0.3;
         assert!(half.weakness().is_some() && half.promises());
         half.holdout = gain(-10.0, -50.0, -0.5);
+        assert!(half.promises());
+        half.holdout = gain(-50.0, -90.0, -1.5);
         assert!(!half.promises());
     }
 }

@@ -139,7 +139,8 @@ fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Op
         let mut held = now.held.clone();
         smooth_held(&white, on.nominal, on.span, &mut held, on.scale);
         let judged = judge_all(&own, &white, &held).pop().expect("the last effect is judged");
-        let weakness = judged.weakness();
+        let weakness =
+            judged.weakness().or_else(|| values::absence(&own, &white, white.model.effects.len() - 1));
         if weakness.is_none() || (promising.is_none() && judged.promises()) {
             let slow = own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]);
             let carries = weakness.is_none();
@@ -218,16 +219,12 @@ pub(crate) fn prune(s: &mut Search, bench: &Bench, held: &[Track], noise: &Noise
     loop {
         let plain = bench.fit(s.last.model.clone(), noise, Colour::White);
         s.found = judge_all(bench, &plain, held);
-        let absent = |i: usize, name| {
-            let is_there = values::is_there(name, &values::parameters(bench, &plain, i));
-            (!is_there).then(|| "its size cannot be told from zero".to_owned())
-        };
         let weakest = s
             .found
             .iter()
             .enumerate()
             .filter_map(|(i, f)| {
-                let reason = f.weakness().or_else(|| absent(i, f.effect.name))?;
+                let reason = f.weakness().or_else(|| values::absence(bench, &plain, i))?;
                 Some((i, f.holdout.z, reason))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));

@@ -11,6 +11,7 @@ use crate::noise::Colour;
 use crate::periodic::is_periodic;
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
+use crate::values;
 use rayon::prelude::*;
 
 /// How many rivals of each effect are fitted in full.
@@ -80,18 +81,19 @@ pub(crate) fn fit_rivals(
                     judge::bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
                 };
                 let mut gain = lead(&rival);
-                let mut effect = effect.clone();
+                let mut rival = rival;
                 if gain.z < WITHIN_REACH {
                     // A rival that may be near is fitted as well as the winner was.
                     let polished = Candidate { noise: best.noise, ..bench.polish_one(&rival) };
                     let again = lead(&polished);
                     if again.sum < gain.sum {
-                        gain = again;
-                        effect =
-                            polished.model.effects.into_iter().next_back().expect("a rival has an effect");
+                        (gain, rival) = (again, polished);
                     }
                 }
-                Rival { name: effect.name, effect, z: gain.z, lead: gain.sum }
+                let last = rival.model.effects.len() - 1;
+                let absence = (gain.z < BEHIND_Z).then(|| values::absence(bench, &rival, last)).flatten();
+                let effect = rival.model.effects.remove(last);
+                Rival { name: effect.name, effect, z: gain.z, lead: gain.sum, absence }
             })
             .collect();
         // Needed only where a rival comes near, and the same for all of them.
@@ -125,7 +127,8 @@ pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -
     }
     class.extend(excitation.twin(name).filter(|twin| !class.contains(twin)));
     let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
-    let mut near: Vec<&Rival> = found.rivals.iter().filter(|r| r.z < BEHIND_Z || r.lead < least).collect();
+    let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
+    let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
     near.sort_by(|a, b| a.z.total_cmp(&b.z));
     for rival in near {
         if class.len() < MOST_IN_CLASS && !class.contains(&rival.name) {
@@ -137,5 +140,6 @@ pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -
 
 /// Standard errors that the nearest rival outside an effect's class is behind.
 pub(crate) fn nearest(found: &Found, class: &[EffectName]) -> f64 {
-    found.rivals.iter().filter(|r| !class.contains(&r.name)).map(|r| r.z).fold(f64::INFINITY, f64::min)
+    let outside = found.rivals.iter().filter(|r| !class.contains(&r.name) && r.absence.is_none());
+    outside.map(|r| r.z).fold(f64::INFINITY, f64::min)
 }

@@ -127,6 +127,11 @@ fn same_joint(
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }
 
+/// Confidence of an effect beside an unsure one: what is not among those standing without it is no surer than it.
+fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
+    if standing.contains(&name) { own } else { own.min(unsure) }
+}
+
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
     let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
@@ -152,18 +157,19 @@ struct Scales<'a> {
 }
 
 impl Scales<'_> {
-    /// Another model in place of the best so far, if it is surer; otherwise the search stays as it was.
-    fn instead(&self, s: &mut Search, model: Model, best: &Weighing) -> Option<Weighing> {
+    /// Another model in place of the best so far, if it is surer; otherwise the search stays as it was, and what stands in
+    /// the other model is told.
+    fn instead(&self, s: &mut Search, model: Model, best: &Weighing) -> Result<Weighing, Vec<EffectName>> {
         let other = self.bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, other), s.lost.len());
         prune(s, self.bench, self.held, &best.patched.noise);
         let next = self.once(s, best.hertz);
         if next.surest() > best.surest() {
-            return Some(next);
+            return Ok(next);
         }
         s.last = before;
         s.lost.truncate(known);
-        None
+        Err(next.effects.iter().map(|e| e.found.effect.name).collect())
     }
 
     fn without_unsure(&self, s: &mut Search, mut best: Weighing) -> Weighing {
@@ -175,12 +181,20 @@ impl Scales<'_> {
             };
             let mut model = s.last.model.clone();
             model.effects.remove(i);
-            let Some(mut next) = self.instead(s, model, &best) else {
-                return best;
-            };
-            next.dropped = best.dropped;
-            next.dropped.push(best.effects.remove(i));
-            best = next;
+            match self.instead(s, model, &best) {
+                Ok(mut next) => {
+                    next.dropped = best.dropped;
+                    next.dropped.push(best.effects.remove(i));
+                    best = next;
+                }
+                Err(standing) => {
+                    let unsure = best.effects[i].confidence;
+                    for one in &mut best.effects {
+                        one.confidence = resting(one.confidence, unsure, one.found.effect.name, &standing);
+                    }
+                    return best;
+                }
+            }
         }
     }
 
@@ -276,6 +290,14 @@ fn above(residual: f64, floor: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_does_not_stand_alone_is_no_surer_than_what_it_rests_on() {
+        let drift = EffectName::FrictionDrift;
+        assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
+        assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);
+        assert_eq!(resting(0.5, 0.65, drift, &[]), 0.5);
+    }
 
     #[test]
     fn a_joint_has_one_name() {
