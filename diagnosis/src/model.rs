@@ -164,8 +164,12 @@ impl Nominal {
                 let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
                 (-0.9 * (1.0 + REACH * self.rig.coulomb_sd()) * dry, 3.0 * dry)
             }
-            // A commutation that loses much of the torque at some angle is broken rather than rippled.
-            EffectName::TorqueRipple => (-0.45 * gain.abs(), 0.45 * gain.abs()),
+            // A commutation that loses much of the torque at some angle is broken rather than rippled. The part is one of the
+            // gain as it is, which may be larger than the rig's; where that is hardly known the anchor tells.
+            EffectName::TorqueRipple => {
+                let reach = if self.anchor.is_some() { 1.0 } else { self.gain_reach() };
+                (-0.45 * reach * gain.abs(), 0.45 * reach * gain.abs())
+            }
             EffectName::Backlash => ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain)),
             // A small mass that always slips is a friction of another form, not a drive that lets go.
             EffectName::RollerSlip => ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain)),
@@ -469,6 +473,10 @@ mod tests {
         near(known.limits(asymmetric, 1), (-10.0, 10.0));
         near(known.limits(drift, 0), (-0.9 * (1.0 + 3.0 * 0.5) * 5.0, 15.0));
         near(known.limits(drift, 1), (-3.6, 12.0));
+        // A part of the gain as it is, and that may be larger than the rig's.
+        let part = 0.45 * known.gain() * known.gain_reach();
+        assert!(known.gain_reach() > 1.0);
+        near(known.limits(EffectName::TorqueRipple, 0), (-part, part));
         // Gain over inertia twice the rig's: half the inertia, twice the deceleration.
         let anchored = Nominal { anchor: Some((20.0, 0.3)), ..known };
         near(anchored.limits(asymmetric, 0), (-8.0, 8.0));
