@@ -62,14 +62,14 @@ fn sensor_noise(tracks: &[Track], noise: &Noise, hz: f64) -> f64 {
 }
 
 impl Estimator {
-    /// Blocks that move, of which the model knows something, and that are further from rest than the estimator reaches: at rest friction is a reaction, and a
-    /// low-pass would carry it over.
+    /// Blocks that move, of which the model knows something, and that are further from rest than the estimator reaches: at
+    /// rest friction is a reaction, and a low-pass would carry it over.
     pub(crate) fn moving(&self, track: &Track) -> Vec<bool> {
         let reach = (0.4 / self.bandwidth_hz * track.block_rate()).ceil() as usize;
         let n = track.blocks();
         let mut out = vec![true; n];
         for j in 0..n {
-            if track.rest[j] || track.unknown[j] || track.v[j].abs() < track.stops_from {
+            if track.rest[j] || track.unknown[j] || track.stops_within(j) {
                 out[j.saturating_sub(reach)..(j + reach + 1).min(n)].fill(false);
             }
         }

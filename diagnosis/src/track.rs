@@ -237,6 +237,13 @@ impl Track {
         sum / m as f64 * count
     }
 
+    /// Whether dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides.
+    pub(crate) fn stops_within(&self, block: usize) -> bool {
+        let near = [block.saturating_sub(2), (block + 2).min(self.blocks() - 1)];
+        let speed = self.v[block].abs();
+        speed < self.stops_from && near.iter().all(|other| speed < 0.5 * self.v[*other].abs())
+    }
+
     /// Whether each segment is known all but for a few blocks.
     pub(crate) fn known_segments(&self) -> impl Iterator<Item = bool> + '_ {
         self.segments.windows(2).map(|w| {
