@@ -164,11 +164,11 @@ impl Nominal {
                 let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
                 (-0.9 * (1.0 + REACH * self.rig.coulomb_sd()) * dry, 3.0 * dry)
             }
-            // A commutation that loses much of the torque at some angle is broken rather than rippled. The part is one of the
-            // gain as it is, which may be larger than the rig's; where that is hardly known the anchor tells.
+            // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
+            // hardly known, a ripple as large explains what cogging does.
             EffectName::TorqueRipple => {
-                let reach = if self.anchor.is_some() { 1.0 } else { self.gain_reach() };
-                (-0.45 * reach * gain.abs(), 0.45 * reach * gain.abs())
+                let part = if self.anchor.is_some() { 0.45 } else { 0.9 * self.gain_reach() };
+                (-part * gain.abs(), part * gain.abs())
             }
             EffectName::Backlash => ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain)),
             // A small mass that always slips is a friction of another form, not a drive that lets go.
@@ -474,7 +474,7 @@ mod tests {
         near(known.limits(drift, 0), (-0.9 * (1.0 + 3.0 * 0.5) * 5.0, 15.0));
         near(known.limits(drift, 1), (-3.6, 12.0));
         // A part of the gain as it is, and that may be larger than the rig's.
-        let part = 0.45 * known.gain() * known.gain_reach();
+        let part = 0.9 * known.gain() * known.gain_reach();
         assert!(known.gain_reach() > 1.0);
         near(known.limits(EffectName::TorqueRipple, 0), (-part, part));
         // Gain over inertia twice the rig's: half the inertia, twice the deceleration.

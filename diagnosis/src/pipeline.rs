@@ -105,6 +105,8 @@ struct Standing {
 struct Lost {
     names: Vec<(EffectName, f64, String)>,
     tried: usize,
+    /// What stood and went: not looked at again.
+    went: Vec<EffectName>,
 }
 
 /// The model with one more effect.
@@ -118,7 +120,7 @@ struct Next {
 /// been tried by then.
 fn with_one_more(now: &Standing, on: &Bench, lost: &mut Lost, most: usize) -> Option<Next> {
     let mut promising = None;
-    let candidates = on.screen(&now.white, &|_| true);
+    let candidates = on.screen(&now.white, &|name| !lost.went.contains(&name));
     let mut finalists = on.finalists(&now.white, &candidates);
     on.polish(&mut finalists);
     order_near_ties(on, now.white.merit, &mut finalists);
@@ -179,38 +181,88 @@ pub(crate) fn search(
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
     let white = bench.fit(Model::default(), &noise, Colour::White);
     let slow = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
-    let mut now = Standing { white, slow, tracks, held };
+    let ground = Ground { nominal: &nominal, span: &span, scale, noise: &noise, progress };
     let mut lost = Lost::default();
-    let mut before = None;
-    for step in 0..MOST {
-        progress("searching for what was left out", 0.15 + 0.2 * step as f64);
-        let on = Bench { nominal: &nominal, tracks: &now.tracks, span: &span, scale };
-        let Some(next) = with_one_more(&now, &on, &mut lost, TRIED * (step + 1)) else { break };
-        if !next.carries && before.is_some() {
-            break;
-        }
-        // Of two effects as large as each other neither carries alone: what promises stands until one more step decides.
-        let last = std::mem::replace(&mut now, next.standing);
-        before = (!next.carries).then_some(last);
-    }
-    let now = before.unwrap_or(now);
+    let grown = ground.grow(Standing { white, slow, tracks, held }, &mut lost);
     progress("judging on held-out recordings", 0.8);
-    let Standing { white, slow, tracks, held } = now;
-    let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
-    let null = bench.fit_slow(Model::default(), &[&noise, &white.noise]);
-    let mut s = Search {
-        nominal: nominal.clone(),
-        fit_tracks: Vec::new(),
-        held_tracks: Vec::new(),
-        span: span.clone(),
-        null,
-        last: slow,
-        found: Vec::new(),
-        lost: lost.names,
-    };
-    prune(&mut s, &bench, &held, &white.noise);
-    (s.fit_tracks, s.held_tracks) = (tracks, held);
+    let mut s = ground.pruned(grown);
+    lost.went = s.lost.iter().map(|(name, _, _)| *name).collect();
+    if !s.found.is_empty() && !lost.went.is_empty() {
+        // What went may have stood in the place of something else.
+        lost.tried = 0;
+        let mut again = ground.pruned(ground.grow(ground.standing(&s), &mut lost));
+        if again.found.len() > s.found.len() {
+            again.lost.splice(..0, s.lost);
+            s = again;
+        }
+    }
+    s.lost.splice(..0, lost.names);
     Ok(s)
+}
+
+/// What every model of a search stands on.
+struct Ground<'a> {
+    nominal: &'a Nominal,
+    span: &'a Span,
+    scale: f64,
+    /// White, of the null.
+    noise: &'a Noise,
+    progress: &'a (dyn Fn(&str, f64) + Sync),
+}
+
+impl Ground<'_> {
+    fn bench<'a>(&'a self, tracks: &'a [Track]) -> Bench<'a> {
+        Bench { nominal: self.nominal, tracks, span: self.span, scale: self.scale }
+    }
+
+    /// Adds effects one after another as long as one carries.
+    fn grow(&self, mut now: Standing, lost: &mut Lost) -> Standing {
+        let mut before = None;
+        for step in now.white.model.effects.len()..MOST {
+            (self.progress)("searching for what was left out", 0.15 + 0.2 * step as f64);
+            let Some(next) = with_one_more(&now, &self.bench(&now.tracks), lost, TRIED * (step + 1)) else {
+                break;
+            };
+            if !next.carries && before.is_some() {
+                break;
+            }
+            // Of two effects as large as each other neither carries alone: what promises stands until one more step decides.
+            let last = std::mem::replace(&mut now, next.standing);
+            before = (!next.carries).then_some(last);
+        }
+        before.unwrap_or(now)
+    }
+
+    /// What of a model stands when all its effects are judged together.
+    fn pruned(&self, now: Standing) -> Search {
+        let Standing { white, slow, tracks, held } = now;
+        let bench = self.bench(&tracks);
+        let null = bench.fit_slow(Model::default(), &[self.noise, &white.noise]);
+        let mut s = Search {
+            nominal: self.nominal.clone(),
+            fit_tracks: Vec::new(),
+            held_tracks: Vec::new(),
+            span: self.span.clone(),
+            null,
+            last: slow,
+            found: Vec::new(),
+            lost: Vec::new(),
+        };
+        prune(&mut s, &bench, &held, &white.noise);
+        (s.fit_tracks, s.held_tracks) = (tracks, held);
+        s
+    }
+
+    /// What stands, in its own motion.
+    fn standing(&self, s: &Search) -> Standing {
+        let bench = self.bench(&s.fit_tracks);
+        let fitted = bench.fit(s.last.model.clone(), self.noise, Colour::White);
+        let (tracks, white) = in_its_own_motion(&s.fit_tracks, fitted, &bench);
+        let mut held = s.held_tracks.clone();
+        smooth_held(&white, self.nominal, self.span, &mut held, self.scale);
+        let slow = self.bench(&tracks).fit_slow(white.model.clone(), &[&s.last.noise, &white.noise]);
+        Standing { white, slow, tracks, held }
+    }
 }
 
 /// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and

@@ -316,3 +316,31 @@ impl Total {
         total
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_within_a_block_is_a_dip_to_what_friction_stops_and_neither_a_crawl_nor_a_slower_stretch() {
+        let time_s: Vec<f64> = (0..101).map(|i| f64::from(i) * 2.5e-3).collect();
+        let recording = Recording {
+            file: "a test".into(),
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.clone(),
+            time_s,
+            tilt_rad: None,
+            reference_counts: None,
+            force: None,
+        };
+        // 5 rad/s² stop 6.25 mrad/s within half a block.
+        let mut track = Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.05));
+        track.v.fill(-1.0);
+        track.v[50] = 0.004;
+        track.v[70] = 0.3;
+        assert!(track.stops_within(50));
+        assert!(!track.stops_within(49) && !track.stops_within(70));
+        track.v.fill(0.004);
+        assert!((0..100).all(|block| !track.stops_within(block)));
+    }
+}

@@ -93,6 +93,19 @@ fn an_effect_as_large_as_the_force_is_named_alone() {
 }
 
 #[test]
+fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
+    // Neither carries to the held-out recording without the other, and a preloaded spring is no friction.
+    let mut rig = rig(OFF, "");
+    rig.model.coulomb = None;
+    for closed in [false, true] {
+        let outcome = run(&rig, &Setup { size: 2.0, closed, ..setup("asymmetric_friction") });
+        let mut names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["asymmetric_friction", "coulomb_friction"], "{}", outcome.summary());
+    }
+}
+
+#[test]
 fn the_same_input_gives_the_same_answer_to_the_last_digit() {
     let rig = rig(OFF, OFFSET);
     let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");
