@@ -52,6 +52,8 @@ const NEARLY_ALL: f64 = 0.9;
 const HALF: f64 = 0.5;
 /// Factors on an effect that are the same size.
 const SAME_SIZE: std::ops::Range<f64> = 0.75..1.33;
+/// What a dry friction may gain with time, as parts of what it is at first.
+const DRIFT: std::ops::Range<f64> = -0.95..3.0;
 /// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
 const LEAST_SHARE: f64 = 0.01;
 const CERTAIN: f64 = 6.0;
@@ -78,10 +80,22 @@ impl Found {
     /// likely at many blocks and yet leave a third of the force.
     fn carries(&self) -> bool {
         let likely = self.holdout.low > 0.0 && self.holdout.z.max(self.holdout.steady) >= 2.0;
-        let is_same = self.sizes.iter().all(|size| SAME_SIZE.contains(size));
         let takes_most = self.force.low > 0.0 && self.share >= MOST_SHARE;
-        let takes_all = self.force.sum >= HALF && self.share >= NEARLY_ALL && self.holdout.sum > 0.0;
-        likely || (is_same && (takes_most || takes_all) && self.fit.z >= SURE)
+        let takes_all = self.takes_all() && self.holdout.sum > 0.0;
+        likely || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= SURE)
+    }
+
+    fn is_same_size(&self) -> bool {
+        self.sizes.iter().all(|size| SAME_SIZE.contains(size))
+    }
+
+    fn takes_all(&self) -> bool {
+        self.force.sum >= HALF && self.share >= NEARLY_ALL
+    }
+
+    /// Whether it leaves hardly anything and is as large on every recording: its law is right, not only near.
+    pub(crate) fn fits_everywhere(&self) -> bool {
+        self.takes_all() && self.is_same_size()
     }
 
     /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and not surely worse than
@@ -197,7 +211,9 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
                 last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
                     *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
                 });
-            let at_bound = is_bound || library::is_at_end(&effect, bench.span);
+            let at_bound = is_bound
+                || library::is_at_end(&effect, bench.span)
+                || drifts_too_far(&last.fit, i, effect.name);
             let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
             Found {
                 effect,
@@ -212,6 +228,13 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
             }
         })
         .collect()
+}
+
+/// Whether more of the dry friction goes or comes with time than warming explains.
+fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
+    let dry = fit.value(Key::Coulomb).filter(|dry| name == EffectName::FrictionDrift && *dry > 0.0);
+    let change = fit.value(Key::Term { effect, term: 0 });
+    dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }
 
 /// Factors on what an effect does on each recording, which is the difference of what is left with it and without it, that
@@ -278,6 +301,14 @@ mod tests {
             rare(found);
             found.fit = gain(900.0, 100.0, 2.0);
         }));
+    }
+
+    #[test]
+    fn a_law_is_right_where_it_leaves_hardly_anything_and_is_as_large_everywhere() {
+        assert!(found().fits_everywhere());
+        assert!(!Found { share: 0.6, ..found() }.fits_everywhere());
+        assert!(!Found { sizes: vec![1.0, 1.5], ..found() }.fits_everywhere());
+        assert!(!Found { force: gain(0.3, 0.1, 3.0), ..found() }.fits_everywhere());
     }
 
     #[test]

@@ -93,8 +93,9 @@ fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {
     values.iter().flatten().map(|x| Some(*x))
 }
 
-/// Degrees of the polynomial that a profile along the travel may have: a slope or bend, and a step or bump.
-const PROFILE_DEGREES: [f64; 2] = [3.0, 6.0];
+/// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or bump, and one that is
+/// narrow beside the travel.
+const PROFILE_DEGREES: [f64; 3] = [3.0, 6.0, 12.0];
 
 /// `count` values from `from` to `to`, evenly spaced in their logarithm.
 pub(crate) fn logarithmic(from: f64, to: f64, count: usize) -> Vec<f64> {

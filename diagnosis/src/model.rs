@@ -52,6 +52,17 @@ const RATIO_REACH: f64 = 3.5;
 /// How many standard deviations a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
+/// Least part of the truth that a nominal value of some relative standard deviation may be.
+fn least_of_truth(sd: f64) -> f64 {
+    1.0 - (FARTHEST * sd).min(0.98)
+}
+
+/// Most that the truth may be over its nominal value: one that is off by its deviation may be small against the truth, so
+/// that this is farther than the way down.
+fn most_over_nominal(sd: f64) -> f64 {
+    (2.0 * (1.0 + REACH * sd)).max(1.0 / least_of_truth(sd))
+}
+
 /// Largest part of the command that may do nothing: where forces are in balance, where the inertia is hardly known, and
 /// where forces are not in balance.
 const IGNORED: f64 = 0.9;
@@ -106,12 +117,10 @@ impl Nominal {
         let relative = |value: f64, sd: f64| {
             let mean = value / j;
             let sd = (sd * sd + common * common).sqrt();
-            // A nominal value that is off by its deviation may be small against the truth: the reach upwards is longer.
             // Friction never vanishes where the rig declares it.
-            let least = 1.0 - (FARTHEST * sd).min(0.98);
-            let (down, up) = (2.0 * (1.0 + REACH * sd), (2.0 * (1.0 + REACH * sd)).max(1.0 / least));
-            let (a, b) = (mean / down, mean * up);
-            Prior { mean, sd: sd / least.max(0.2) * mean.abs(), low: a.min(b), high: a.max(b) }
+            let (a, b) = (mean / (2.0 * (1.0 + REACH * sd)), mean * most_over_nominal(sd));
+            let least = least_of_truth(sd).max(0.2);
+            Prior { mean, sd: sd / least * mean.abs(), low: a.min(b), high: a.max(b) }
         };
         match key {
             Key::Gain => {
@@ -161,8 +170,10 @@ impl Nominal {
                 (-dry, dry)
             }
             EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
+                // How much of the friction as it is may go or come is judged where that is known.
                 let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
-                (-0.9 * (1.0 + REACH * self.rig.coulomb_sd()) * dry, 3.0 * dry)
+                let most = most_over_nominal(self.rig.coulomb_sd()) * dry;
+                (-0.9 * most, 3.0 * most)
             }
             // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
             // hardly known, a ripple as large explains what cogging does.
@@ -471,7 +482,8 @@ mod tests {
         };
         near(known.limits(asymmetric, 0), (-4.0, 4.0));
         near(known.limits(asymmetric, 1), (-10.0, 10.0));
-        near(known.limits(drift, 0), (-0.9 * (1.0 + 3.0 * 0.5) * 5.0, 15.0));
+        let most = most_over_nominal(0.5) * 5.0;
+        near(known.limits(drift, 0), (-0.9 * most, 3.0 * most));
         near(known.limits(drift, 1), (-3.6, 12.0));
         // A part of the gain as it is, and that may be larger than the rig's.
         let part = 0.9 * known.gain() * known.gain_reach();

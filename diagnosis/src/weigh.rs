@@ -258,7 +258,9 @@ impl Scales<'_> {
                     .filter(|rival| class.contains(&rival.name))
                     .map(|rival| &rival.effect)
                     .chain([&found.effect])
-                    .find_map(|effect| library::creeps(effect, bench.span));
+                    .find_map(|effect| library::creeps(effect, bench.span))
+                    // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
+                    .filter(|_| !found.fits_everywhere());
                 Weighed { found, class, evidence, confidence, parameters, is_there, undecided, creeps }
             })
             .collect();

@@ -106,6 +106,25 @@ fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
 }
 
 #[test]
+fn a_drift_is_a_part_of_the_friction_as_it_is_and_not_as_the_rig_has_it() {
+    let rig = rig([0.06, -0.3, -0.7, -0.03], OFFSET);
+    let outcome = run(&rig, &Setup { size: 1.7, ..setup("friction_drift") });
+    let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, ["friction_drift"], "{}", outcome.summary());
+    let change = outcome.report.effects[0].parameters["change"].value;
+    assert!((change / -0.85 - 1.0).abs() < 0.1, "{change} instead of -0.85");
+}
+
+#[test]
+fn a_profile_that_is_narrow_beside_the_travel_is_named() {
+    let outcome = run(&rig(OFF, OFFSET), &Setup { closed: true, size: 2.0, ..setup("sticky_place") });
+    let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, ["position_dependent_damping"], "{}", outcome.summary());
+    let [nominal, patched] = [outcome.report.fit.nominal.holdout, outcome.report.fit.patched.holdout];
+    assert!(patched < 0.5 * nominal, "{patched} of {nominal} is left");
+}
+
+#[test]
 fn the_same_input_gives_the_same_answer_to_the_last_digit() {
     let rig = rig(OFF, OFFSET);
     let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");

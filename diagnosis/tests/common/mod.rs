@@ -197,6 +197,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             if is("position_dependent_damping") {
                 force -= 6e-6 * s * (1.0 + (0.15 * q).sin()) * v;
             }
+            if is("sticky_place") {
+                force -= 3e-5 * s * (-0.5 * ((q - 4.0) / 1.3).powi(2)).exp() * v;
+            }
             if is("cogging") {
                 force += s * (1.2e-4 * (4.0 * (q + zero)).sin() + 0.9e-4 * (12.0 * (q + zero) + 0.5).sin());
             }
