@@ -97,6 +97,13 @@ impl Estimator {
         self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
     }
 
+    /// What a white disturbance alone puts into the residual, as an acceleration, root mean square.
+    pub(crate) fn white(&self, noise: &Noise) -> f64 {
+        // ∫ 1/(1 + (f/fc)⁶)² df over both sides = 2·fc · 5/6 · (π/6)/sin(π/6)
+        let sixth = std::f64::consts::PI / 6.0;
+        (noise.white * 2.0 * self.bandwidth_hz * (5.0 / 6.0) * sixth / sixth.sin()).sqrt()
+    }
+
     /// Root mean square of residuals over the rows that move.
     pub(crate) fn rms(&self, residuals: &[Vec<f64>], tracks: &[Track]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
@@ -109,5 +116,49 @@ impl Estimator {
             }
         }
         if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    #[test]
+    fn a_white_disturbance_leaves_what_is_said() {
+        let (dt, white) = (1e-3, 2.5e4);
+        let mut random = 1_u64;
+        let mut even = || {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            random as f64 / u64::MAX as f64 - 0.5
+        };
+        let (mut x, mut v) = (0.0, 0.0);
+        let mut recording = Recording {
+            file: "a test".into(),
+            time_s: Vec::new(),
+            command: Vec::new(),
+            position_counts: Vec::new(),
+            tilt_rad: None,
+            reference_counts: None,
+            force: None,
+        };
+        for i in 0..30_000 {
+            recording.time_s.push(f64::from(i) * dt);
+            recording.command.push(0.0);
+            recording.position_counts.push((1000.0_f64 * x).round());
+            let a = (12.0 * white / dt).sqrt() * even();
+            x += v * dt + 0.5 * a * dt * dt;
+            v += a * dt;
+        }
+        let track = Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
+        let estimator = Estimator { bandwidth_hz: 20.0 };
+        let residual = estimator.residual(&track, &Total::zero(track.blocks()));
+        let inner = &residual[50..residual.len() - 50];
+        let rms = (inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64).sqrt();
+        let said = estimator.white(&Noise { sensor: 1.0, white, slow: 0.0, tau: 1.0, rest: 0.0 });
+        assert!((rms / said - 1.0).abs() < 0.05, "{rms} instead of {said}");
     }
 }

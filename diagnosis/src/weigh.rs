@@ -78,12 +78,24 @@ impl Weighing {
             && weighed.is_there
             && weighed.creeps.is_none()
             && self.same_joint(weighed).is_none()
+            && !self.drifts_alike(weighed)
             && !self.stands_for_swing()
     }
 
     fn same_joint(&self, weighed: &Weighed) -> Option<EffectName> {
         let gained = |weighed: &Weighed| (weighed.found.effect.name, weighed.found.holdout.sum);
         same_joint(gained(weighed), self.effects.iter().map(gained))
+    }
+
+    /// Whether it is one of two drifts that are one of the inertia.
+    fn drifts_alike(&self, weighed: &Weighed) -> bool {
+        let change = |name: EffectName| {
+            let drift = self.effects.iter().find(|e| e.found.effect.name == name)?;
+            Some(drift.parameters.get("change")?.value)
+        };
+        let [gain, friction] = [EffectName::GainDrift, EffectName::FrictionDrift];
+        [gain, friction].contains(&weighed.found.effect.name)
+            && change(gain).zip(change(friction)).is_some_and(|(gain, friction)| are_alike(gain, friction))
     }
 
     fn stands_for_swing(&self) -> bool {
@@ -105,6 +117,8 @@ impl Weighing {
             ))
         } else if let Some(joint) = self.same_joint(weighed) {
             Some(format!("beside {joint} it is the form of the same joint"))
+        } else if self.drifts_alike(weighed) {
+            Some("gain and friction would change alike, as both do where the inertia changes".into())
         } else if weighed.undecided {
             Some("more effects than a class may hold explain it as well".into())
         } else if weighed.confidence < NAMED {
@@ -125,6 +139,15 @@ fn same_joint(
         |name| matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip);
     let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
+}
+
+/// Factor within which two drifts are one: what is a step and fitted as a bend gives either a little of the other's.
+const ALIKE: f64 = 1.5;
+
+/// Whether gain and friction change by the same part: over an inertia that changes, both do.
+fn are_alike(gain: f64, friction: f64) -> bool {
+    let ratio = friction / gain;
+    ratio < ALIKE && ratio * ALIKE > 1.0
 }
 
 /// Confidence of an effect beside an unsure one: what is not among those standing without it is no surer than it.
@@ -230,9 +253,14 @@ impl Scales<'_> {
         let (refit_held, left_held) =
             (estimator.rms(&on_held.refit, known), estimator.rms(&on_held.patched, known));
         let left = s.last.noise.slow * inertia * inertia;
+        // What neither counting nor a white disturbance makes.
+        let random = floor.hypot(estimator.white(&s.last.noise) * inertia);
         let leftover = Leftover {
             of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
-            unexplained: above(left_held, floor) / above(refit_held, floor),
+            unexplained: [(left_held, refit_held), (table.patched.fit, table.refit.fit)]
+                .map(|(left, refit)| above(left, random) / above(refit, random))
+                .into_iter()
+                .fold(1.0, f64::min),
         };
         let part_of_force = left_held / estimator.rms(&on_held.force, known).max(1e-300);
         let helps_much = left_held < MUCH_OF_REFIT * refit_held;
@@ -284,9 +312,9 @@ fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'
     unnamed::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
 }
 
-/// Mean square of a residual above what counting makes of it.
-fn above(residual: f64, floor: f64) -> f64 {
-    (residual.powi(2) - floor.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
+/// Mean square of a residual above what chance makes of it.
+fn above(residual: f64, random: f64) -> f64 {
+    (residual.powi(2) - random.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
 }
 
 #[cfg(test)]
@@ -299,6 +327,12 @@ mod tests {
         assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
         assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);
         assert_eq!(resting(0.5, 0.65, drift, &[]), 0.5);
+    }
+
+    #[test]
+    fn drifts_of_gain_and_friction_by_the_same_part_are_one_of_the_inertia() {
+        assert!(are_alike(-0.137, -0.137) && are_alike(-0.35, -0.5) && are_alike(0.2, 0.16));
+        assert!(!are_alike(-0.1, -0.5) && !are_alike(-0.3, -0.1) && !are_alike(-0.2, 0.2));
     }
 
     #[test]
