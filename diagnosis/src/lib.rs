@@ -20,6 +20,7 @@ pub mod effects;
 mod error;
 mod estimate;
 mod excitation;
+mod fading;
 mod fit;
 mod found;
 mod html;

@@ -5,6 +5,7 @@ use crate::confidence::{self, Evidence, Leftover};
 use crate::effects::EffectName;
 use crate::estimate::Estimator;
 use crate::excitation::Excitation;
+use crate::fading;
 use crate::found::Found;
 use crate::known::known;
 use crate::library;
@@ -44,6 +45,8 @@ pub(crate) struct Weighed {
     pub(crate) undecided: bool,
     /// Part of the travel over which it bends, or what explains as much does, where that is more than bristles do.
     pub(crate) creeps: Option<f64>,
+    /// Time in which its force fades although it stays bent, s.
+    pub(crate) fades_s: Option<f64>,
 }
 
 /// The model that stands, its effects weighed, and its residuals.
@@ -77,6 +80,7 @@ impl Weighing {
         self.understood
             && weighed.is_there
             && weighed.creeps.is_none()
+            && weighed.fades_s.is_none()
             && self.same_joint(weighed).is_none()
             && !self.drifts_alike(weighed)
             && !self.stands_for_swing()
@@ -115,6 +119,8 @@ impl Weighing {
                 "it would bend over {:.0} % of the travel, as a spring that creeps does",
                 100.0 * part
             ))
+        } else if let Some(time) = weighed.fades_s {
+            Some(format!("its force would fade within {time} s, as that of a spring that creeps does"))
         } else if let Some(joint) = self.same_joint(weighed) {
             Some(format!("beside {joint} it is the form of the same joint"))
         } else if self.drifts_alike(weighed) {
@@ -289,7 +295,18 @@ impl Scales<'_> {
                     .find_map(|effect| library::creeps(effect, bench.span))
                     // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
                     .filter(|_| !found.fits_everywhere());
-                Weighed { found, class, evidence, confidence, parameters, is_there, undecided, creeps }
+                let fades_s = fading::fades(bench, &patched, i, found.fit.sum);
+                Weighed {
+                    found,
+                    class,
+                    evidence,
+                    confidence,
+                    parameters,
+                    is_there,
+                    undecided,
+                    creeps,
+                    fades_s,
+                }
             })
             .collect();
         Weighing {

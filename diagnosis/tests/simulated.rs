@@ -125,6 +125,17 @@ fn a_profile_that_is_narrow_beside_the_travel_is_named() {
 }
 
 #[test]
+fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
+    for closed in [false, true] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size: 1.0, ..setup("creeping_spring") });
+        assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
+        let spring = |h: &&diagnosis::report::Hypothesis| h.name.as_str() == "position_spring";
+        let why = outcome.report.hypotheses.iter().find(spring).and_then(|h| h.rejected_because.clone());
+        assert!(why.is_some_and(|why| why.contains("fade")), "{}", outcome.summary());
+    }
+}
+
+#[test]
 fn the_same_input_gives_the_same_answer_to_the_last_digit() {
     let rig = rig(OFF, OFFSET);
     let once = serde_json::to_string(&run(&rig, &setup("stribeck_friction")).report).expect("serialises");

@@ -38,6 +38,8 @@ pub struct Law {
     name: EffectName,
     a: f64,
     b: f64,
+    /// Time in which a spring's force fades while it stays bent, s; never, but where that is asked.
+    fades_s: f64,
     waves: Vec<f64>,
     times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
@@ -56,6 +58,7 @@ impl Law {
         let mut waves = Vec::new();
         let mut times = Vec::new();
         let (mut a, mut b) = (0.0, 0.0);
+        let mut fades_s = f64::INFINITY;
         let names: Vec<String> = match effect.name {
             N::ViscousFriction => vec!["viscous".into()],
             N::CoulombFriction => vec!["coulomb".into()],
@@ -96,6 +99,7 @@ impl Law {
             N::TiltGravity => vec!["weight".into()],
             N::PositionSpring => {
                 (a, b) = (get("from", 0.0), get("one_sided", 0.0));
+                fades_s = get("fades_s", f64::INFINITY);
                 // Where it is at rest is not known: a force that is there at the start.
                 let both = ["stiffness".to_owned(), "preload".to_owned()];
                 both.into_iter().take(if get("preload", 0.0) > 0.5 { 2 } else { 1 }).collect()
@@ -121,7 +125,7 @@ impl Law {
         };
         let state = [0.0; 3];
         let load = Load::new(effect);
-        Some(Self { name: effect.name, a, b, waves, times, names, state, load })
+        Some(Self { name: effect.name, a, b, fades_s, waves, times, names, state, load })
     }
 
     /// Names of the terms, in order.
@@ -188,7 +192,10 @@ impl Law {
             N::TiltGravity => out[0] = s.tilt.sin(),
             N::PositionSpring => {
                 let x = s.position - self.a;
-                out[0] = if self.b > 0.5 { -x.max(0.0) } else { -x };
+                // Maxwell's spring and dashpot in series: what has faded is no longer bent.
+                self.state[0] += (x - self.state[0]) * (1.0 - (-s.dt / self.fades_s).exp());
+                let bent = x - self.state[0];
+                out[0] = if self.b > 0.5 { -bent.max(0.0) } else { -bent };
                 if let Some(preload) = out.get_mut(1) {
                     *preload = 1.0;
                 }
@@ -298,6 +305,21 @@ mod tests {
         for velocity in [0.1, 0.0, -0.1] {
             assert!(near(after_a_slide(velocity, true), -1.0), "at rest they hold alone");
         }
+    }
+
+    #[test]
+    fn a_spring_that_fades_holds_what_is_bent_at_once_and_lets_go() {
+        let spring = |fades: &[(&str, f64)], seconds: usize| {
+            let mut law = Law::new(&Effect::shaped(EffectName::PositionSpring, fades)).unwrap();
+            let mut out = [0.0];
+            for _ in 0..1000 * seconds {
+                law.terms(&State { position: 2.0, dt: 1e-3, ..State::default() }, &mut out);
+            }
+            out[0]
+        };
+        assert_eq!(spring(&[], 5), -2.0);
+        assert!((spring(&[("fades_s", 1.0)], 1) + 2.0 * (-1.0_f64).exp()).abs() < 0.01);
+        assert!(spring(&[("fades_s", 1.0)], 10).abs() < 1e-3);
     }
 
     #[test]

@@ -197,6 +197,10 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             if is("position_dependent_damping") {
                 force -= 6e-6 * s * (1.0 + (0.15 * q).sin()) * v;
             }
+            if is("creeping_spring") {
+                z += (v - z / 0.8) * dt;
+                force -= 8e-5 * s * z;
+            }
             if is("sticky_place") {
                 force -= 3e-5 * s * (-0.5 * ((q - 4.0) / 1.3).powi(2)).exp() * v;
             }
