@@ -122,29 +122,17 @@ impl Estimator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::Random;
     use crate::recording::Recording;
     use crate::rig::Rig;
 
     #[test]
     fn a_white_disturbance_leaves_what_is_said() {
         let (dt, white) = (1e-3, 2.5e4);
-        let mut random = 1_u64;
-        let mut even = || {
-            random ^= random << 13;
-            random ^= random >> 7;
-            random ^= random << 17;
-            random as f64 / u64::MAX as f64 - 0.5
-        };
+        let mut random = Random::new(1);
+        let mut even = || random.below(1 << 20) as f64 / f64::from(1 << 20) - 0.5;
         let (mut x, mut v) = (0.0, 0.0);
-        let mut recording = Recording {
-            file: "a test".into(),
-            time_s: Vec::new(),
-            command: Vec::new(),
-            position_counts: Vec::new(),
-            tilt_rad: None,
-            reference_counts: None,
-            force: None,
-        };
+        let mut recording = Recording::default();
         for i in 0..30_000 {
             recording.time_s.push(f64::from(i) * dt);
             recording.command.push(0.0);

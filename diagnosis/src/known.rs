@@ -63,13 +63,10 @@ mod tests {
     fn slide(to: f64) -> Track {
         let time_s: Vec<f64> = (0..401).map(|i| f64::from(i) * 2.5e-3).collect();
         let recording = Recording {
-            file: "a test".into(),
             command: vec![0.0; time_s.len()],
             position_counts: time_s.iter().map(|t| (1000.0 * to * t).round()).collect(),
             time_s,
-            tilt_rad: None,
-            reference_counts: None,
-            force: None,
+            ..Recording::default()
         };
         Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
     }

@@ -221,15 +221,7 @@ mod tests {
         let time_s: Vec<f64> = (0..4001).map(|i| f64::from(i) * 2.5e-3).collect();
         let position_counts = time_s.iter().map(|t| (1000.0 * (2.0 * t).sin()).round()).collect();
         let command = vec![0.0; time_s.len()];
-        let recording = Recording {
-            file: "t".into(),
-            time_s,
-            command,
-            position_counts,
-            tilt_rad: None,
-            reference_counts: None,
-            force: None,
-        };
+        let recording = Recording { time_s, command, position_counts, ..Recording::default() };
         let mut track = Track::new(&recording, &rig);
         track.v = track.start.iter().map(|t| 2.0 * (2.0 * t).cos()).collect();
         let residual = track.x.iter().zip(&track.start).map(|(x, t)| residual(*x, *t)).collect();

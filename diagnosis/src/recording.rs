@@ -4,7 +4,7 @@ use crate::error::InputError;
 use std::path::Path;
 
 /// One recording. All columns have the same length.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
     /// What reports call it: the file's name.
     pub file: String,

@@ -325,13 +325,10 @@ mod tests {
     fn a_stop_within_a_block_is_a_dip_to_what_friction_stops_and_neither_a_crawl_nor_a_slower_stretch() {
         let time_s: Vec<f64> = (0..101).map(|i| f64::from(i) * 2.5e-3).collect();
         let recording = Recording {
-            file: "a test".into(),
             command: vec![0.0; time_s.len()],
             position_counts: time_s.clone(),
             time_s,
-            tilt_rad: None,
-            reference_counts: None,
-            force: None,
+            ..Recording::default()
         };
         // 5 rad/s² stop 6.25 mrad/s within half a block.
         let mut track = Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.05));

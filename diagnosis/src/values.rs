@@ -120,11 +120,14 @@ pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> boo
         || parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
 }
 
+/// Why an effect without a size is none.
+pub(crate) const NO_SIZE: &str = "its size cannot be told from zero";
+
 /// Why an effect of a fitted model may not be named although it explains something: it does by what it shares with others.
 pub(crate) fn absence(bench: &Bench, fitted: &Candidate, effect: usize) -> Option<String> {
     let name = fitted.model.effects[effect].name;
     let is_there = is_there(name, &parameters(bench, fitted, effect));
-    (!is_there).then(|| "its size cannot be told from zero".to_owned())
+    (!is_there).then(|| NO_SIZE.to_owned())
 }
 
 /// The parameters of an effect of a fitted model.

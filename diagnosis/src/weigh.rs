@@ -77,13 +77,7 @@ impl Weighing {
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
     pub(crate) fn rests_on_evidence(&self, weighed: &Weighed) -> bool {
-        self.understood
-            && weighed.is_there
-            && weighed.creeps.is_none()
-            && weighed.fades_s.is_none()
-            && self.same_joint(weighed).is_none()
-            && !self.drifts_alike(weighed)
-            && !self.stands_for_swing()
+        self.contradiction(weighed).is_none()
     }
 
     fn same_joint(&self, weighed: &Weighed) -> Option<EffectName> {
@@ -108,12 +102,25 @@ impl Weighing {
 
     /// Why an effect is not named, if it is not.
     pub(crate) fn doubt(&self, weighed: &Weighed) -> Option<String> {
+        self.contradiction(weighed).or_else(|| {
+            if weighed.undecided {
+                Some("more effects than a class may hold explain it as well".into())
+            } else if weighed.confidence < NAMED {
+                Some(format!("it is right with a probability of only {:.2}", weighed.confidence))
+            } else {
+                None
+            }
+        })
+    }
+
+    /// What rules an effect out however much it explains.
+    fn contradiction(&self, weighed: &Weighed) -> Option<String> {
         if let Some(swing) = self.swing.filter(Swing::is_mistaken) {
             Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
         } else if !self.understood {
             Some("with it the model still leaves too much of the force to have understood it".into())
         } else if !weighed.is_there {
-            Some("its size cannot be told from zero".into())
+            Some(values::NO_SIZE.into())
         } else if let Some(part) = weighed.creeps {
             Some(format!(
                 "it would bend over {:.0} % of the travel, as a spring that creeps does",
@@ -125,10 +132,6 @@ impl Weighing {
             Some(format!("beside {joint} it is the form of the same joint"))
         } else if self.drifts_alike(weighed) {
             Some("gain and friction would change alike, as both do where the inertia changes".into())
-        } else if weighed.undecided {
-            Some("more effects than a class may hold explain it as well".into())
-        } else if weighed.confidence < NAMED {
-            Some(format!("it is right with a probability of only {:.2}", weighed.confidence))
         } else {
             None
         }

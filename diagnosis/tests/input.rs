@@ -77,15 +77,7 @@ fn random_rows_never_panic() {
         let size = 10f64.powf(random.between(-6.0, 9.0));
         let mut t = 0.0;
         let mut recording = || {
-            let mut r = Recording {
-                file: "random.csv".into(),
-                time_s: Vec::new(),
-                command: Vec::new(),
-                position_counts: Vec::new(),
-                tilt_rad: None,
-                reference_counts: None,
-                force: None,
-            };
+            let mut r = Recording { file: "random.csv".into(), ..Recording::default() };
             for _ in 0..rows {
                 t += random.between(1e-4, 4e-3);
                 r.time_s.push(t);
