@@ -7,6 +7,7 @@ use crate::pipeline::Search;
 use crate::report::{Place, Region, Stretch};
 use crate::rig::Rig;
 use crate::select::Candidate;
+use crate::track::Track;
 use crate::values;
 
 /// The rig with refitted values and the effects found.
@@ -33,8 +34,9 @@ pub(crate) fn patch(s: &Search, last: &Candidate) -> Rig {
     for (index, effect) in last.model.effects.iter().enumerate() {
         let mut effect = effect.clone();
         if effect.name == EffectName::MissedCounts {
-            // The steps of the first recording, as they happened.
-            let track = &s.fit_tracks[0];
+            // The steps of the recording with the most, as they happened.
+            let steps = |track: &&Track| track.lost.windows(2).filter(|w| w[0] != w[1]).count();
+            let track = s.fit_tracks.iter().max_by_key(steps).expect("something was fitted");
             for (i, w) in track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]) {
                 let n = effect.shape.len() + 1;
                 effect.shape.insert(format!("time_{n}"), track.start[i + 1]);

@@ -110,21 +110,19 @@ impl Templates {
     /// Blocks at which a jump of position stands out, with its size, the clearest first.
     fn peaks(&self, track: &Track, residual: &[f64]) -> Vec<(usize, f64)> {
         let mut found: Vec<(f64, usize, f64)> = Vec::new();
-        for j in 5..residual.len().saturating_sub(REACH) {
+        for j in 5..residual.len().saturating_sub(REACH + 2) {
             let Template { position, speed, .. } = self.nearest(track.quantum[j]);
-            let (pp, ss) = (dot(position, position), dot(speed, speed));
-            if pp <= 0.0 || ss <= 0.0 {
+            if track.rest[j] {
                 continue;
             }
-            let p = dot(position, &residual[j..j + REACH]);
-            let gain = 0.5 * p * p / pp;
+            let jump = Pair::new(position, &residual[j..=j + REACH]);
             // What is lost is lost on the way: the reading falls behind the motion.
-            if track.rest[j] || gain <= PER_JUMP || p * track.v[j] >= 0.0 {
+            if jump.gain <= PER_JUMP || jump.size() * track.v[j] >= 0.0 {
                 continue;
             }
-            let impact = |k: usize| dot(speed, &residual[j + 1 - k..j + 1 - k + REACH]).powi(2) * 0.5 / ss;
-            if gain > OVER_IMPACT * impact(0).max(impact(1)) {
-                found.push((gain, j, p / pp));
+            let impact = |from: usize| Pair::new(speed, &residual[from..=from + REACH]).gain;
+            if jump.gain > OVER_IMPACT * impact(j).max(impact(j + 1)) {
+                found.push((jump.gain, j + usize::from(jump.second.abs() > jump.first.abs()), jump.size()));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -135,6 +133,39 @@ impl Templates {
             }
         }
         apart
+    }
+}
+
+/// What falls into a block shows in part in it and whole in the next one: a response from some block on and the same from the
+/// next one on, neither against the other.
+struct Pair {
+    first: f64,
+    second: f64,
+    /// Of log-likelihood.
+    gain: f64,
+}
+
+impl Pair {
+    /// `left` is longer than the response by the one block that the second comes later.
+    fn new(response: &[f64], left: &[f64]) -> Self {
+        let n = response.len();
+        let square = dot(response, response).max(1e-300);
+        let both = dot(&response[..n - 1], &response[1..]);
+        let (first, second) = (dot(response, &left[..n]), dot(response, &left[1..]));
+        let determinant = square * square - both * both;
+        let a = (square * first - both * second) / determinant;
+        let b = (square * second - both * first) / determinant;
+        if a * b > 0.0 {
+            Self { first: a, second: b, gain: 0.5 * (a * first + b * second) }
+        } else if first.abs() > second.abs() {
+            Self { first: first / square, second: 0.0, gain: 0.5 * first * first / square }
+        } else {
+            Self { first: 0.0, second: second / square, gain: 0.5 * second * second / square }
+        }
+    }
+
+    fn size(&self) -> f64 {
+        self.first + self.second
     }
 }
 
@@ -244,4 +275,28 @@ fn together(
     let sizes = all.sizes(residual);
     let left = all.left(&sizes, residual);
     (all.blocks, sizes, left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_within_a_block_is_one_in_two_parts_and_parts_that_oppose_each_other_are_none() {
+        let response = [1.0, -0.6, 0.1, 0.0];
+        let left = |a: f64, b: f64| -> Vec<f64> {
+            let at = |i: usize| {
+                a * response.get(i).unwrap_or(&0.0) + b * i.checked_sub(1).map_or(0.0, |i| response[i])
+            };
+            (0..=response.len()).map(at).collect()
+        };
+        let half = Pair::new(&response, &left(2.0, 2.0));
+        let all: f64 = left(2.0, 2.0).iter().map(|x| x * x).sum();
+        assert!((half.size() - 4.0).abs() < 1e-9 && (half.gain - 0.5 * all).abs() < 1e-9);
+        let opposed = Pair::new(&response, &left(3.0, -1.0));
+        assert!(
+            opposed.second == 0.0 && opposed.gain < 0.5 * left(3.0, -1.0).iter().map(|x| x * x).sum::<f64>()
+        );
+        assert!(Pair::new(&response, &left(0.0, 5.0)).second > 4.9);
+    }
 }

@@ -6,6 +6,7 @@ use crate::model::{Key, Nominal};
 use crate::report::Parameter;
 use crate::select::{Bench, Candidate};
 use crate::solve::Square;
+use crate::track::Track;
 use std::collections::BTreeMap;
 
 /// Relative standard deviation of a value for the form of its law alone: the machine's law is never quite ours, and an
@@ -218,6 +219,8 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
         }
         N::PreslidingFriction => {
             let (c, cs) = scaled(term(0));
+            // How far they bend may be hardly known where how much they hold is.
+            put("breakaway", c, cs, force.into());
             let (d, ds) = shape("deflection");
             let value = c / d;
             put(
@@ -349,11 +352,10 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             put("antiresonance_hz", f / part, sd, "Hz".into());
         }
         N::MissedCounts => {
-            // All the counts that were lost in the first recording, whichever way.
+            // All the counts that were lost in the fitted recordings, whichever way.
             let counts = nominal.rig.encoder.counts_per_unit;
-            let sum: f64 = bench.tracks[0].lost.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>()
-                * counts
-                * term(0).0;
+            let lost = |track: &Track| track.lost.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>();
+            let sum = bench.tracks.iter().map(lost).sum::<f64>() * counts * term(0).0;
             let square = (0.05 * sum).powi(2) + 1.0;
             put("lost", sum, square.sqrt(), "counts".into());
         }
