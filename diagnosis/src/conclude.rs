@@ -5,6 +5,8 @@ use crate::error::InputError;
 use crate::excitation::Excitation;
 use crate::known;
 use crate::locate::{self, Map};
+use crate::model::Model;
+use crate::noise::Colour;
 use crate::null::command_scale;
 use crate::outcome::{Evidence, Outcome, Series};
 use crate::patch::{patch, place};
@@ -12,7 +14,10 @@ use crate::pipeline::Search;
 use crate::prescribe;
 use crate::report::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
 use crate::residuals::refit_matters;
-use crate::select::Bench;
+use crate::select::{Bench, Candidate};
+use crate::shown::Shown;
+use crate::track::Track;
+use crate::values;
 use crate::weigh::{LITTLE_FORCE, Weighed, Weighing, weigh};
 use std::collections::BTreeMap;
 
@@ -33,9 +38,19 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
     let weighing = weigh(&mut s, &bench, &held_tracks, &excitation);
-    let Weighing { patched, estimator, on_fit, on_held, table, floor, understood, swing, .. } = &weighing;
-    let maps =
-        locate::maps((&fit_tracks, &on_fit.patched), (&held_tracks, &on_held.patched), nominal.rig.turn());
+    let Weighing { estimator, floor, understood, swing, .. } = &weighing;
+    let maps_of = |shown: &Shown| {
+        let (on_fit, on_held) = (&shown.on_fit.patched, &shown.on_held.patched);
+        locate::maps((&fit_tracks, on_fit), (&held_tracks, on_held), nominal.rig.turn())
+    };
+    // The verdict rests on all that was weighed, what people see on what is named.
+    let Shown { on_held: with_all_on_held, table: with_all, .. } = &weighing.shown;
+    let carries = repeats(&maps_of(&weighing.shown));
+    let named = weighing.named();
+    let with_named = only(&named, &weighing, &bench, &held_tracks, &s);
+    let shown = with_named.as_ref().unwrap_or(&weighing.shown);
+    let Shown { patched, on_fit, on_held, table } = shown;
+    let maps = maps_of(shown);
     s.fit_tracks = fit_tracks.clone();
     let mut effects: Vec<(f64, Named)> = Vec::new();
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
@@ -47,21 +62,18 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         rejected_because: weighing.doubt(weighed),
     };
     hypotheses.extend(weighing.effects.iter().chain(&weighing.dropped).map(hypothesis));
-    for (i, weighed) in weighing.effects.iter().enumerate() {
-        let (found, name) = (&weighed.found, weighed.found.effect.name);
-        if weighing.doubt(weighed).is_some() {
-            continue;
-        }
+    for (i, weighed) in named.iter().map(|i| &weighing.effects[*i]).enumerate() {
+        let name = weighed.found.effect.name;
         let named = Named {
             name,
             subsystem: name.subsystem(),
             confidence: weighed.confidence,
-            parameters: weighed.parameters.clone(),
+            parameters: values::parameters(&bench, patched, i),
             place: place(&s, patched, i),
             separating_experiment: prescribe::separating(&weighed.class),
             class: weighed.class.clone(),
         };
-        effects.push((found.holdout.sum, named));
+        effects.push((weighed.found.holdout.sum, named));
     }
     effects.sort_by(|a, b| b.0.total_cmp(&a.0));
     let effects: Vec<Named> = effects.into_iter().map(|e| e.1).collect();
@@ -70,20 +82,19 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         let before = above(table.nominal.holdout).max(above(table.refit.holdout));
         if before > 0.0 { (above(table.patched.holdout) / before).min(1.0) } else { 0.0 }
     };
-    let carries = maps.iter().any(|m| m.significant && m.carries > 0.1);
     // What was found and is too unsure to be named still says that the mismatch repeats, if it explains much of it.
-    let helps =
-        !weighing.effects.is_empty() && table.patched.holdout.powi(2) < REPEATS * table.refit.holdout.powi(2);
-    let disturbed = above(table.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
-    let refit_matters = refit_matters(estimator, &held_tracks, on_held, table.force_rms.holdout);
+    let helps = !weighing.effects.is_empty()
+        && with_all.patched.holdout.powi(2) < REPEATS * with_all.refit.holdout.powi(2);
+    let disturbed = above(with_all.patched.holdout).sqrt() > DISTURBED * table.force_rms.holdout;
+    let refit_matters = refit_matters(estimator, &held_tracks, with_all_on_held, table.force_rms.holdout);
     // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something, unless what was
     // found explains nearly all.
-    let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
+    let judged = if nominal.anchor.is_some() { with_all.patched } else { with_all.refit };
     // A command that is another one explains anything.
     let is_another = weighing.effects.iter().any(|e| CommandLaw::new(&e.found.effect).is_some());
     let foreign = judged.holdout > FOREIGN * table.force_rms.holdout
         && judged.fit > FOREIGN * table.force_rms.fit
-        && (is_another || table.patched.holdout > LITTLE_FORCE * table.force_rms.holdout);
+        && (is_another || with_all.patched.holdout > LITTLE_FORCE * table.force_rms.holdout);
     if foreign {
         return Ok(Outcome::cannot_tell(
             &nominal.rig,
@@ -209,6 +220,25 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         },
         patched_rig,
     })
+}
+
+/// Whether what a model leaves repeats over some state.
+fn repeats(maps: &[Map]) -> bool {
+    maps.iter().any(|map| map.significant && map.carries > 0.1)
+}
+
+/// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in
+/// no patched rig.
+fn only(named: &[usize], weighing: &Weighing, bench: &Bench, held: &[Track], s: &Search) -> Option<Shown> {
+    if named.len() == weighing.effects.len() {
+        return None;
+    }
+    let all = &s.last.model.effects;
+    let model = Model { effects: named.iter().map(|i| all[*i].clone()).collect() };
+    let white = |candidate: Candidate| bench.fit(candidate.model, &candidate.noise, Colour::White);
+    let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
+    let patched = white(bench.fit_slow(model, &[&s.null.noise, &s.last.noise]));
+    Some(Shown::new(bench, held, &weighing.estimator, &refit, patched))
 }
 
 fn strongest(maps: &[Map]) -> Vec<Region> {

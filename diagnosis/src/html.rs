@@ -49,11 +49,13 @@ fn numbers(out: &mut String, outcome: &Outcome) {
     out.push_str(
         "<section><h2>Before and after, on recordings that were not used for fitting</h2><div class=bars>",
     );
-    for (label, class, both) in [
+    let models = [
         ("the simulation as it stands", "a", f.nominal),
         ("with its values refitted", "b", f.refit),
         ("with what was found", "c", f.patched),
-    ] {
+    ];
+    let found = !outcome.report.effects.is_empty();
+    for (label, class, both) in &models[..if found { 3 } else { 2 }] {
         let _ = write!(
             out,
             "<div class=bar><span>{label}</span><i class={class} style=\"width:{:.1}%\"></i><b>{:.1} % <small>{} {unit}</small></b></div>",
@@ -64,13 +66,19 @@ fn numbers(out: &mut String, outcome: &Outcome) {
     }
     let _ = write!(
         out,
-        "</div><p class=note>Root mean square of the force that each model leaves, in per cent of the force itself ({} {unit}), below {:.0} Hz. \
-         From refit to patched the mean square falls by {:.0} to {:.0} % (95 %).</p></section>",
+        "</div><p class=note>Root mean square of the force that each model leaves, in per cent of the force itself ({} {unit}), below {:.0} Hz.",
         short(f.force_rms.holdout),
-        outcome.report.residual_bandwidth_hz,
-        100.0 * f.holdout_gain_ci95[0],
-        100.0 * f.holdout_gain_ci95[1]
+        outcome.report.residual_bandwidth_hz
     );
+    if found {
+        let _ = write!(
+            out,
+            " From refit to patched the mean square falls by {:.0} to {:.0} % (95 %).",
+            100.0 * f.holdout_gain_ci95[0],
+            100.0 * f.holdout_gain_ci95[1]
+        );
+    }
+    out.push_str("</p></section>");
 }
 
 fn what(out: &mut String, outcome: &Outcome) {
@@ -189,9 +197,20 @@ fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64
 
 fn over_time(out: &mut String, outcome: &Outcome) {
     let unit = &outcome.report.fit.unit;
-    out.push_str(
-        "<section><h2>Where: residual over time</h2><p class=note><i class=\"key a\"></i> as it stands <i class=\"key c\"></i> with what was \
-         found <i class=\"key m\"></i> where what was found acts most. Gaps: at rest, where friction is a reaction.</p>",
+    let marked = "<i class=\"key m\"></i> where";
+    let (after, marks_say) = match &outcome.report {
+        report if !report.effects.is_empty() => {
+            ("with what was found", format!(" {marked} what was found acts most"))
+        }
+        report if report.place.is_some() => {
+            ("with its values refitted", format!(" {marked} that leaves most"))
+        }
+        _ => ("with its values refitted", String::new()),
+    };
+    let _ = write!(
+        out,
+        "<section><h2>Where: residual over time</h2><p class=note><i class=\"key a\"></i> as it stands <i class=\"key c\"></i> \
+         {after}{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
     );
     for series in &outcome.evidence.series {
         let kind = if series.held_out { "held out" } else { "fitted" };
@@ -238,9 +257,11 @@ fn over_states(out: &mut String, outcome: &Outcome) {
     if outcome.evidence.maps.is_empty() {
         return;
     }
-    out.push_str(
+    let model = if outcome.report.effects.is_empty() { "refitted" } else { "patched" };
+    let _ = write!(
+        out,
         "<section><h2>Where: what is left, over states</h2><p class=note><i class=\"key f\"></i> moving forward <i class=\"key r\"></i> moving \
-         backward. Mean residual of the patched model on the fitted recordings.</p><div class=maps>",
+         backward. Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
     );
     for map in &outcome.evidence.maps {
         draw(out, map, &outcome.report.fit.unit, outcome.evidence.kind.length());

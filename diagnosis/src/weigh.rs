@@ -12,10 +12,11 @@ use crate::library;
 use crate::model::Model;
 use crate::noise::Colour;
 use crate::pipeline::{Search, prune};
-use crate::report::{Both, FitTable, Parameter};
-use crate::residuals::{Residuals, relative_gain, residuals};
+use crate::report::Parameter;
+use crate::residuals::Residuals;
 use crate::rivals;
 use crate::select::{Bench, Candidate};
+use crate::shown::Shown;
 use crate::track::Track;
 use crate::unnamed::{self, Swing};
 use crate::values;
@@ -54,11 +55,8 @@ pub(crate) struct Weighing {
     pub(crate) effects: Vec<Weighed>,
     /// What went because it was unsure.
     pub(crate) dropped: Vec<Weighed>,
-    pub(crate) patched: Candidate,
+    pub(crate) shown: Shown,
     pub(crate) estimator: Estimator,
-    pub(crate) on_fit: Residuals,
-    pub(crate) on_held: Residuals,
-    pub(crate) table: FitTable,
     /// What reading whole counts alone puts into the residual, N·m or N.
     pub(crate) floor: f64,
     /// Whether the model leaves little enough of the force to have understood it.
@@ -98,6 +96,12 @@ impl Weighing {
 
     fn stands_for_swing(&self) -> bool {
         self.swing.is_some_and(|swing| swing.is_mistaken())
+    }
+
+    /// Places of the effects that are named.
+    pub(crate) fn named(&self) -> Vec<usize> {
+        let is_named = |(i, effect): (usize, &Weighed)| self.doubt(effect).is_none().then_some(i);
+        self.effects.iter().enumerate().filter_map(is_named).collect()
     }
 
     /// Why an effect is not named, if it is not.
@@ -194,7 +198,7 @@ impl Scales<'_> {
     fn instead(&self, s: &mut Search, model: Model, best: &Weighing) -> Result<Weighing, Vec<EffectName>> {
         let other = self.bench.fit_slow(model, &[&s.null.noise, &s.last.noise]);
         let (before, known) = (std::mem::replace(&mut s.last, other), s.lost.len());
-        prune(s, self.bench, self.held, &best.patched.noise);
+        prune(s, self.bench, self.held, &best.shown.patched.noise);
         let next = self.once(s, best.hertz);
         if next.surest() > best.surest() {
             return Ok(next);
@@ -239,26 +243,11 @@ impl Scales<'_> {
         let known: &[Track] = &known(held, &patched.model, bench.span);
         rivals::fit_rivals(bench, &patched, &s.last, held, &mut found);
         let estimator = Estimator::new(bench.tracks, &patched.noise, bench.scale);
-        let on_fit = residuals(nominal, &estimator, bench.tracks, false, refit, &patched);
-        let on_held = residuals(nominal, &estimator, known, true, refit, &patched);
-        let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
-            fit: estimator.rms(a, bench.tracks),
-            holdout: estimator.rms(b, held),
-        };
-        let (inertia, _, _) = values::scale(nominal, &patched);
+        let shown = Shown::new(bench, held, &estimator, refit, patched);
+        let Shown { patched, on_fit, on_held, table } = &shown;
+        let (inertia, _, _) = values::scale(nominal, patched);
         let count = 1.0 / nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(bench.tracks, &patched.noise, count) * inertia;
-        let helps = relative_gain(&estimator, held, &on_held.refit, &on_held.patched);
-        let table = FitTable {
-            metric: "force_rmse".into(),
-            unit: nominal.rig.kind.force().into(),
-            nominal: both(&on_fit.nominal, &on_held.nominal),
-            refit: both(&on_fit.refit, &on_held.refit),
-            patched: both(&on_fit.patched, &on_held.patched),
-            force_rms: both(&on_fit.force, &on_held.force),
-            // Nothing can take more than there is; some resamplings of few segments would.
-            holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
-        };
         let (refit_held, left_held) =
             (estimator.rms(&on_held.refit, known), estimator.rms(&on_held.patched, known));
         let left = s.last.noise.slow * inertia * inertia;
@@ -275,8 +264,8 @@ impl Scales<'_> {
         let helps_much = left_held < MUCH_OF_REFIT * refit_held;
         let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
-        let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, &on_fit)));
-        let swing = hertz.and_then(|hertz| unnamed::swing(&estimator, hertz, &left_by(held, &on_held)));
+        let hertz = hertz.or_else(|| unnamed::frequency(&estimator, &left_by(bench.tracks, on_fit)));
+        let swing = hertz.and_then(|hertz| unnamed::swing(&estimator, hertz, &left_by(held, on_held)));
         let effects = found
             .into_iter()
             .enumerate()
@@ -284,7 +273,7 @@ impl Scales<'_> {
                 let class = rivals::class(&found, excitation, leaves_much);
                 let nearest = rivals::nearest(&found, &class);
                 let evidence = confidence::evidence(&found, leftover);
-                let parameters = values::parameters(bench, &patched, i);
+                let parameters = values::parameters(bench, patched, i);
                 let is_there = values::is_there(found.effect.name, &parameters);
                 let undecided = nearest < rivals::BEHIND_Z;
                 let most = if undecided { UNDECIDED } else { 1.0 };
@@ -298,7 +287,7 @@ impl Scales<'_> {
                     .find_map(|effect| library::creeps(effect, bench.span))
                     // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
                     .filter(|_| !found.fits_everywhere());
-                let fades_s = fading::fades(bench, &patched, i, found.fit.sum);
+                let fades_s = fading::fades(bench, patched, i, found.fit.sum);
                 Weighed {
                     found,
                     class,
@@ -312,19 +301,7 @@ impl Scales<'_> {
                 }
             })
             .collect();
-        Weighing {
-            effects,
-            dropped: Vec::new(),
-            patched,
-            estimator,
-            on_fit,
-            on_held,
-            table,
-            floor,
-            understood,
-            hertz,
-            swing,
-        }
+        Weighing { effects, dropped: Vec::new(), shown, estimator, floor, understood, hertz, swing }
     }
 }
 

@@ -132,7 +132,25 @@ fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
         let spring = |h: &&diagnosis::report::Hypothesis| h.name.as_str() == "position_spring";
         let why = outcome.report.hypotheses.iter().find(spring).and_then(|h| h.rejected_because.clone());
         assert!(why.is_some_and(|why| why.contains("fade")), "{}", outcome.summary());
+        // What is not named is in no patched rig, and explains nothing in the report.
+        assert!(outcome.patched_rig.effects.is_empty(), "{:?}", outcome.patched_rig.effects);
+        assert_eq!(outcome.report.fit.patched, outcome.report.fit.refit, "{}", outcome.summary());
     }
+}
+
+#[test]
+fn counts_that_only_one_of_the_fitted_recordings_loses_are_counts_lost() {
+    let missed = setup("missed_counts");
+    let fit = [record(&setup("none"), 1), record(&missed, 3)];
+    let outcome = diagnose_recordings(&rig(OFF, OFFSET), &fit, &[record(&missed, 2)], &|_, _| ());
+    let outcome = outcome.expect("usable");
+    let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, ["missed_counts"], "{}", outcome.summary());
+    let lost = &outcome.report.effects[0].parameters["lost"];
+    // Ten at a time.
+    let times = lost.value / 10.0;
+    assert!(times > 1.5 && (times - times.round()).abs() < 0.2, "{} counts", lost.value);
+    assert!(!outcome.patched_rig.effects[0].coefficients.is_empty(), "the steps are in the patched rig");
 }
 
 #[test]
