@@ -44,6 +44,8 @@ const FAIR_SHARE: f64 = 0.1;
 /// What explains this part is most of what was left out, and this many standard errors are sure.
 const MOST_SHARE: f64 = 0.5;
 const SURE: f64 = 3.0;
+/// Least part of what is hardly sure: a bias that wanders looks like many a small effect for as long as two recordings last.
+const UNSURE_SHARE: f64 = 0.7;
 /// Standard errors on the fitted recordings of what may carry beside another.
 const PROMISING: f64 = 2.5;
 /// What explains this part, and takes half of the held-out mean square with it, may rest on few moments there: counts are
@@ -79,10 +81,13 @@ impl Found {
     /// that it leaves and the same size as on the fitted ones. Next to reversals a law of slightly another form may be less
     /// likely at many blocks and yet leave a third of the force.
     fn carries(&self) -> bool {
-        let likely = self.holdout.low > 0.0 && self.holdout.z.max(self.holdout.steady) >= 2.0;
+        let likely = self.holdout.low > 0.0
+            && self.holdout.z.max(self.holdout.steady) >= 2.0
+            && (self.least_z() >= SURE || self.share >= UNSURE_SHARE);
         let takes_most = self.force.low > 0.0 && self.share >= MOST_SHARE;
         let takes_all = self.takes_all() && self.holdout.sum > 0.0;
-        likely || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= SURE)
+        let least = if takes_all { PROMISING } else { SURE };
+        likely || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= least)
     }
 
     fn is_same_size(&self) -> bool {
@@ -297,10 +302,25 @@ mod tests {
             rare(found);
             found.sizes[2] = 0.5;
         }));
-        assert!(!may_be_named(|found| {
-            rare(found);
-            found.fit = gain(900.0, 100.0, 2.0);
-        }));
+        let fitted = |z: f64| {
+            may_be_named(|found| {
+                rare(found);
+                found.fit = gain(900.0, 100.0, z);
+            })
+        };
+        assert!(fitted(2.6) && !fitted(2.0));
+    }
+
+    #[test]
+    fn what_is_hardly_sure_must_explain_most() {
+        let hardly = |share: f64| {
+            may_be_named(|found| {
+                found.fit = gain(130.0, 30.0, 2.2);
+                found.share = share;
+            })
+        };
+        assert!(hardly(0.8) && !hardly(0.6));
+        assert!(may_be_named(|found| found.share = 0.6));
     }
 
     #[test]
