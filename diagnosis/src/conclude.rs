@@ -68,7 +68,10 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
             name,
             subsystem: name.subsystem(),
             confidence: weighed.confidence,
-            parameters: values::parameters(&bench, patched, i),
+            parameters: match &with_named {
+                Some(_) => values::parameters(&bench, patched, i),
+                None => weighed.parameters.clone(),
+            },
             place: place(&s, patched, i),
             separating_experiment: prescribe::separating(&weighed.class),
             class: weighed.class.clone(),
@@ -190,7 +193,7 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
         },
         reason: match verdict {
             Verdict::InsufficientExcitation => Some(excitation.one_speed()),
-            Verdict::Unexplained => swings,
+            Verdict::Unexplained => swings.or_else(|| weighing.foreign()),
             _ => None,
         },
     };

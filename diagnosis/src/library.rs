@@ -81,7 +81,8 @@ impl Span {
 
     /// Least command at which a grip lets go: what slips under friction alone never held.
     fn least_grip(&self, nominal: &Nominal) -> f64 {
-        (nominal.dry_deceleration() / nominal.known_gain().abs()).clamp(0.02 * self.command, 0.5 * self.command)
+        (nominal.dry_deceleration() / nominal.known_gain().abs())
+            .clamp(0.02 * self.command, 0.5 * self.command)
     }
 
     pub(crate) fn travel(&self) -> f64 {

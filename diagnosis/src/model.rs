@@ -365,6 +365,7 @@ pub(crate) fn effect_inputs(
         let state = State {
             position: track.x[j],
             velocity: track.v[j],
+            acceleration: track.acceleration(j),
             rest: track.rest[j],
             drive: 1.0,
             command: 1.0,

@@ -193,6 +193,8 @@ pub(crate) fn is_periodic(name: N) -> bool {
 
 /// Longest run of neighbouring orders that teeth or poles make.
 const LONGEST_RUN: usize = 4;
+/// How near to a whole number an order is one.
+const MULTIPLE: f64 = 0.1;
 /// Part of the strongest amplitude that an order must have to count in a run.
 const STANDS: f64 = 0.2;
 
@@ -222,7 +224,10 @@ pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
         run = if pair[1] - pair[0] <= 1.0 { run + 1 } else { 1 };
         longest = longest.max(run);
     }
-    longest <= LONGEST_RUN
+    // Waves that run on and are no multiples of the longest are irregular.
+    let regular = effect.shape.contains_key("turn")
+        || waves.iter().zip(&orders).all(|(wave, order)| (wave / first - order).abs() < MULTIPLE);
+    longest <= if regular { LONGEST_RUN } else { LONGEST_RUN - 1 }
 }
 
 /// Golden-section search for the largest value.
@@ -271,6 +276,8 @@ mod tests {
         assert!(!is_comb(&free(&[0.1, 0.048, 0.031, 0.025, 0.022, 0.0195, 0.016]), &[1.0; 7]));
         assert!(!is_comb(&free(&[0.13, 0.091, 0.059, 0.047, 0.039, 0.034]), &[1.1, 0.5, 1.4, 0.3, 0.4, 0.7]));
         assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3]), &[1.0; 3]));
+        assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3, 0.625e-3]), &[1.0; 4]));
+        assert!(!is_comb(&free(&[0.0754, 0.0522, 0.0456, 0.0370]), &[0.79, 1.07, 0.56, 0.35]));
         // What is weak beside the strongest does not close a gap.
         assert!(is_comb(&cogging(&[2.0, 3.0, 4.0, 5.0, 6.0]), &[1.0, 1.0, 0.1, 1.0, 1.0]));
     }

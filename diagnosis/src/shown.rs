@@ -11,7 +11,6 @@ use crate::track::Track;
 pub(crate) struct Shown {
     pub(crate) patched: Candidate,
     pub(crate) on_fit: Residuals,
-    /// Of blocks that the model does not know, too.
     pub(crate) on_held: Residuals,
     pub(crate) table: FitTable,
 }

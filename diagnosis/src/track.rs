@@ -180,6 +180,13 @@ impl Track {
         self.force.as_ref().map_or(0.0, |force| force[block])
     }
 
+    /// Acceleration in the middle of a block, rad/s² or m/s².
+    pub(crate) fn acceleration(&self, block: usize) -> f64 {
+        let (a, b) = (block.saturating_sub(1), (block + 1).min(self.blocks() - 1));
+        let middle = |block: usize| self.start[block] + 0.5 * self.span[block];
+        if b > a { (self.v[b] - self.v[a]) / (middle(b) - middle(a)) } else { 0.0 }
+    }
+
     /// Velocity at a time since the start of a block, s, between those in the middles of the blocks.
     pub(crate) fn velocity_within(&self, block: usize, time: f64) -> f64 {
         let part = time / self.span[block] - 0.5;

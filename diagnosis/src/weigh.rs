@@ -5,7 +5,7 @@ use crate::confidence::{self, Evidence, Leftover};
 use crate::effects::EffectName;
 use crate::estimate::Estimator;
 use crate::excitation::Excitation;
-use crate::fading;
+use crate::foreign;
 use crate::found::Found;
 use crate::known::known;
 use crate::library;
@@ -46,8 +46,14 @@ pub(crate) struct Weighed {
     pub(crate) undecided: bool,
     /// Part of the travel over which it bends, or what explains as much does, where that is more than bristles do.
     pub(crate) creeps: Option<f64>,
-    /// Time in which its force fades although it stays bent, s.
-    pub(crate) fades_s: Option<f64>,
+    /// What it would rather be, where physics without a name explains surely more.
+    pub(crate) rather: Option<String>,
+}
+
+impl Weighed {
+    fn explains_more(&self, than: &Self) -> bool {
+        self.found.holdout.sum > than.found.holdout.sum
+    }
 }
 
 /// The model that stands, its effects weighed, and its residuals.
@@ -98,6 +104,13 @@ impl Weighing {
         self.swing.is_some_and(|swing| swing.is_mistaken())
     }
 
+    /// What is there instead of the effect that explains the most, where physics without a name explains more.
+    pub(crate) fn foreign(&self) -> Option<String> {
+        let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
+        let says = most.rather.as_ref()?;
+        Some(format!("it resembles {}, but {says}", most.found.effect.name))
+    }
+
     /// Places of the effects that are named.
     pub(crate) fn named(&self) -> Vec<usize> {
         let is_named = |(i, effect): (usize, &Weighed)| self.doubt(effect).is_none().then_some(i);
@@ -130,8 +143,10 @@ impl Weighing {
                 "it would bend over {:.0} % of the travel, as a spring that creeps does",
                 100.0 * part
             ))
-        } else if let Some(time) = weighed.fades_s {
-            Some(format!("its force would fade within {time} s, as that of a spring that creeps does"))
+        } else if let Some(foreign) = &weighed.rather {
+            Some(foreign.clone())
+        } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(weighed)) {
+            Some("what stands beside it and explains more is no effect of the library".into())
         } else if let Some(joint) = self.same_joint(weighed) {
             Some(format!("beside {joint} it is the form of the same joint"))
         } else if self.drifts_alike(weighed) {
@@ -287,7 +302,7 @@ impl Scales<'_> {
                     .find_map(|effect| library::creeps(effect, bench.span))
                     // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
                     .filter(|_| !found.fits_everywhere());
-                let fades_s = fading::fades(bench, patched, i, found.fit.sum);
+                let rather = foreign::rather(bench, patched, i, found.fit.sum);
                 Weighed {
                     found,
                     class,
@@ -297,7 +312,7 @@ impl Scales<'_> {
                     is_there,
                     undecided,
                     creeps,
-                    fades_s,
+                    rather,
                 }
             })
             .collect();

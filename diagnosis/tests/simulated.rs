@@ -139,6 +139,17 @@ fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
 }
 
 #[test]
+fn a_load_that_changes_at_once_is_no_drift_and_the_report_says_what_it_resembles() {
+    for closed in [false, true] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size: 0.2, ..setup("heavier_load") });
+        assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
+        assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
+        // Under a loop gain and friction are both seen to change, alike.
+        assert!(closed || outcome.report.sentence.contains("at once, at 5.4 s"), "{}", outcome.summary());
+    }
+}
+
+#[test]
 fn counts_that_only_one_of_the_fitted_recordings_loses_are_counts_lost() {
     let missed = setup("missed_counts");
     let fit = [record(&setup("none"), 1), record(&missed, 3)];

@@ -11,6 +11,8 @@ pub struct State {
     pub position: f64,
     /// rad/s or m/s.
     pub velocity: f64,
+    /// rad/s² or m/s²; asked only by what no plant has.
+    pub acceleration: f64,
     /// Whether the sign of the velocity is unknown: friction is a reaction then and not in the model.
     pub rest: bool,
     /// Force that the command asks for: gain · effective command, N·m or N.
@@ -40,6 +42,10 @@ pub struct Law {
     b: f64,
     /// Time in which a spring's force fades while it stays bent, s; never, but where that is asked.
     fades_s: f64,
+    /// Time at which a drift comes all at once, s; never, but where that is asked.
+    at_once_s: f64,
+    /// Whether a profile along the travel is of the inertia.
+    of_inertia: bool,
     waves: Vec<f64>,
     times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
@@ -58,7 +64,9 @@ impl Law {
         let mut waves = Vec::new();
         let mut times = Vec::new();
         let (mut a, mut b) = (0.0, 0.0);
-        let mut fades_s = f64::INFINITY;
+        let fades_s = get("fades_s", f64::INFINITY);
+        let at_once_s = get("at_once_s", f64::INFINITY);
+        let of_inertia = get("of_inertia", 0.0) > 0.5;
         let names: Vec<String> = match effect.name {
             N::ViscousFriction => vec!["viscous".into()],
             N::CoulombFriction => vec!["coulomb".into()],
@@ -99,7 +107,6 @@ impl Law {
             N::TiltGravity => vec!["weight".into()],
             N::PositionSpring => {
                 (a, b) = (get("from", 0.0), get("one_sided", 0.0));
-                fades_s = get("fades_s", f64::INFINITY);
                 // Where it is at rest is not known: a force that is there at the start.
                 let both = ["stiffness".to_owned(), "preload".to_owned()];
                 both.into_iter().take(if get("preload", 0.0) > 0.5 { 2 } else { 1 }).collect()
@@ -125,7 +132,19 @@ impl Law {
         };
         let state = [0.0; 3];
         let load = Load::new(effect);
-        Some(Self { name: effect.name, a, b, fades_s, waves, times, names, state, load })
+        Some(Self {
+            name: effect.name,
+            a,
+            b,
+            fades_s,
+            at_once_s,
+            of_inertia,
+            waves,
+            times,
+            names,
+            state,
+            load,
+        })
     }
 
     /// Names of the terms, in order.
@@ -178,11 +197,15 @@ impl Law {
             N::QuadraticDrag => out[0] = -velocity * velocity.abs(),
             N::LoadDependentFriction => out[0] = -way * s.external.abs(),
             N::PositionDependentFriction => legendre(self.along(s.position), -way, out),
+            N::PositionDependentDamping if self.of_inertia => self.inertia(s, out),
             N::PositionDependentDamping => legendre(self.along(s.position), -velocity, out),
             N::FrictionDrift => {
                 let settled = 1.0 - (-s.time / self.a).exp();
                 out[0] = -way * settled;
                 out[1] = -velocity * settled;
+            }
+            N::GainDrift if self.at_once_s.is_finite() => {
+                out[0] = if s.time >= self.at_once_s { s.drive } else { 0.0 };
             }
             N::GainDrift => out[0] = s.drive * (1.0 - (-s.time / self.a).exp()),
             N::Cogging | N::MassImbalance | N::EncoderEccentricity => {
@@ -216,6 +239,19 @@ impl Law {
         let (low, high) = (self.a, self.b);
         let half = 0.5 * (high - low);
         if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.0, 1.0) } else { 0.0 }
+    }
+
+    /// What an inertia J(q) takes beside a constant one, J′v²/2 and its part of the acceleration, by Lagrange's equation.
+    fn inertia(&self, s: &State, out: &mut [f64]) {
+        let half = 0.5 * (self.b - self.a);
+        let step = 1e-3 * half;
+        let mut beyond = vec![0.0; out.len()];
+        legendre(self.along(s.position + step), 1.0, &mut beyond);
+        legendre(self.along(s.position - step), 1.0, out);
+        for (term, beyond) in out.iter_mut().zip(beyond) {
+            let slope = (beyond - *term) / (2.0 * step);
+            *term = -0.5 * (beyond + *term) * s.acceleration - 0.5 * slope * s.velocity * s.velocity;
+        }
     }
 
     /// Means over the step: a wave that is passed within it averages out.
@@ -320,6 +356,19 @@ mod tests {
         assert_eq!(spring(&[], 5), -2.0);
         assert!((spring(&[("fades_s", 1.0)], 1) + 2.0 * (-1.0_f64).exp()).abs() < 0.01);
         assert!(spring(&[("fades_s", 1.0)], 10).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_inertia_along_the_travel_takes_its_part_of_the_acceleration_and_half_its_slope_of_the_square_of_speed()
+     {
+        let shape = [("low", 0.0), ("high", 4.0), ("degree", 2.0), ("of_inertia", 1.0)];
+        let mut law = Law::new(&Effect::shaped(EffectName::PositionDependentDamping, &shape)).unwrap();
+        let mut out = [0.0; 2];
+        law.terms(&State { position: 3.0, velocity: 2.0, acceleration: 5.0, ..State::default() }, &mut out);
+        // x = (q − 2)/2 = ½: P₁ = x with slope ½, P₂ = (3x² − 1)/2 with slope 3x/2.
+        for (term, expected) in out.iter().zip([-0.5 * 5.0 - 0.25 * 4.0, 0.125 * 5.0 - 0.375 * 4.0]) {
+            assert!((term - expected).abs() < 1e-4, "{term} instead of {expected}");
+        }
     }
 
     #[test]

@@ -74,6 +74,7 @@ impl Plant {
             external: around.external,
             time: self.time,
             dt,
+            ..State::default()
         };
         let mut dry = coulomb;
         let mut free = push - model.viscous.unwrap_or(0.0) * self.velocity

@@ -172,6 +172,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             if is("torque_ripple") {
                 u *= 1.0 + s * (0.2 * (3.0 * (q + zero)).sin() + 0.1 * (6.0 * (q + zero) + 1.0).sin());
             }
+            let mut j = J;
             let mut dry = C;
             let mut force = GAIN * u - B * v + noise + slow;
             if is("stribeck_friction") {
@@ -200,6 +201,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             if is("creeping_spring") {
                 z += (v - z / 0.8) * dt;
                 force -= 8e-5 * s * z;
+            }
+            if is("heavier_load") && t > 0.45 * setup.seconds {
+                j *= 1.0 + 0.5 * s;
             }
             if is("sticky_place") {
                 force -= 3e-5 * s * (-0.5 * ((q - 4.0) / 1.3).powi(2)).exp() * v;
@@ -265,7 +269,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 q += v * dt;
                 continue;
             }
-            step(&mut v, force / J, dry / J, dt);
+            step(&mut v, force / j, dry / j, dt);
             q += v * dt;
         }
     }
