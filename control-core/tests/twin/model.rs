@@ -66,6 +66,17 @@ impl Twin {
         (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-span, span)
     }
 
+    /// DAC steps that the torque limit moves for a heat that is off by a part in 8,192 of what is allowed: none before heat
+    /// limits. The limit falls over a fifth of the heat, so that where a weak motor drives a strong amplifier it shows what
+    /// rounding has left in the heat.
+    pub(crate) fn steps_of_heat(&self) -> f64 {
+        let (most, largest) = (self.config.limits.torque.0.to_num::<f64>(), self.largest_torque());
+        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>().min(most);
+        let device = self.config.device;
+        let steps = f64::from(device.dac.span()) / device.full_scale_torque.0.to_num::<f64>();
+        if largest < most { 5.0 / 8192.0 * (most - continuous) * steps } else { 0.0 }
+    }
+
     /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
     fn largest_torque(&self) -> f64 {
         let most = self.config.limits.torque.0.to_num::<f64>();
