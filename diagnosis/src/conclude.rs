@@ -45,12 +45,13 @@ pub(crate) fn conclude(mut s: Search) -> Result<Outcome, InputError> {
     };
     // The verdict rests on all that was weighed, what people see on what is named.
     let Shown { on_held: with_all_on_held, table: with_all, .. } = &weighing.shown;
-    let carries = repeats(&maps_of(&weighing.shown));
+    let maps_with_all = maps_of(&weighing.shown);
+    let carries = repeats(&maps_with_all);
     let named = weighing.named();
     let with_named = only(&named, &weighing, &bench, &held_tracks, &s);
     let shown = with_named.as_ref().unwrap_or(&weighing.shown);
     let Shown { patched, on_fit, on_held, table } = shown;
-    let maps = maps_of(shown);
+    let maps = with_named.as_ref().map_or(maps_with_all, maps_of);
     s.fit_tracks = fit_tracks.clone();
     let mut effects: Vec<(f64, Named)> = Vec::new();
     let mut hypotheses: Vec<Hypothesis> = Vec::new();

@@ -11,6 +11,8 @@ pub(crate) struct Twin {
     anchor: f64,
     given: f64,
     heat: f64,
+    /// What of the heat the places make that forces lose: half of the last one of each wall, of friction and of damping.
+    heat_doubt: f64,
     ticks: u32,
     counts: Vec<i32>,
     edges: Vec<(usize, i32)>,
@@ -39,6 +41,7 @@ impl Twin {
             anchor: 0.0,
             given: 0.0,
             heat: 0.0,
+            heat_doubt: 0.0,
             ticks: 0,
             counts: Vec::new(),
             edges: vec![(0, 0)],
@@ -62,19 +65,23 @@ impl Twin {
         self.given = faded.clamp(self.given - slew, self.given + slew);
         let seconds = f64::from(limits.winding_time_s);
         self.heat += (self.given * self.given - self.heat) / (seconds * 10_000.0);
+        let lost = 0.5 / 65_536.0 * (self.layers.len() + 2) as f64 * device.roller_radius.0.to_num::<f64>();
+        self.heat_doubt += (2.0 * self.given.abs() * lost - self.heat_doubt) / (seconds * 10_000.0);
         let span = f64::from(device.dac.span());
         (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-span, span)
     }
 
-    /// DAC steps that the torque limit moves for a heat that is off by a part in 8,192 of what is allowed: none before heat
-    /// limits. The limit falls over a fifth of the heat, so that where a weak motor drives a strong amplifier it shows what
-    /// rounding has left in the heat.
+    /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat limits. The limit falls over a
+    /// fifth of the heat, so that where a weak motor hangs on a strong amplifier the last places of long ago show.
     pub(crate) fn steps_of_heat(&self) -> f64 {
         let (most, largest) = (self.config.limits.torque.0.to_num::<f64>(), self.largest_torque());
-        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>().min(most);
+        if largest >= most {
+            return 0.0;
+        }
+        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>();
         let device = self.config.device;
         let steps = f64::from(device.dac.span()) / device.full_scale_torque.0.to_num::<f64>();
-        if largest < most { 5.0 / 8192.0 * (most - continuous) * steps } else { 0.0 }
+        self.heat_doubt * (most - continuous) / (continuous * continuous / 5.0) * steps
     }
 
     /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
