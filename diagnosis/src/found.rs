@@ -39,6 +39,8 @@ pub(crate) struct Found {
 
 /// Part of the refit's residual above the noise that an effect must explain to be named.
 const SHARE: f64 = 0.05;
+/// Part of a refit's mean square that counts as above the noise at the least: how much of it the noise is, is itself unsure.
+const LEAST_EXPLAINABLE: f64 = 0.2;
 /// Below this part it must also stand out by [`CERTAIN`]: the form of a larger effect is never quite right.
 const FAIR_SHARE: f64 = 0.1;
 /// What explains this part is most of what was left out, and this many standard errors are sure.
@@ -189,7 +191,7 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
     let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
     let explainable = |whole: f64, tracks: &[Track]| {
         let floor = (estimator.counting(tracks, &last.noise, count) * inertia).powi(2);
-        (whole - floor).max(0.02 * whole).max(1e-300)
+        (whole - floor).max(LEAST_EXPLAINABLE * whole).max(1e-300)
     };
     let of_null = left_on_held(&null, &lay_all(&null, bench.nominal, held, &last.noise));
     let held_out = explainable(square(&of_null, held), held);

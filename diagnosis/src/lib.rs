@@ -6,7 +6,7 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic`, `descend`, `select` and `pipeline` (name), `judge`, `known` and `found` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `rivals`, `foreign`, `weigh` and `confidence` (how sure), `residuals`, `shown`, `conclude`, `patch`,
+//! `screen`, `periodic`, `descend`, `select` and `pipeline` (name), `judge`, `known` and `found` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `rivals`, `foreign`, `weigh` and `confidence` (how sure), `residuals`, `shown`, `verdict`, `conclude`, `patch`,
 //! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
 
 // Matrices are read by row and column.
@@ -50,6 +50,7 @@ mod steps;
 mod track;
 mod unnamed;
 mod values;
+mod verdict;
 mod weigh;
 
 pub use error::InputError;
@@ -96,7 +97,7 @@ pub fn diagnose_recordings(
     }
     let search = pipeline::search(rig, fit, holdout, progress)?;
     progress("writing down", 0.95);
-    let outcome = conclude::conclude(search)?;
+    let outcome = conclude::conclude(search);
     progress("done", 1.0);
     Ok(outcome)
 }

@@ -74,6 +74,11 @@ impl Span {
         }
     }
 
+    /// Highest resonance of a load on a spring that still shows in how fast the motor answers, Hz.
+    fn highest_resonance(&self) -> f64 {
+        (0.5 / self.block).max((0.25 / self.row).min(STIFFEST_HZ))
+    }
+
     /// Widest gap worth looking for: one that the axis crosses within a moment at its fast speed.
     fn widest_gap(&self) -> f64 {
         (0.08 * self.speed).max(60.0 * self.count)
@@ -93,6 +98,12 @@ impl Span {
 fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {
     values.iter().flatten().map(|x| Some(*x))
 }
+
+/// Longest over shortest of the lengths over which bristles bend, where they are not all alike: asperities of many sizes.
+const SPREAD: f64 = 10.0;
+
+/// Resonance above which a spring holds like a solid shaft, Hz.
+const STIFFEST_HZ: f64 = 400.0;
 
 /// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or bump, and one that is
 /// narrow beside the travel.
@@ -136,7 +147,15 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             }
             out
         }
-        N::PreslidingFriction => one("deflection", logarithmic(2.0 * span.count, 0.03 * span.travel(), 9)),
+        N::PreslidingFriction => {
+            let mut out = Vec::new();
+            for spread in [1.0, SPREAD] {
+                for deflection in logarithmic(2.0 * span.count, 0.03 * span.travel(), 9) {
+                    out.push(Effect::shaped(name, &[("deflection", deflection), ("spread", spread)]));
+                }
+            }
+            out
+        }
         N::PositionDependentFriction | N::PositionDependentDamping => {
             let of =
                 |degree| Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", degree)]);
@@ -144,7 +163,13 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         }
         N::LoadDependentFriction if span.force => vec![Effect::shaped(name, &[])],
         N::FrictionDrift | N::GainDrift => {
-            one("time_constant", logarithmic(0.08 * span.duration, 2.0 * span.duration, 5))
+            let mut out = one("time_constant", logarithmic(0.08 * span.duration, 2.0 * span.duration, 5));
+            if name == N::FrictionDrift && !nominal.holds(N::ViscousFriction) {
+                for drift in &mut out {
+                    drift.shape.insert("dry_only".into(), 1.0);
+                }
+            }
+            out
         }
         N::CommandDeadband => {
             let mut out = Vec::new();
@@ -200,7 +225,7 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         N::DriveCompliance => {
             let mut out = Vec::new();
             for damping in [0.02, 0.12] {
-                for hz in logarithmic(5.0, 0.35 / span.block, 11) {
+                for hz in logarithmic(5.0, 0.7 * span.highest_resonance(), 12) {
                     out.push(Effect::shaped(name, &[("resonance_hz", hz), ("damping", damping)]));
                 }
             }
@@ -244,7 +269,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
                 ("contact_hz", 30.0, 600.0),
             ]
         }
-        N::DriveCompliance => vec![("resonance_hz", 4.0, 0.5 / span.block), ("damping", 0.003, 0.7)],
+        N::DriveCompliance => vec![("resonance_hz", 4.0, span.highest_resonance()), ("damping", 0.003, 0.7)],
         _ => Vec::new(),
     }
 }

@@ -13,21 +13,25 @@ const MARGIN: usize = 1;
 /// No count for this long is rest, s: the steadiest slow motion that is told from it makes fifty counts a second.
 const STILL_S: f64 = 0.02;
 
-/// Blocks before or after which the encoder gives no count for a while: by itself, whatever a filter makes of the speed.
-fn still(track: &Track, count: f64) -> Vec<bool> {
+/// Counts that a smoothed motion passes and the encoder does not before they contradict each other: the motion rests there.
+const CONTRADICTED: f64 = 2.0;
+
+/// Blocks at rest whatever a filter makes of the speed `v`: the encoder gives no count for a while, or for less where by
+/// that speed it should have given some.
+fn still(track: &Track, v: &[f64], count: f64) -> Vec<bool> {
     let n = track.blocks();
     let reach = ((STILL_S * track.block_rate()).ceil() as usize).max(2);
     let mut out = vec![false; n];
     let mut from = 0;
-    for j in 0..n {
+    while from < n {
         // The mean of a block within which a count falls is no whole count.
-        if (track.z[j] - track.z[from]).abs() > 1e-3 * count {
-            from = j;
+        let same = |j: &usize| (track.z[*j] - track.z[from]).abs() <= 1e-3 * count;
+        let to = (from + 1..n).take_while(same).last().unwrap_or(from);
+        let passed: f64 = (from..=to).map(|j| v[j] * track.span[j]).sum();
+        if to - from >= reach || (to > from && passed.abs() > CONTRADICTED * count) {
+            out[from..=to].fill(true);
         }
-        if j - from >= reach {
-            let first = if j - from == reach { from } else { j };
-            out[first..=j].fill(true);
-        }
+        from = to + 1;
     }
     out
 }
@@ -49,7 +53,7 @@ pub(crate) fn resmooth(tracks: &mut [Track], totals: &[Total], noise: &Noise, co
         // A quarter of the fast speed is moving, whatever the noise estimate says.
         let fast = speeds[speeds.len() * 95 / 100];
         let floor = (2.5 * typical).min(0.25 * fast).max(1e-6 * fast);
-        let still = still(track, count);
+        let still = still(track, &state.v, count);
         let n = still.len();
         let slow: Vec<bool> =
             state.v.iter().zip(&still).map(|(v, still)| *still || v.abs() < floor).collect();
@@ -154,4 +158,36 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [Track]) -> (Noise, Fit
         fit = Fit::new(&model, nominal, tracks, &noise);
     }
     (noise, fit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    /// Blocks of 2.5 ms on which an axis passes one count each and from 40 on, for five blocks, none.
+    fn stopped_for_a_moment() -> Track {
+        let count = |row: i32| f64::from(if row <= 40 { row } else { (row - 5).max(40) });
+        let recording = Recording {
+            time_s: (0..101).map(|row| f64::from(row) * 2.5e-3).collect(),
+            command: vec![0.0; 101],
+            position_counts: (0..101).map(count).collect(),
+            ..Recording::default()
+        };
+        Track::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
+    }
+
+    #[test]
+    fn an_axis_rests_where_the_smoothed_speed_promises_counts_that_do_not_come() {
+        let track = stopped_for_a_moment();
+        let count = track.z[1] - track.z[0];
+        let at = |counts_per_block: f64| {
+            let v: Vec<f64> = track.span.iter().map(|h| counts_per_block * count / h).collect();
+            still(&track, &v, count)
+        };
+        let resting = |at: &[bool]| (0..at.len()).filter(|j| at[*j]).collect::<Vec<_>>();
+        assert_eq!(resting(&at(0.6)), [40, 41, 42, 43, 44, 45], "3.6 counts promised");
+        assert!(resting(&at(0.2)).is_empty(), "1.2 counts are one more block's");
+    }
 }

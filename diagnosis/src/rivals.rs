@@ -9,6 +9,7 @@ use crate::known::known;
 use crate::model::Nominal;
 use crate::noise::Colour;
 use crate::periodic::is_periodic;
+use crate::rig::Kind;
 use crate::select::{Bench, Candidate};
 use crate::track::Track;
 use crate::values;
@@ -25,6 +26,8 @@ const BEHIND_PART: f64 = 0.015;
 /// behind, and counts as by this many standard errors.
 const BEHIND_SLOW: f64 = 30.0;
 const BEHIND_SLOW_Z: f64 = 4.0;
+/// Narrowest gap that an encoder sees, counts.
+const SEEN: f64 = 2.0;
 /// Most effects that a class may hold.
 const MOST_IN_CLASS: usize = 3;
 /// Standard errors behind within which a rival's shape is worth polishing.
@@ -113,18 +116,33 @@ pub(crate) fn fit_rivals(
     }
 }
 
+/// What no recording of motion tells from an effect; `count` is one of the encoder's.
+fn twin(effect: &Effect, leaves_much: bool, kind: Kind, count: f64) -> Option<EffectName> {
+    use EffectName as N;
+    match effect.name {
+        // A drive that clips, and a roller that slips at a constant force.
+        N::CommandSaturation => Some(N::RollerSlip),
+        N::RollerSlip => Some(N::CommandSaturation),
+        // A spring that explains little of what it should explain may well have a gap.
+        N::DriveCompliance if leaves_much => Some(N::Backlash),
+        // A gap that the encoder does not see, and the spring that its flanks are.
+        N::Backlash if effect.shape_or("gap", f64::INFINITY) < SEEN * count => Some(N::DriveCompliance),
+        // Waves of once a turn, where nothing that turns need be heavy.
+        N::MassImbalance if kind == Kind::Linear => Some(N::Cogging),
+        _ => None,
+    }
+}
+
 /// Every effect that these recordings cannot tell from the one found, itself first.
-pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -> Vec<EffectName> {
+pub(crate) fn class(
+    found: &Found,
+    excitation: &Excitation,
+    leaves_much: bool,
+    bench: &Bench,
+) -> Vec<EffectName> {
     let name = found.effect.name;
     let mut class = vec![name];
-    // What no recording of motion tells apart: a drive that clips and a roller that slips at a constant force.
-    match name {
-        EffectName::CommandSaturation => class.push(EffectName::RollerSlip),
-        EffectName::RollerSlip => class.push(EffectName::CommandSaturation),
-        // A spring that explains little of what it should explain may well have a gap.
-        EffectName::DriveCompliance if leaves_much => class.push(EffectName::Backlash),
-        _ => {}
-    }
+    class.extend(twin(&found.effect, leaves_much, bench.nominal.rig.kind, bench.span.count));
     class.extend(excitation.twin(name).filter(|twin| !class.contains(twin)));
     let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
     let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
@@ -142,4 +160,21 @@ pub(crate) fn class(found: &Found, excitation: &Excitation, leaves_much: bool) -
 pub(crate) fn nearest(found: &Found, class: &[EffectName]) -> f64 {
     let outside = found.rivals.iter().filter(|r| !class.contains(&r.name) && r.absence.is_none());
     outside.map(|r| r.z).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unseen_gap_may_be_a_spring_and_a_wave_of_a_screw_may_be_of_its_motor() {
+        use EffectName as N;
+        let of = |name: N, shape: &[(&str, f64)], kind: Kind| {
+            twin(&Effect::shaped(name, shape), false, kind, 1e-6)
+        };
+        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], Kind::Linear), Some(N::DriveCompliance));
+        assert_eq!(of(N::Backlash, &[("gap", 3e-6)], Kind::Linear), None);
+        assert_eq!(of(N::MassImbalance, &[], Kind::Linear), Some(N::Cogging));
+        assert_eq!(of(N::MassImbalance, &[], Kind::Rotary), None, "there a mass turns");
+    }
 }

@@ -1,6 +1,6 @@
 //! From coefficients to the numbers of the report: values in the rig's units with intervals, by the contract's names.
 
-use crate::effects::{Effect, EffectName as N, legendre};
+use crate::effects::{Effect, EffectName as N, bristle_lengths, legendre};
 use crate::judge::waves_of;
 use crate::model::{Key, Nominal};
 use crate::report::Parameter;
@@ -222,7 +222,9 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             // How far they bend may be hardly known where how much they hold is.
             put("breakaway", c, cs, force.into());
             let (d, ds) = shape("deflection");
-            let value = c / d;
+            // From straight, before any slides.
+            let lengths = bristle_lengths(found);
+            let value = c * lengths.iter().map(|length| length.recip()).sum::<f64>() / lengths.len() as f64;
             put(
                 "stiffness",
                 value,

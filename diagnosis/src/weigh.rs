@@ -285,7 +285,7 @@ impl Scales<'_> {
             .into_iter()
             .enumerate()
             .map(|(i, found)| {
-                let class = rivals::class(&found, excitation, leaves_much);
+                let class = rivals::class(&found, excitation, leaves_much, bench);
                 let nearest = rivals::nearest(&found, &class);
                 let evidence = confidence::evidence(&found, leftover);
                 let parameters = values::parameters(bench, patched, i);

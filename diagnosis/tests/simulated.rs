@@ -93,6 +93,23 @@ fn an_effect_as_large_as_the_force_is_named_alone() {
 }
 
 #[test]
+fn bristles_of_one_length_and_of_many_are_told_apart_and_named_with_their_stiffness() {
+    // Nine lengths over a decade are stiffer from straight than all of the middle one.
+    let stiffer = (0..9).map(|i| 10_f64.powf(0.5 - f64::from(i) / 8.0)).sum::<f64>() / 9.0;
+    let cases = [("presliding_friction", false, 1.0), ("bristles_of_many_lengths", true, stiffer)];
+    for (effect, spread, stiffer) in cases {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed: true, size: 4.0, ..setup(effect) });
+        let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["presliding_friction"], "{}", outcome.summary());
+        let patched = &outcome.patched_rig.effects[0];
+        assert_eq!(patched.shape_or("spread", 1.0) > 1.0, spread, "{effect}: {patched:?}");
+        let value = outcome.report.effects[0].parameters["stiffness"].value;
+        let truth = stiffer * common::C / 0.2;
+        assert!((value / truth - 1.0).abs() < 0.15, "{effect}: stiffness {value} instead of {truth}");
+    }
+}
+
+#[test]
 fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
     // Neither carries to the held-out recording without the other, and a preloaded spring is no friction.
     let mut rig = rig(OFF, "");

@@ -1,5 +1,6 @@
 //! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
 
+use super::bristles::Bristles;
 use super::load::Load;
 use super::{Effect, EffectName};
 use std::f64::consts::TAU;
@@ -50,8 +51,9 @@ pub struct Law {
     times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
     names: Vec<String>,
-    /// Internal state: bristle deflection, load, resonator.
+    /// Internal state: what has faded of a spring, resonator.
     state: [f64; 3],
+    bristles: Bristles,
     /// What hangs on the motor by a gap or a grip.
     load: Load,
 }
@@ -79,10 +81,9 @@ impl Law {
                 (a, b) = (get("speed", 1.0), get("exponent", 2.0));
                 vec!["peak".into()]
             }
-            N::PreslidingFriction => {
-                a = get("deflection", 1.0);
-                vec!["coulomb".into()]
-            }
+            // Alike, they are LuGre's, which dampen as they bend.
+            N::PreslidingFriction if get("spread", 1.0) > 1.0 => vec!["coulomb".into()],
+            N::PreslidingFriction => vec!["coulomb".into(), "damping".into()],
             N::QuadraticDrag | N::LoadDependentFriction => vec!["coefficient".into()],
             N::PositionDependentFriction | N::PositionDependentDamping => {
                 (a, b) = (get("low", -1.0), get("high", 1.0));
@@ -90,7 +91,9 @@ impl Law {
             }
             N::FrictionDrift => {
                 a = get("time_constant", 1.0);
-                vec!["coulomb".into(), "viscous".into()]
+                // What is not there does not drift.
+                let both = ["coulomb".to_owned(), "viscous".to_owned()];
+                both.into_iter().take(if get("dry_only", 0.0) > 0.5 { 1 } else { 2 }).collect()
             }
             N::GainDrift => {
                 a = get("time_constant", 1.0);
@@ -131,7 +134,7 @@ impl Law {
             N::CommandDeadband | N::CommandSaturation | N::CommandDelay | N::ElectricalLag => return None,
         };
         let state = [0.0; 3];
-        let load = Load::new(effect);
+        let (bristles, load) = (Bristles::new(effect), Load::new(effect));
         Some(Self {
             name: effect.name,
             a,
@@ -143,6 +146,7 @@ impl Law {
             times,
             names,
             state,
+            bristles,
             load,
         })
     }
@@ -186,13 +190,13 @@ impl Law {
                 }
             }
             N::StribeckFriction => out[0] = -way * (-(velocity.abs() / self.a).powf(self.b)).exp(),
+            // Bristles bend on where the sign is too unsure for dry friction, and hold alone there.
             N::PreslidingFriction => {
-                // Dahl with exponent 1: dz/dq = (1 − z·sgn v)/deflection, so z relaxes towards the sign of motion.
-                // Bristles bend on where the sign is too unsure for dry friction, and hold alone there.
-                let bends = sign(s.velocity);
-                let z = bends + (self.state[0] - bends) * (-(s.velocity * s.dt).abs() / self.a).exp();
-                out[0] = way - 0.5 * (z + self.state[0]);
-                self.state[0] = z;
+                let (bent, more) = self.bristles.bend(s.velocity * s.dt);
+                out[0] = way - bent;
+                if let Some(damping) = out.get_mut(1) {
+                    *damping = if s.dt > 0.0 { -more / s.dt } else { 0.0 };
+                }
             }
             N::QuadraticDrag => out[0] = -velocity * velocity.abs(),
             N::LoadDependentFriction => out[0] = -way * s.external.abs(),
@@ -202,7 +206,9 @@ impl Law {
             N::FrictionDrift => {
                 let settled = 1.0 - (-s.time / self.a).exp();
                 out[0] = -way * settled;
-                out[1] = -velocity * settled;
+                if let Some(viscous) = out.get_mut(1) {
+                    *viscous = -velocity * settled;
+                }
             }
             N::GainDrift if self.at_once_s.is_finite() => {
                 out[0] = if s.time >= self.at_once_s { s.drive } else { 0.0 };
@@ -325,22 +331,39 @@ mod tests {
         Law::new(&Effect::shaped(EffectName::PreslidingFriction, &[("deflection", 1.0)])).unwrap()
     }
 
-    /// The bristles' force after a long slide forward and one step.
-    fn after_a_slide(velocity: f64, rest: bool) -> f64 {
-        let (mut law, mut out) = (bristles(), [0.0]);
+    /// The bristles' force and their damping after a long slide forward and one step.
+    fn after_a_slide(velocity: f64, rest: bool) -> [f64; 2] {
+        let (mut law, mut out) = (bristles(), [0.0; 2]);
         law.terms(&State { velocity: 100.0, dt: 1.0, ..State::default() }, &mut out);
         law.terms(&State { velocity, rest, dt: 1e-3, ..State::default() }, &mut out);
-        out[0]
+        out
     }
 
     #[test]
     fn bristles_take_the_place_of_dry_friction_where_its_sign_is_unknown() {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
-        assert!(near(after_a_slide(0.1, false), 0.0), "sliding on, dry friction is whole");
-        assert!(near(after_a_slide(-0.1, false), -2.0), "turned round, the bristles still push back");
+        assert!(near(after_a_slide(0.1, false)[0], 0.0), "sliding on, dry friction is whole");
+        assert!(near(after_a_slide(-0.1, false)[0], -2.0), "turned round, the bristles still push back");
         for velocity in [0.1, 0.0, -0.1] {
-            assert!(near(after_a_slide(velocity, true), -1.0), "at rest they hold alone");
+            assert!(near(after_a_slide(velocity, true)[0], -1.0), "at rest they hold alone");
         }
+    }
+
+    #[test]
+    fn bristles_dampen_only_while_they_bend() {
+        assert!(after_a_slide(0.1, false)[1].abs() < 1e-9, "sliding on, nothing bends");
+        // Turned round at −0.1 they unbend by 2·0.1 of their length a second.
+        assert!((after_a_slide(-0.1, false)[1] - 0.2).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_is_not_there_does_not_drift() {
+        let names = |shape: &[(&str, f64)]| {
+            let drift = Effect::shaped(EffectName::FrictionDrift, shape);
+            Law::new(&drift).unwrap().names().to_vec()
+        };
+        assert_eq!(names(&[]), ["coulomb", "viscous"]);
+        assert_eq!(names(&[("dry_only", 1.0)]), ["coulomb"]);
     }
 
     #[test]

@@ -3,12 +3,14 @@
 //! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state, and [`Plant`] runs a
 //! whole patched rig. Nothing here may know how an effect is found.
 
+mod bristles;
 mod command;
 mod law;
 mod load;
 mod name;
 mod plant;
 
+pub(crate) use bristles::lengths as bristle_lengths;
 pub use command::CommandLaw;
 pub use law::{Law, State};
 pub(crate) use law::{legendre, wave_mean};

@@ -88,6 +88,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
     let pace = random.between(0.22, 0.3);
     let mut slow = 0.0;
     let mut z = 0.0f64;
+    let mut elements = [0.0f64; 9];
     let mut queue = std::collections::VecDeque::new();
     let mut lagged = 0.0;
     let (mut ql, mut vl) = (0.0f64, 0.0f64);
@@ -266,6 +267,16 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 z += rate * dt;
                 let bristle = stiffness * z + 1e-6 * rate;
                 v += (force - bristle) / J * dt;
+                q += v * dt;
+                continue;
+            }
+            if is("bristles_of_many_lengths") {
+                let most = dry / elements.len() as f64;
+                for (i, element) in elements.iter_mut().enumerate() {
+                    let length = 0.05 * s * 10f64.powf(i as f64 / 8.0 - 0.5);
+                    *element = (*element + most / length * v * dt).clamp(-most, most);
+                }
+                v += (force - elements.iter().sum::<f64>()) / J * dt;
                 q += v * dt;
                 continue;
             }
