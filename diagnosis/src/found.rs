@@ -214,10 +214,12 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
             let force = relative_gain(&estimator, held, &less_held_out, &left_held_out);
             let mut sizes = sizes_on(&estimator, bench.tracks, &left_fitted, &less_fitted);
             sizes.extend(sizes_on(&estimator, held, &left_held_out, &less_held_out));
-            let is_bound =
-                last.fit.keys.iter().zip(&last.fit.solution.bound).any(|((key, _), bound)| {
-                    *bound && matches!(key, Key::Term { effect, .. } if *effect == i)
-                });
+            // Bristles without damping are bristles all the same.
+            let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
+            let ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
+            let is_bound = ends.into_iter().any(
+                |((key, _), _)| matches!(key, Key::Term { effect, term } if *effect == i && counts(*term)),
+            );
             let at_bound = is_bound
                 || library::is_at_end(&effect, bench.span)
                 || drifts_too_far(&last.fit, i, effect.name);

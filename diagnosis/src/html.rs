@@ -197,7 +197,7 @@ fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64
 
 fn over_time(out: &mut String, outcome: &Outcome) {
     let unit = &outcome.report.fit.unit;
-    let marked = "<i class=\"key m\"></i> where";
+    let marked = "<span><i class=\"key m\"></i> where</span>";
     let (after, marks_say) = match &outcome.report {
         report if !report.effects.is_empty() => {
             ("with what was found", format!(" {marked} what was found acts most"))
@@ -209,8 +209,8 @@ fn over_time(out: &mut String, outcome: &Outcome) {
     };
     let _ = write!(
         out,
-        "<section><h2>Where: residual over time</h2><p class=note><i class=\"key a\"></i> as it stands <i class=\"key c\"></i> \
-         {after}{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
+        "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it stands</span> <span><i class=\"key c\"></i> \
+         {after}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
     );
     for series in &outcome.evidence.series {
         let kind = if series.held_out { "held out" } else { "fitted" };
@@ -260,8 +260,8 @@ fn over_states(out: &mut String, outcome: &Outcome) {
     let model = if outcome.report.effects.is_empty() { "refitted" } else { "patched" };
     let _ = write!(
         out,
-        "<section><h2>Where: what is left, over states</h2><p class=note><i class=\"key f\"></i> moving forward <i class=\"key r\"></i> moving \
-         backward. Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
+        "<section><h2>Where: what is left, over states</h2><p class=note><span><i class=\"key f\"></i> moving forward</span> <span><i class=\"key r\"></i> moving \
+         backward.</span> Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
     );
     for map in &outcome.evidence.maps {
         draw(out, map, &outcome.report.fit.unit, outcome.evidence.kind.length());

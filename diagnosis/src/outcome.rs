@@ -99,7 +99,6 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
                 }
                 out.push(')');
             }
-            let left_out = if report.effects.len() > 1 { "are" } else { "is" };
             let region = report.effects.first().and_then(|e| e.place.states.first());
             let region = region.map_or(String::new(), |r| {
                 format!(
@@ -111,7 +110,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
                 )
             });
             format!(
-                "The simulation leaves out physics: {out} {left_out} missing{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
+                "The simulation leaves something out: {out}{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
                 percent(fit.refit.holdout),
                 percent(fit.patched.holdout)
             )

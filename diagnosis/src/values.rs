@@ -18,7 +18,7 @@ fn form_sd(name: N, value: &str) -> f64 {
         (N::StribeckFriction, _) => 0.18,
         (N::PositionDependentFriction | N::PositionDependentDamping | N::PositionSpring, _) => 0.13,
         (N::RollerSlip, _) => 0.3,
-        (N::PreslidingFriction, _) => 0.25,
+        (N::PreslidingFriction, _) => 0.15,
         (N::Backlash, _) => 0.4,
         (N::FrictionDrift | N::GainDrift, "time_constant") => 0.06,
         (N::EncoderEccentricity, _) => 0.05,

@@ -96,7 +96,11 @@ fn an_effect_as_large_as_the_force_is_named_alone() {
 fn bristles_of_one_length_and_of_many_are_told_apart_and_named_with_their_stiffness() {
     // Nine lengths over a decade are stiffer from straight than all of the middle one.
     let stiffer = (0..9).map(|i| 10_f64.powf(0.5 - f64::from(i) / 8.0)).sum::<f64>() / 9.0;
-    let cases = [("presliding_friction", false, 1.0), ("bristles_of_many_lengths", true, stiffer)];
+    let cases = [
+        ("presliding_friction", false, 1.0),
+        ("bristles_without_damping", false, 1.0),
+        ("bristles_of_many_lengths", true, stiffer),
+    ];
     for (effect, spread, stiffer) in cases {
         let outcome = run(&rig(OFF, OFFSET), &Setup { closed: true, size: 4.0, ..setup(effect) });
         let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();

@@ -260,12 +260,13 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 ql += vl * dt;
                 continue;
             }
-            if is("presliding_friction") {
+            if is("presliding_friction") || is("bristles_without_damping") {
                 let g = dry;
                 let stiffness = dry / (0.05 * s);
                 let rate = v - stiffness * v.abs() / g * z;
                 z += rate * dt;
-                let bristle = stiffness * z + 1e-6 * rate;
+                let damping = if is("presliding_friction") { 1e-6 } else { 0.0 };
+                let bristle = stiffness * z + damping * rate;
                 v += (force - bristle) / J * dt;
                 q += v * dt;
                 continue;
