@@ -216,8 +216,8 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
             sizes.extend(sizes_on(&estimator, held, &left_held_out, &less_held_out));
             // Bristles without damping are bristles all the same.
             let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
-            let ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
-            let is_bound = ends.into_iter().any(
+            let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
+            let is_bound = ends.any(
                 |((key, _), _)| matches!(key, Key::Term { effect, term } if *effect == i && counts(*term)),
             );
             let at_bound = is_bound

@@ -1,7 +1,8 @@
 //! Bristles that bend before they slide: the hysteresis of friction just after a reversal, as a part of the sliding force.
 //!
-//! One length is Dahl's law (Dahl 1968, exponent 1), which LuGre (Canudas de Wit et al. 1995) dampens. Several, from short to long, are Maxwell-slip elements, each a share of
-//! the force that bends and then slides (Iwan 1966; Lampaert, Al-Bender and Swevers 2003): asperities of many sizes.
+//! One length is Dahl's law (Dahl 1968, exponent 1), which LuGre (Canudas de Wit et al. 1995) dampens. Several, from short
+//! to long, are Maxwell-slip elements, each a share of the force that bends and then slides (Iwan 1966; Lampaert, Al-Bender
+//! and Swevers 2003): asperities of many sizes.
 
 use super::Effect;
 
