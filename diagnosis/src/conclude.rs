@@ -11,13 +11,13 @@ use crate::patch::{patch, place};
 use crate::pipeline::Search;
 use crate::prescribe;
 use crate::report::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
-use crate::residuals::Residuals;
+use crate::residuals::{Residuals, above};
 use crate::rig::Rig;
-use crate::select::Bench;
+use crate::select::{Bench, Candidate};
 use crate::shown::Shown;
 use crate::track::Track;
 use crate::values;
-use crate::verdict::{above, misfit, verdict};
+use crate::verdict::{misfit, verdict};
 use crate::weigh::{Weighed, Weighing, weigh};
 use std::collections::BTreeMap;
 
@@ -30,7 +30,8 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
     let bench = Bench { nominal: &nominal, tracks: &fit_tracks, span: &span, scale };
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
-    let weighing = weigh(&mut s, &bench, &held_tracks, &excitation);
+    let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
+    let weighing = weigh(&mut s, &bench, &refit, &held_tracks, &excitation);
     s.fit_tracks = fit_tracks.clone();
     if let Some(reason) = misfit(&weighing, &nominal) {
         return Outcome::cannot_tell(&nominal.rig, reason);
@@ -42,14 +43,14 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
     let maps_with_all = maps_of(&weighing.shown);
     let (verdict, reason) = verdict(&weighing, &maps_with_all, &held_tracks, &excitation);
     // The verdict rests on all that was weighed, what people see on what is named.
-    let with_named = only_named(&weighing, &bench, &held_tracks, &s);
+    let with_named = only_named(&weighing, &bench, &refit, &held_tracks, &s);
     let Shown { patched, on_fit, on_held, table } = with_named.as_ref().unwrap_or(&weighing.shown);
     let maps = with_named.as_ref().map_or(maps_with_all, maps_of);
     let effects = named_effects(&weighing, with_named.as_ref(), &bench, &s);
     let patched_rig = patch(&s, patched);
     let floor = weighing.floor;
-    let before = above(table.nominal.holdout, floor).max(above(table.refit.holdout, floor));
-    let left = above(table.patched.holdout, floor);
+    let before = above(table.nominal.holdout, floor, 0.0).max(above(table.refit.holdout, floor, 0.0));
+    let left = above(table.patched.holdout, floor, 0.0);
     let mut report = Report {
         format: 1,
         sentence: String::new(),
@@ -78,7 +79,13 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
 
 /// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in
 /// no patched rig.
-fn only_named(weighing: &Weighing, bench: &Bench, held: &[Track], s: &Search) -> Option<Shown> {
+fn only_named(
+    weighing: &Weighing,
+    bench: &Bench,
+    refit: &Candidate,
+    held: &[Track],
+    s: &Search,
+) -> Option<Shown> {
     let named = weighing.named();
     if named.len() == weighing.effects.len() {
         return None;
@@ -88,8 +95,7 @@ fn only_named(weighing: &Weighing, bench: &Bench, held: &[Track], s: &Search) ->
     let noises = [&s.null.noise, &s.last.noise];
     let slow = bench.fit_slow(model, &noises);
     let patched = bench.fit(slow.model, &slow.noise, Colour::White);
-    let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
-    Some(Shown::new(bench, held, &weighing.estimator, &refit, patched))
+    Some(Shown::new(bench, held, &weighing.estimator, refit, patched))
 }
 
 /// The named effects, the one that explains most first.

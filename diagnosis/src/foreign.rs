@@ -4,6 +4,7 @@
 use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
 use crate::select::{Bench, Candidate, PER_COEFFICIENT};
+use rayon::prelude::*;
 
 /// Times in which a force may fade, s.
 const FADES_S: [f64; 6] = [0.1, 0.25, 0.6, 1.5, 4.0, 10.0];
@@ -72,9 +73,10 @@ pub(crate) fn rather(bench: &Bench, fitted: &Candidate, effect: usize, gain: f64
         let least = (MUCH * gain).max(foreign.freedom * PER_COEFFICIENT);
         fit.log_likelihood - fitted.fit.log_likelihood - least
     };
-    like(&fitted.model.effects[effect], bench)
+    let all = like(&fitted.model.effects[effect], bench);
+    let tried: Vec<(f64, Foreign)> = all.into_par_iter().map(|foreign| (more(&foreign), foreign)).collect();
+    tried
         .into_iter()
-        .map(|foreign| (more(&foreign), foreign))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(more, _)| *more > 0.0)
         .map(|(_, foreign)| foreign.says)

@@ -10,7 +10,7 @@ use crate::known::known;
 use crate::library;
 use crate::model::{Key, Model, Nominal};
 use crate::periodic;
-use crate::residuals::{forces, relative_gain};
+use crate::residuals::{above, forces, relative_gain};
 use crate::select::{Bench, Candidate};
 use crate::track::{Total, Track};
 use crate::values;
@@ -189,13 +189,13 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
     let null = Candidate { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
     let inertia = values::scale(bench.nominal, last).0;
     let count = 1.0 / bench.nominal.rig.encoder.counts_per_unit;
-    let explainable = |whole: f64, tracks: &[Track]| {
-        let floor = (estimator.counting(tracks, &last.noise, count) * inertia).powi(2);
-        (whole - floor).max(LEAST_EXPLAINABLE * whole).max(1e-300)
+    let explainable = |left: &[Vec<f64>], tracks: &[Track]| {
+        let floor = estimator.counting(tracks, &last.noise, count) * inertia;
+        above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
     };
     let of_null = left_on_held(&null, &lay_all(&null, bench.nominal, held, &last.noise));
-    let held_out = explainable(square(&of_null, held), held);
-    let fitted = explainable(square(&left_on_fit(&null), bench.tracks), bench.tracks);
+    let held_out = explainable(&of_null, held);
+    let fitted = explainable(&left_on_fit(&null), bench.tracks);
     let (left_held_out, left_fitted) = (left_on_held(last, &with), left_on_fit(last));
     (0..last.model.effects.len())
         .map(|i| {

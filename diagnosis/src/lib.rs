@@ -6,8 +6,10 @@
 //!
 //! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
 //! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic`, `descend`, `select` and `pipeline` (name), `judge`, `known` and `found` (held-out recordings), `locate` and `excitation` (where, and what cannot be told), `rivals`, `foreign`, `weigh` and `confidence` (how sure), `residuals`, `shown`, `verdict`, `conclude`, `patch`,
-//! `values` and `prescribe` (what follows), `outcome` and `html` (what people read).
+//! `screen`, `periodic`, `descend`, `select` and `pipeline` (name), `judge`, `known` and `found` (held-out recordings),
+//! `locate` and `excitation` (where, and what cannot be told), `rivals`, `foreign`, `weigh` and `confidence` (how sure),
+//! `residuals`, `shown`, `verdict`, `conclude`, `patch`, `values` and `prescribe` (what follows), `outcome` and `html`
+//! (what people read).
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]

@@ -75,6 +75,12 @@ pub(crate) fn residuals(
     }
 }
 
+/// Mean square of a residual above what chance makes of it, and at least this part of its own.
+pub(crate) fn above(residual: f64, chance: f64, least: f64) -> f64 {
+    let whole = residual * residual;
+    (whole - chance * chance).max(least * whole)
+}
+
 /// Part of the force that a refit must take from the held-out residual before values are called wrong.
 const REFIT_MATTERS: f64 = 0.02;
 

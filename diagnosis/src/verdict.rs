@@ -5,7 +5,7 @@ use crate::excitation::Excitation;
 use crate::locate::Map;
 use crate::model::Nominal;
 use crate::report::Verdict;
-use crate::residuals::refit_matters;
+use crate::residuals::{above, refit_matters};
 use crate::shown::Shown;
 use crate::track::Track;
 use crate::weigh::{LITTLE_FORCE, Weighing};
@@ -16,11 +16,6 @@ const FOREIGN: f64 = 0.85;
 const DISTURBED: f64 = 0.05;
 /// Part of the refit's mean square that doubtful effects must leave at the most for the mismatch to be called repeatable.
 const REPEATS: f64 = 0.7;
-
-/// Mean square of a residual above what reading whole counts makes of it.
-pub(crate) fn above(residual: f64, floor: f64) -> f64 {
-    (residual * residual - floor * floor).max(0.0)
-}
 
 /// Why the rig's model does not speak of these recordings at all, if it does not.
 pub(crate) fn misfit(weighing: &Weighing, nominal: &Nominal) -> Option<String> {
@@ -50,7 +45,7 @@ pub(crate) fn verdict(
     excitation: &Excitation,
 ) -> (Verdict, Option<String>) {
     let Shown { on_held, table, .. } = &weighing.shown;
-    let left = above(table.patched.holdout, weighing.floor).sqrt();
+    let left = above(table.patched.holdout, weighing.floor, 0.0).sqrt();
     let disturbed = left > DISTURBED * table.force_rms.holdout;
     // What was found and is too unsure to be named still says that the mismatch repeats, if it explains much of it.
     let helps =

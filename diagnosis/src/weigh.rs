@@ -13,7 +13,7 @@ use crate::model::Model;
 use crate::noise::Colour;
 use crate::pipeline::{Search, prune};
 use crate::report::Parameter;
-use crate::residuals::Residuals;
+use crate::residuals::{Residuals, above};
 use crate::rivals;
 use crate::select::{Bench, Candidate};
 use crate::shown::Shown;
@@ -33,6 +33,9 @@ const MUCH_FORCE: f64 = 0.5;
 const MUCH_OF_REFIT: f64 = 0.65;
 /// Part of the refit's mean square that a spring leaves where it may well be a gap.
 const LEAVES_MUCH: f64 = 0.3;
+
+/// Least part of a residual's mean square that counts as more than chance.
+const LEAST_ABOVE: f64 = 0.02;
 
 /// One effect with what speaks for and against it.
 pub(crate) struct Weighed {
@@ -184,9 +187,14 @@ fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> 
 }
 
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
-pub(crate) fn weigh(s: &mut Search, bench: &Bench, held: &[Track], excitation: &Excitation) -> Weighing {
-    let refit = bench.fit(Model::default(), &s.null.noise, Colour::White);
-    let scales = Scales { bench, refit: &refit, held, excitation };
+pub(crate) fn weigh(
+    s: &mut Search,
+    bench: &Bench,
+    refit: &Candidate,
+    held: &[Track],
+    excitation: &Excitation,
+) -> Weighing {
+    let scales = Scales { bench, refit, held, excitation };
     let found = scales.once(s, None);
     let best = scales.without_unsure(s, found);
     if !best.stands_for_swing() {
@@ -268,10 +276,11 @@ impl Scales<'_> {
         let left = s.last.noise.slow * inertia * inertia;
         // What neither counting nor a white disturbance makes.
         let random = floor.hypot(estimator.white(&s.last.noise) * inertia);
+        let of_chance = |residual: f64| above(residual, random, LEAST_ABOVE).max(1e-300);
         let leftover = Leftover {
             of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
             unexplained: [(left_held, refit_held), (table.patched.fit, table.refit.fit)]
-                .map(|(left, refit)| above(left, random) / above(refit, random))
+                .map(|(left, refit)| of_chance(left) / of_chance(refit))
                 .into_iter()
                 .fold(1.0, f64::min),
         };
@@ -322,11 +331,6 @@ impl Scales<'_> {
 
 fn left_by<'a>(tracks: &'a [Track], residuals: &'a Residuals) -> unnamed::Left<'a> {
     unnamed::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
-}
-
-/// Mean square of a residual above what chance makes of it.
-fn above(residual: f64, random: f64) -> f64 {
-    (residual.powi(2) - random.powi(2)).max(0.02 * residual.powi(2)).max(1e-300)
 }
 
 #[cfg(test)]

@@ -30,6 +30,11 @@ pub struct State {
     pub dt: f64,
 }
 
+/// Names of terms of which the second is not always there.
+fn first_or_both(first: &str, second: &str, both: bool) -> Vec<String> {
+    [first, second].into_iter().take(if both { 2 } else { 1 }).map(str::to_owned).collect()
+}
+
 /// Sign with `sgn(0) = 0`.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
@@ -68,22 +73,20 @@ impl Law {
         let (mut a, mut b) = (0.0, 0.0);
         let fades_s = get("fades_s", f64::INFINITY);
         let at_once_s = get("at_once_s", f64::INFINITY);
-        let of_inertia = get("of_inertia", 0.0) > 0.5;
+        let set = |key: &str| get(key, 0.0) > 0.5;
+        let of_inertia = set("of_inertia");
         let names: Vec<String> = match effect.name {
             N::ViscousFriction => vec!["viscous".into()],
             N::CoulombFriction => vec!["coulomb".into()],
             N::AsymmetricFriction => {
-                b = get("viscous_only", 0.0);
-                let both = ["viscous_difference".to_owned(), "coulomb_difference".to_owned()];
-                both.into_iter().take(if b > 0.5 { 1 } else { 2 }).collect()
+                first_or_both("viscous_difference", "coulomb_difference", !set("viscous_only"))
             }
             N::StribeckFriction => {
                 (a, b) = (get("speed", 1.0), get("exponent", 2.0));
                 vec!["peak".into()]
             }
             // Alike, they are LuGre's, which dampen as they bend.
-            N::PreslidingFriction if get("spread", 1.0) > 1.0 => vec!["coulomb".into()],
-            N::PreslidingFriction => vec!["coulomb".into(), "damping".into()],
+            N::PreslidingFriction => first_or_both("coulomb", "damping", get("spread", 1.0) <= 1.0),
             N::QuadraticDrag | N::LoadDependentFriction => vec!["coefficient".into()],
             N::PositionDependentFriction | N::PositionDependentDamping => {
                 (a, b) = (get("low", -1.0), get("high", 1.0));
@@ -92,8 +95,7 @@ impl Law {
             N::FrictionDrift => {
                 a = get("time_constant", 1.0);
                 // What is not there does not drift.
-                let both = ["coulomb".to_owned(), "viscous".to_owned()];
-                both.into_iter().take(if get("dry_only", 0.0) > 0.5 { 1 } else { 2 }).collect()
+                first_or_both("coulomb", "viscous", !set("dry_only"))
             }
             N::GainDrift => {
                 a = get("time_constant", 1.0);
@@ -111,8 +113,7 @@ impl Law {
             N::PositionSpring => {
                 (a, b) = (get("from", 0.0), get("one_sided", 0.0));
                 // Where it is at rest is not known: a force that is there at the start.
-                let both = ["stiffness".to_owned(), "preload".to_owned()];
-                both.into_iter().take(if get("preload", 0.0) > 0.5 { 2 } else { 1 }).collect()
+                first_or_both("stiffness", "preload", set("preload"))
             }
             N::Backlash | N::RollerSlip => vec!["inertia_ratio".into()],
             N::DriveCompliance => {
