@@ -91,7 +91,7 @@ fn only_named(
         return None;
     }
     let all = &s.last.model.effects;
-    let model = Model { effects: named.iter().map(|i| all[*i].clone()).collect() };
+    let model = Model { effects: named.iter().map(|i| all[*i].clone()).collect(), ..s.last.model.clone() };
     let noises = [&s.null.noise, &s.last.noise];
     let slow = bench.fit_slow(model, &noises);
     let patched = bench.fit(slow.model, &slow.noise, Colour::White);

@@ -215,6 +215,12 @@ impl Fit {
         Some(self.theta(0)[column])
     }
 
+    /// Acceleration by the force that is there all the time in one recording.
+    pub(crate) fn bias(&self, r: usize) -> f64 {
+        let column = self.prepared[r].columns.iter().position(|c| c.key == Key::Offset);
+        column.map_or(0.0, |column| self.theta(r)[column])
+    }
+
     /// Amplitudes of an effect whose terms are pairs of cosine and sine, in the first recording.
     pub(crate) fn amplitudes(&self, effect: usize) -> Vec<f64> {
         let of_effect = |(column, theta): (&Column, f64)| {

@@ -33,7 +33,8 @@ pub(crate) struct Found {
     pub(crate) at_bound: bool,
     /// Whether its waves, if it has any, are those of teeth or poles.
     pub(crate) is_comb: bool,
-    /// Size that it would have on each recording, over the size that it has on all, fitted ones first.
+    /// Size that it would have on each recording that plays it, over the size that it has on all, fitted ones first; none
+    /// where no fitted or no held-out one does.
     pub(crate) sizes: Vec<f64>,
 }
 
@@ -93,7 +94,12 @@ impl Found {
     }
 
     fn is_same_size(&self) -> bool {
-        self.sizes.iter().all(|size| SAME_SIZE.contains(size))
+        !self.sizes.is_empty() && self.sizes.iter().all(|size| SAME_SIZE.contains(size))
+    }
+
+    /// Whether it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
+    fn recurs(&self) -> bool {
+        self.is_same_size() && self.share >= MOST_SHARE && self.holdout.low > 0.0 && self.force.low > 0.0
     }
 
     fn takes_all(&self) -> bool {
@@ -116,7 +122,8 @@ impl Found {
         if !self.carries() {
             return Some("its gain does not carry to the held-out recordings".into());
         }
-        if self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0 {
+        let rare = self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0;
+        if rare && !self.recurs() {
             return Some("its gain rests on few moments of the fitted recordings".into());
         }
         if self.share < SHARE && !(self.share >= LEAST_SHARE && self.is_certain()) {
@@ -212,8 +219,10 @@ pub(crate) fn judge_all(bench: &Bench, last: &Candidate, held: &[Track]) -> Vec<
             let share = ((square(&less_held_out, held) - square(&left_held_out, held)) / held_out)
                 .max((square(&less_fitted, bench.tracks) - square(&left_fitted, bench.tracks)) / fitted);
             let force = relative_gain(&estimator, held, &less_held_out, &left_held_out);
-            let mut sizes = sizes_on(&estimator, bench.tracks, &left_fitted, &less_fitted);
-            sizes.extend(sizes_on(&estimator, held, &left_held_out, &less_held_out));
+            let sizes = played(
+                sizes_on(&estimator, bench.tracks, &left_fitted, &less_fitted),
+                sizes_on(&estimator, held, &left_held_out, &less_held_out),
+            );
             // Bristles without damping are bristles all the same.
             let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
             let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
@@ -246,17 +255,38 @@ fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
     dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }
 
-/// Factors on what an effect does on each recording, which is the difference of what is left with it and without it, that
-/// would leave the least.
-fn sizes_on(estimator: &Estimator, tracks: &[Track], with: &[Vec<f64>], without: &[Vec<f64>]) -> Vec<f64> {
+/// Part of the mean square that an effect makes on one recording from which on another plays it.
+const PLAYED: f64 = 0.03;
+
+/// Sizes on the recordings that play an effect, fitted ones first.
+fn played(fitted: Vec<Size>, held: Vec<Size>) -> Vec<f64> {
+    let most = fitted.iter().chain(&held).map(|size| size.square).fold(0.0, f64::max);
+    let of = |sizes: Vec<Size>| -> Vec<f64> {
+        sizes.iter().filter(|size| size.square >= PLAYED * most).map(|size| size.factor).collect()
+    };
+    let (fitted, held) = (of(fitted), of(held));
+    if fitted.is_empty() || held.is_empty() { Vec::new() } else { [fitted, held].concat() }
+}
+
+/// How large an effect is on one recording.
+struct Size {
+    /// Factor on what it does that would leave the least.
+    factor: f64,
+    /// Mean square of what it does.
+    square: f64,
+}
+
+/// Sizes of an effect on each recording; what it does is the difference of what is left with it and without it.
+fn sizes_on(estimator: &Estimator, tracks: &[Track], with: &[Vec<f64>], without: &[Vec<f64>]) -> Vec<Size> {
     let one = |(track, (with, without)): (&Track, (&Vec<f64>, &Vec<f64>))| {
-        let (mut along, mut square) = (0.0, 0.0);
+        let (mut along, mut square, mut moving) = (0.0, 0.0, 0.0);
         for (j, _) in estimator.moving(track).iter().enumerate().filter(|(_, moving)| **moving) {
             let done = without[j] - with[j];
             along += done * with[j];
             square += done * done;
+            moving += 1.0;
         }
-        1.0 + along / f64::max(square, 1e-300)
+        Size { factor: 1.0 + along / f64::max(square, 1e-300), square: square / f64::max(moving, 1.0) }
     };
     tracks.iter().zip(with.iter().zip(without)).map(one).collect()
 }
@@ -313,6 +343,31 @@ mod tests {
             })
         };
         assert!(fitted(2.6) && !fitted(2.0));
+    }
+
+    #[test]
+    fn what_is_rare_where_it_was_fitted_must_recur() {
+        let rare = |found: &mut Found| {
+            found.fit = gain(900.0, 100.0, 1.8);
+            found.holdout = gain(1400.0, 500.0, 2.7);
+        };
+        assert!(may_be_named(rare));
+        assert!(!may_be_named(|found| {
+            rare(found);
+            found.sizes[1] = 2.0;
+        }));
+        assert!(!may_be_named(|found| {
+            rare(found);
+            found.force.low = -0.1;
+        }));
+    }
+
+    #[test]
+    fn a_recording_that_hardly_plays_an_effect_says_nothing_of_its_size() {
+        let size = |factor, square| Size { factor, square };
+        let fitted = || vec![size(1.0, 1.0), size(1.8, 0.01)];
+        assert_eq!(played(fitted(), vec![size(0.9, 0.5)]), [1.0, 0.9]);
+        assert!(played(fitted(), vec![size(0.9, 0.01)]).is_empty(), "no held-out one plays it");
     }
 
     #[test]

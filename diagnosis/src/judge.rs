@@ -2,6 +2,7 @@
 //! the place along the travel at which it started).
 
 use crate::fit::{Fit, Prepared};
+use crate::joint;
 use crate::kalman::{Noise, tolerant};
 use crate::model::{Key, Model, Nominal, own_phase, total};
 use crate::select::Candidate;
@@ -11,8 +12,16 @@ use crate::track::{Total, Track};
 /// A model laid on one held-out recording.
 pub(crate) struct Laid {
     pub(crate) total: Total,
+    /// Acceleration by the force that is there all the time.
+    pub(crate) bias: f64,
     /// Cost of each segment, in log-likelihood.
     pub(crate) costs: Vec<f64>,
+}
+
+impl Laid {
+    fn cost(&self) -> f64 {
+        self.costs.iter().sum()
+    }
 }
 
 /// Pattern of an effect with its own phase: per wave (frequency, cosine, sine), with the recordings' phases undone.
@@ -97,6 +106,28 @@ fn best_shift(period: f64, highest: f64, value: impl Fn(f64) -> f64) -> f64 {
 
 /// Lays a fitted model on a held-out recording under a noise.
 pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise: &Noise) -> Laid {
+    let mut best = lay_once(candidate, nominal, track, noise);
+    if !candidate.model.effects.iter().any(joint::is_joint) {
+        return best;
+    }
+    // The law of a joint takes up the force that is there all the time, which laying it finds.
+    let mut own = track.clone();
+    let mut bias = best.bias;
+    for _ in 0..BIASES {
+        own.bias = bias;
+        let laid = lay_once(candidate, nominal, &own, noise);
+        bias = laid.bias;
+        if laid.cost() < best.cost() {
+            best = Laid { bias: own.bias, ..laid };
+        }
+    }
+    best
+}
+
+/// How often the force that is there all the time is found anew.
+const BIASES: usize = 2;
+
+fn lay_once(candidate: &Candidate, nominal: &Nominal, track: &Track, noise: &Noise) -> Laid {
     let (model, fit) = (&candidate.model, &candidate.fit);
     let one = Prepared::new(model, nominal, track, noise);
     let p = one.columns.len();
@@ -192,7 +223,8 @@ pub(crate) fn lay(candidate: &Candidate, nominal: &Nominal, track: &Track, noise
             },
         )
         .collect();
-    Laid { total: total(track, &one.columns, &theta), costs }
+    let bias = offset.map_or(0.0, |o| theta[o]);
+    Laid { total: total(track, &one.columns, &theta), bias, costs }
 }
 
 /// Deterministic pseudo-random numbers (xorshift64*), seeded by a constant.

@@ -76,7 +76,7 @@ mod tests {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
         let span = Span::of(&[slide(10.0)], &nominal);
-        let model = |name| Model { effects: vec![Effect::shaped(name, &[])] };
+        let model = |name| Model { effects: vec![Effect::shaped(name, &[])], ..Model::default() };
         let unknown = |to: f64, name| {
             let tracks = [slide(to)];
             let tracks = known(&tracks, &model(name), &span);

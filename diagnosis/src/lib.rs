@@ -26,6 +26,8 @@ mod fit;
 mod foreign;
 mod found;
 mod html;
+mod inputs;
+mod joint;
 mod judge;
 mod kalman;
 mod known;

@@ -1,7 +1,7 @@
 //! Which shapes of each effect are worth trying on given recordings: the grids from which refinement starts.
 
 use crate::effects::{Effect, EffectName as N};
-use crate::model::Nominal;
+use crate::model::{Machine, Nominal};
 use crate::track::Track;
 
 /// What the recordings span.
@@ -85,9 +85,8 @@ impl Span {
     }
 
     /// Least command at which a grip lets go: what slips under friction alone never held.
-    fn least_grip(&self, nominal: &Nominal) -> f64 {
-        (nominal.dry_deceleration() / nominal.known_gain().abs())
-            .clamp(0.02 * self.command, 0.5 * self.command)
+    fn least_grip(&self, machine: &Machine) -> f64 {
+        (machine.dry / machine.per_command.abs()).clamp(0.02 * self.command, 0.5 * self.command)
     }
 
     pub(crate) fn travel(&self) -> f64 {
@@ -124,6 +123,7 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
     if nominal.holds(name) {
         return Vec::new();
     }
+    let machine = nominal.machine(None);
     let one = |key: &str, values: Vec<f64>| -> Vec<Effect> {
         values.into_iter().map(|value| Effect::shaped(name, &[(key, value)])).collect()
     };
@@ -186,12 +186,11 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
         ),
         N::RollerSlip => {
             let mut out = Vec::new();
-            let own = [("coast", nominal.dry_deceleration()), ("ratio", 1.0)];
-            let machine = nominal.machine();
+            let own = [("coast", machine.dry), ("ratio", 1.0)];
             for creep in [0.003, 0.02].map(|part| part * span.speed) {
-                for limit in logarithmic(span.least_grip(nominal), 0.945 * span.command, 10) {
+                for limit in logarithmic(span.least_grip(&machine), 0.945 * span.command, 10) {
                     let shape = [("limit", limit), ("creep", creep)];
-                    out.push(Effect::shaped(name, &[shape.as_slice(), &own, &machine].concat()));
+                    out.push(Effect::shaped(name, &[shape.as_slice(), &own, &machine.shape()].concat()));
                 }
             }
             out
@@ -212,12 +211,11 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             out
         }
         N::Backlash => {
-            let machine = nominal.machine();
             let mut out = Vec::new();
-            for coast in [0.6, 1.5].map(|part| part * nominal.dry_deceleration()) {
+            for coast in [0.6, 1.5].map(|part| part * machine.dry) {
                 for gap in logarithmic(2.0 * span.count, span.widest_gap(), 12) {
                     let shape = [("gap", gap), ("coast", coast), ("contact_hz", 180.0), ("ratio", 1.0)];
-                    out.push(Effect::shaped(name, &[shape.as_slice(), &machine].concat()));
+                    out.push(Effect::shaped(name, &[shape.as_slice(), &machine.shape()].concat()));
                 }
             }
             out
@@ -251,7 +249,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::RollerSlip => {
             let dry = effect.shape_or("dry", 1.0);
             vec![
-                ("limit", 0.01 * span.command, span.command),
+                ("limit", 0.01 * span.command, 2.0 * span.command),
                 ("creep", 1e-4 * span.speed, 0.3 * span.speed),
                 ("coast", 0.35 * dry, 2.5 * dry),
                 ("ratio", RATIOS.0, RATIOS.1),
@@ -293,11 +291,21 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
         })
 }
 
-/// Whether values of a shape go together: a grip holds its load against the load's own friction, or it never held.
+/// Whether values of a shape go together: the load's own friction is no more than the machine's, and a grip holds its load
+/// against it, or it never held.
 pub(crate) fn is_possible(effect: &Effect) -> bool {
     let get = |key: &str| effect.shape_or(key, 0.0);
-    effect.name != N::RollerSlip || get("limit") * get("per_command").abs() >= HOLDS * get("coast")
+    let own = get("coast") * get("ratio") / (1.0 + get("ratio"));
+    let holds = || get("limit") * get("per_command").abs() >= HOLDS * get("coast");
+    match effect.name {
+        N::RollerSlip => own <= MOST_OF_DRY * get("dry") && holds(),
+        N::Backlash => own <= MOST_OF_DRY * get("dry"),
+        _ => true,
+    }
 }
+
+/// Part of the machine's friction that the load's may be: the rig may have the machine's too small.
+const MOST_OF_DRY: f64 = 1.2;
 
 /// What a grip carries at the least over its load's own friction, of which the rig tells no more than this.
 const HOLDS: f64 = 0.9;

@@ -1,6 +1,8 @@
 //! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
 
-use crate::effects::{CommandLaw, Effect, EffectName, Law, State};
+use crate::effects::{CommandLaw, Effect, EffectName};
+use crate::fit::Fit;
+use crate::inputs::effect_inputs;
 use crate::kalman::Noise;
 use crate::rig::Rig;
 use crate::solve::Prior;
@@ -43,6 +45,31 @@ pub(crate) struct Nominal {
     pub(crate) anchor: Option<(f64, f64)>,
     /// Whether the refit explains most of the force.
     pub(crate) is_balanced: bool,
+}
+
+/// What the law of a joint takes from the whole machine, all per inertia: per unit of command and of the measured load, by dry
+/// and viscous friction, and by the weight.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Machine {
+    pub(crate) per_command: f64,
+    pub(crate) dry: f64,
+    viscous: f64,
+    per_force: f64,
+    weight: f64,
+}
+
+impl Machine {
+    /// The values of a shape.
+    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
+        let Self { per_command, dry, viscous, per_force, weight } = *self;
+        [
+            ("per_command", per_command),
+            ("dry", dry),
+            ("viscous", viscous),
+            ("per_force", per_force),
+            ("weight", weight),
+        ]
+    }
 }
 
 /// How many standard deviations a nominal value may move in a refit.
@@ -224,18 +251,18 @@ impl Nominal {
         dry / self.known_inertia()
     }
 
-    /// What the law of a second mass takes from the whole machine, per inertia.
-    pub(crate) fn machine(&self) -> [(&'static str, f64); 6] {
+    /// What the law of a joint takes from the whole machine: as fitted, or as the rig has it.
+    pub(crate) fn machine(&self, fit: Option<&Fit>) -> Machine {
         let model = &self.rig.model;
+        let fitted = |key: Key, otherwise: f64| fit.and_then(|fit| fit.value(key)).unwrap_or(otherwise);
         let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
-        [
-            ("per_command", self.known_gain()),
-            ("dry", self.dry_deceleration()),
-            ("viscous", per_inertia(model.viscous)),
-            ("per_force", per_inertia(Some(self.external))),
-            ("weight", per_inertia(model.weight)),
-            ("offset", per_inertia(model.offset)),
-        ]
+        Machine {
+            per_command: fitted(Key::Gain, self.known_gain()),
+            dry: fitted(Key::Coulomb, self.dry_deceleration()),
+            viscous: fitted(Key::Viscous, per_inertia(model.viscous)),
+            per_force: fitted(Key::External, per_inertia(Some(self.external))),
+            weight: fitted(Key::Weight, per_inertia(model.weight)),
+        }
     }
 
     /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
@@ -249,6 +276,9 @@ impl Nominal {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Model {
     pub(crate) effects: Vec<Effect>,
+    /// Acceleration by the force that is there all the time, for a second mass to take up, per fitted recording; where there is
+    /// none the track's own.
+    pub(crate) bias: Vec<f64>,
 }
 
 /// The effective commands of recordings under effects of which the last acts on the command; none where it does not.
@@ -297,11 +327,6 @@ fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
-fn scales_drive(name: EffectName) -> bool {
-    matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
-}
-
 /// Whether each recording has its own phase, so that coefficients are not shared.
 pub(crate) fn own_phase(name: EffectName) -> bool {
     matches!(
@@ -318,84 +343,12 @@ pub(crate) fn direction(track: &Track) -> Vec<f64> {
     track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
 }
 
-/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
-const SECOND_MASS_STEP_S: f64 = 6e-4;
-const GRIP_STEP_S: f64 = 1e-3;
-
-/// The inputs of one effect on force or sensor over a recording; `drive` is the command's, asked for only where the effect
-/// scales it.
-pub(crate) fn effect_inputs(
-    track: &Track,
-    effect: &Effect,
-    command: &[f64],
-    drive: impl FnOnce() -> Input,
-) -> Vec<Input> {
-    if effect.name == EffectName::MissedCounts {
-        return vec![Input::Sensor(track.lost.clone())];
-    }
-    let Some(mut law) = Law::new(effect) else { return Vec::new() };
-    let count = law.names().len();
-    let n = track.blocks();
-    if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
-        // What a second mass does is faster than a block.
-        let mut out = vec![0.0];
-        let mut signal = Vec::with_capacity(command.len());
-        let longest = if effect.name == EffectName::RollerSlip { GRIP_STEP_S } else { SECOND_MASS_STEP_S };
-        let (block, step) = (track.rows_per_block, track.rows_per_step(longest));
-        let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
-        for (j, (command, hold)) in blocks.enumerate() {
-            let (tilt, external) = (track.tilt_at(j.min(n - 1)), track.force_at(j.min(n - 1)));
-            let mut passed = 0.0;
-            for (command, hold) in command.chunks(step).zip(hold.chunks(step)) {
-                let dt: f64 = hold.iter().sum();
-                let velocity = track.velocity_within(j.min(n - 1), passed + 0.5 * dt);
-                passed += dt;
-                let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / dt;
-                let state =
-                    State { drive: mean, command: mean, velocity, tilt, external, dt, ..State::default() };
-                law.terms(&state, &mut out);
-                signal.extend(std::iter::repeat_n(out[0], command.len()));
-            }
-        }
-        return vec![track.rows_input(&signal)];
-    }
-    let mut columns = vec![Vec::with_capacity(n); count];
-    let mut out = vec![0.0; count];
-    for j in 0..n {
-        let state = State {
-            position: track.x[j],
-            velocity: track.v[j],
-            acceleration: track.acceleration(j),
-            rest: track.rest[j],
-            drive: 1.0,
-            command: 1.0,
-            tilt: track.tilt_at(j),
-            external: track.force_at(j),
-            time: track.start[j] + 0.5 * track.span[j],
-            dt: track.span[j],
-        };
-        law.terms(&state, &mut out);
-        for (column, term) in columns.iter_mut().zip(&out) {
-            column.push(*term);
-        }
-    }
-    let sensor = law.in_sensor();
-    let drive = scales_drive(effect.name).then(drive);
-    columns
-        .into_iter()
-        .map(|column| {
-            if sensor {
-                Input::Sensor(column)
-            } else if let Some(drive) = &drive {
-                drive.scaled(&column)
-            } else {
-                Input::Held(column)
-            }
-        })
-        .collect()
-}
-
 impl Model {
+    /// Acceleration by the force that is there all the time in a recording.
+    fn bias_on(&self, track: &Track) -> f64 {
+        track.place.and_then(|place| self.bias.get(place)).copied().unwrap_or(track.bias)
+    }
+
     /// The columns of this model over a recording, nominal terms first.
     pub(crate) fn columns(&self, nominal: &Nominal, track: &Track, noise: &Noise) -> Vec<Column> {
         let effective = effective_command(track, &self.effects);
@@ -420,8 +373,9 @@ impl Model {
             push(Key::External, Input::Held(force.clone()), false);
         }
         for (index, effect) in self.effects.iter().enumerate() {
-            for (term, input) in
-                effect_inputs(track, effect, command, || drive.clone()).into_iter().enumerate()
+            for (term, input) in effect_inputs(track, effect, command, self.bias_on(track), || drive.clone())
+                .into_iter()
+                .enumerate()
             {
                 push(Key::Term { effect: index, term }, input, own_phase(effect.name));
             }

@@ -51,6 +51,8 @@ fn excerpt(track: &Track, total: &Total, from: usize, to: usize) -> Excerpt {
         stuck: track.stuck[from..to].to_vec(),
         unknown: vec![false; to - from],
         segments: vec![0, to - from],
+        place: None,
+        bias: 0.0,
         lost: Vec::new(),
         speed_floor: track.speed_floor,
         stops_from: track.stops_from,

@@ -5,6 +5,7 @@ use crate::error::InputError;
 use crate::estimate::Estimator;
 use crate::fit::Fit;
 use crate::found::{Found, judge_all, lay_all};
+use crate::joint;
 use crate::kalman::Noise;
 use crate::known::known;
 use crate::library::Span;
@@ -47,6 +48,9 @@ fn smooth_held(candidate: &Candidate, nominal: &Nominal, span: &Span, tracks: &m
     null::resmooth(tracks, &drives, &crate::noise::guess(tracks, scale), count);
     for _ in 0..3 {
         let laid = lay_all(candidate, nominal, &known(tracks, &candidate.model, span), &candidate.noise);
+        for (track, laid) in tracks.iter_mut().zip(&laid) {
+            track.bias = laid.bias;
+        }
         let totals: Vec<Total> = laid.into_iter().map(|laid| laid.total).collect();
         null::resmooth(tracks, &totals, &candidate.noise, count);
     }
@@ -60,6 +64,7 @@ fn in_its_own_motion(tracks: &[Track], candidate: Candidate, on: &Bench) -> (Vec
     null::resmooth(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count);
     let bench = Bench { tracks: &own, ..*on };
     let again = bench.fit(candidate.model, &candidate.noise, Colour::White);
+    let again = joint::settled(&bench, again);
     (own, again)
 }
 
@@ -86,7 +91,8 @@ fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Nois
         if tracks.iter().all(|track| track.lost.iter().all(|lost| *lost == 0.0)) {
             return;
         }
-        let model = Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])] };
+        let model =
+            Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])], ..Model::default() };
         let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
         noise = crate::noise::estimate(tracks, &totals, &noise, scale, Colour::White);
     }
@@ -178,6 +184,9 @@ pub(crate) fn search(
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
     smooth_held(&first, &nominal, &span, &mut held, scale);
     find_steps(&nominal, &span, &mut held, &noise, scale);
+    for (r, track) in tracks.iter_mut().enumerate() {
+        (track.place, track.bias) = (Some(r), first.fit.bias(r));
+    }
     let bench = Bench { nominal: &nominal, tracks: &tracks, span: &span, scale };
     let white = bench.fit(Model::default(), &noise, Colour::White);
     let slow = bench.fit_slow(Model::default(), &[&noise, &white.noise]);

@@ -2,8 +2,9 @@
 
 use crate::effects::Effect;
 use crate::fit::{Fit, Prepared, dot};
+use crate::inputs::effect_inputs;
 use crate::library;
-use crate::model::{Model, Nominal, effect_inputs, effective_command, effective_commands, own_phase};
+use crate::model::{Model, Nominal, effective_command, effective_commands, own_phase};
 use crate::select::PER_COEFFICIENT;
 use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
@@ -28,7 +29,7 @@ fn added_inputs(model: &Model, track: &Track, effect: &Effect, after: Option<&Ve
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
-    effect_inputs(track, effect, command, || track.rows_input(command))
+    effect_inputs(track, effect, command, track.bias, || track.rows_input(command))
 }
 
 /// Sums that a score test needs: information of the terms with the model projected out, and their score.

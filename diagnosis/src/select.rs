@@ -3,6 +3,7 @@
 use crate::descend::descend;
 use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
+use crate::joint;
 use crate::kalman::Noise;
 use crate::library::{self, Span};
 use crate::model::{Model, Nominal, effective_commands};
@@ -231,7 +232,7 @@ impl Bench<'_> {
     }
 
     /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
-    fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
+    pub(crate) fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
         let effect = model.effects.last().expect("there is an effect to polish");
         let effective = effective_commands(self.tracks, &model.effects);
         let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);
@@ -275,6 +276,11 @@ impl Bench<'_> {
                 }
             }
         }
+        if let Some((value, found)) =
+            joint::search(self, &model, &candidate.noise, &merit).filter(|f| f.0 > best)
+        {
+            (best, model) = (value, found);
+        }
         for (key, low, high) in movable.iter().copied() {
             let at = model.effects[last].shape[key];
             let ends = ((at / 1.6).max(low), (at * 1.6).min(high));
@@ -290,6 +296,7 @@ impl Bench<'_> {
             }
         }
         let model = descend(self, model, &candidate.noise, best, &merit);
+        let model = joint::settle(self, model, &candidate.noise, &merit);
         self.fit(model, &candidate.noise, Colour::White)
     }
 }

@@ -55,6 +55,10 @@ pub(crate) struct Track {
     pub(crate) unknown: Vec<bool>,
     /// Bounds of the segments that gains are counted in, as block indices; one more than segments.
     pub(crate) segments: Vec<usize>,
+    /// Its place among the fitted recordings; none where it is held out.
+    pub(crate) place: Option<usize>,
+    /// Acceleration by the force that is there all the time, of a model fitted before.
+    pub(crate) bias: f64,
     /// Travel that the encoder seems to have lost so far, where steps were found.
     pub(crate) lost: Vec<f64>,
     /// Speed below which its sign is not known.
@@ -103,6 +107,8 @@ impl Track {
             stuck: vec![false; n],
             unknown: vec![false; n],
             segments: Vec::new(),
+            place: None,
+            bias: 0.0,
             lost: vec![0.0; n],
             speed_floor: 0.0,
             stops_from: 0.5 * recording.duration_s() / n.max(1) as f64 * rig.model.coulomb.unwrap_or(0.0)

@@ -327,7 +327,7 @@ pub(crate) fn parameters(bench: &Bench, candidate: &Candidate, effect: usize) ->
             let ratio_of_load = (term(0).0 / ratio).abs();
             let part = ratio_of_load / (1.0 + ratio_of_load);
             let part_sd = (term(0).1 / ratio).abs() / (1.0 + ratio_of_load).powi(2);
-            let drive = limit * inertia * ratio.abs();
+            let drive = limit * inertia * found.shape_or("per_command", ratio).abs();
             let value = part * drive;
             let sd =
                 ((part * s / limit * drive).powi(2) + (part_sd * drive).powi(2) + (value * common).powi(2))

@@ -24,6 +24,8 @@ pub struct State {
     pub tilt: f64,
     /// External load on the coordinate, N·m or N.
     pub external: f64,
+    /// Acceleration by the force that is there all the time, rad/s² or m/s².
+    pub bias: f64,
     /// Since the start, s.
     pub time: f64,
     /// Length of the step, s.

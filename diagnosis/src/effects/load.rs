@@ -24,10 +24,9 @@ pub(crate) struct Load {
     per_command: f64,
     dry: f64,
     viscous: f64,
-    /// Acceleration of the whole machine per unit of the measured load, by its weight, and by its offset.
+    /// Acceleration of the whole machine per unit of the measured load, and by its weight.
     per_force: f64,
     weight: f64,
-    offset: f64,
     /// Deceleration of the load by its own dry friction, and its friction over that of the whole machine, per inertia.
     coast: f64,
     share: f64,
@@ -68,7 +67,6 @@ impl Load {
             viscous: get("viscous", 0.0),
             per_force: get("per_force", 0.0),
             weight: get("weight", 0.0),
-            offset: get("offset", 0.0),
             coast,
             share: if dry > 0.0 { coast / dry } else { 1.0 },
             limit: get("limit", f64::INFINITY),
@@ -126,7 +124,7 @@ impl Load {
     fn held(&self, s: &State) -> Held {
         let way = if s.velocity == 0.0 { 0.0 } else { s.velocity.signum() };
         let friction = self.dry * way + self.viscous * s.velocity;
-        let pulled = (self.per_force * s.external + self.weight * s.tilt.sin() + self.offset) / self.ratio;
+        let pulled = (self.per_force * s.external + self.weight * s.tilt.sin() + s.bias) / self.ratio;
         Held {
             apart: (1.0 + self.ratio) * pulled + (1.0 + self.ratio * (1.0 - self.share)) * friction,
             missed: (1.0 - self.share) * friction + pulled,

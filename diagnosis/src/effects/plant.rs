@@ -72,6 +72,7 @@ impl Plant {
             command: effective,
             tilt: around.tilt,
             external: around.external,
+            bias: model.offset.unwrap_or(0.0) / model.inertia,
             time: self.time,
             dt,
             ..State::default()

@@ -1,0 +1,94 @@
+//! What one effect puts into a recording: the inputs of its terms. Nothing here is fitted.
+
+use crate::effects::{Effect, EffectName, Law, State};
+use crate::track::{Input, Track};
+
+/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
+const SECOND_MASS_STEP_S: f64 = 6e-4;
+const GRIP_STEP_S: f64 = 1e-3;
+
+/// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
+fn scales_drive(name: EffectName) -> bool {
+    matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
+}
+
+/// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
+/// time, `drive` is the command's input, asked for only where the effect scales it.
+pub(crate) fn effect_inputs(
+    track: &Track,
+    effect: &Effect,
+    command: &[f64],
+    bias: f64,
+    drive: impl FnOnce() -> Input,
+) -> Vec<Input> {
+    if effect.name == EffectName::MissedCounts {
+        return vec![Input::Sensor(track.lost.clone())];
+    }
+    let Some(mut law) = Law::new(effect) else { return Vec::new() };
+    if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
+        return vec![of_second_mass(track, effect, &mut law, command, bias)];
+    }
+    let count = law.names().len();
+    let n = track.blocks();
+    let mut columns = vec![Vec::with_capacity(n); count];
+    let mut out = vec![0.0; count];
+    for j in 0..n {
+        let state = State {
+            position: track.x[j],
+            velocity: track.v[j],
+            acceleration: track.acceleration(j),
+            rest: track.rest[j],
+            drive: 1.0,
+            command: 1.0,
+            tilt: track.tilt_at(j),
+            external: track.force_at(j),
+            bias,
+            time: track.start[j] + 0.5 * track.span[j],
+            dt: track.span[j],
+        };
+        law.terms(&state, &mut out);
+        for (column, term) in columns.iter_mut().zip(&out) {
+            column.push(*term);
+        }
+    }
+    let sensor = law.in_sensor();
+    let drive = scales_drive(effect.name).then(drive);
+    columns
+        .into_iter()
+        .map(|column| {
+            if sensor {
+                Input::Sensor(column)
+            } else if let Some(drive) = &drive {
+                drive.scaled(&column)
+            } else {
+                Input::Held(column)
+            }
+        })
+        .collect()
+}
+
+/// What a second mass does is faster than a block.
+fn of_second_mass(track: &Track, effect: &Effect, law: &mut Law, command: &[f64], bias: f64) -> Input {
+    let mut out = vec![0.0];
+    let mut signal = Vec::with_capacity(command.len());
+    let last = track.blocks() - 1;
+    let longest = if effect.name == EffectName::RollerSlip { GRIP_STEP_S } else { SECOND_MASS_STEP_S };
+    let (block, step) = (track.rows_per_block, track.rows_per_step(longest));
+    let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
+    for (j, (command, hold)) in blocks.enumerate() {
+        let j = j.min(last);
+        let (tilt, external) = (track.tilt_at(j), track.force_at(j));
+        let mut passed = 0.0;
+        for (command, hold) in command.chunks(step).zip(hold.chunks(step)) {
+            let dt: f64 = hold.iter().sum();
+            let velocity = track.velocity_within(j, passed + 0.5 * dt);
+            passed += dt;
+            let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / dt;
+            let state =
+                State { drive: mean, command: mean, velocity, tilt, external, bias, dt, ..State::default() };
+            law.terms(&state, &mut out);
+            signal.extend(std::iter::repeat_n(out[0], command.len()));
+        }
+    }
+    track.rows_input(&signal)
+}
