@@ -378,10 +378,16 @@ mod tests {
             |deflection| creeps(&Effect::shaped(N::PreslidingFriction, &[("deflection", deflection)]), &span);
         assert_eq!((bristles(1e-3), bristles(0.3), bristles(2.0)), (None, None, Some(0.1)));
         let grip = |limit, coast| {
-            let shape = [("limit", limit), ("coast", coast), ("per_command", -10.0)];
+            let shape =
+                [("limit", limit), ("coast", coast), ("per_command", -10.0), ("dry", 5.0), ("ratio", 1.0)];
             is_possible(&Effect::shaped(N::RollerSlip, &shape))
         };
         assert!(grip(0.5, 5.0) && !grip(0.5, 6.0), "what cannot move its load is no grip");
+        let gap = |ratio| {
+            let shape = [("coast", 6.0), ("dry", 4.0), ("ratio", ratio)];
+            is_possible(&Effect::shaped(N::Backlash, &shape))
+        };
+        assert!(gap(3.0) && !gap(5.0), "a load has no more friction than the machine");
         assert!(!at_end(N::ElectricalLag, 1e-6), "what is instant may be no lag, and is judged by its size");
     }
 }

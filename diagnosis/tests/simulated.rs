@@ -114,6 +114,18 @@ fn bristles_of_one_length_and_of_many_are_told_apart_and_named_with_their_stiffn
 }
 
 #[test]
+fn a_grip_that_lets_go_is_found_although_the_rig_has_the_machine_wrong() {
+    // Its law stands on the machine and on a force that is there all the time, another one in each recording.
+    let outcome = run(&rig(OFF, OFFSET), &setup("grip"));
+    let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, ["roller_slip"], "{}", outcome.summary());
+    let value = outcome.report.effects[0].parameters["ceiling"].value;
+    assert!((value / common::GRIP - 1.0).abs() < 0.15, "ceiling {value} instead of {}", common::GRIP);
+    let fit = &outcome.report.fit;
+    assert!(fit.patched.holdout < 0.2 * fit.refit.holdout, "{}", outcome.summary());
+}
+
+#[test]
 fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
     // Neither carries to the held-out recording without the other, and a preloaded spring is no friction.
     let mut rig = rig(OFF, "");

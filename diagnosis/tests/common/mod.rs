@@ -31,6 +31,9 @@ pub const C: f64 = 4.0e-4;
 pub const GAIN: f64 = 0.0234;
 pub const COUNTS: f64 = 636.619_772_4;
 
+/// Force at which a grip of size 1 lets go, N·m.
+pub const GRIP: f64 = 7e-4;
+
 /// The nominal rig, with values off by the given relative errors of inertia, viscous, coulomb and gain.
 pub fn rig(off: [f64; 4], extra: &str) -> Rig {
     let text = format!(
@@ -258,6 +261,18 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 step(&mut vl, al, half / jl, dt);
                 q += v * dt;
                 ql += vl * dt;
+                continue;
+            }
+            if is("grip") {
+                // Another standing force in each recording.
+                let standing = C * if part % 2 == 0 { 0.2 } else { -0.1 };
+                let (jl, jm, half) = (0.55 * J, 0.45 * J, 0.5 * dry);
+                let traction = GRIP / s * ((v - vl) / 0.2).tanh();
+                let (a, al) =
+                    ((force + 0.5 * B * v - traction) / jm, (traction - 0.5 * B * vl + standing) / jl);
+                step(&mut v, a, half / jm, dt);
+                step(&mut vl, al, half / jl, dt);
+                q += v * dt;
                 continue;
             }
             if is("presliding_friction") || is("bristles_without_damping") {
