@@ -265,7 +265,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             }
             if is("grip") {
                 // Another standing force in each recording.
-                let standing = C * if part % 2 == 0 { 0.2 } else { -0.1 };
+                let standing = C * if part.is_multiple_of(2) { 0.2 } else { -0.1 };
                 let (jl, jm, half) = (0.55 * J, 0.45 * J, 0.5 * dry);
                 let traction = GRIP / s * ((v - vl) / 0.2).tanh();
                 let (a, al) =
