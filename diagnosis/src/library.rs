@@ -249,6 +249,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<(&'static str, f64, f
         N::RollerSlip => {
             let dry = effect.shape_or("dry", 1.0);
             vec![
+                // Beyond the largest command: what the load's own friction takes a grip carries too.
                 ("limit", 0.01 * span.command, 2.0 * span.command),
                 ("creep", 1e-4 * span.speed, 0.3 * span.speed),
                 ("coast", 0.35 * dry, 2.5 * dry),
