@@ -20,14 +20,15 @@ const PARTS: [f64; 3] = [1.0, 0.4, 0.15];
 /// Gain of log-likelihood below which it is not worth going on.
 const ENOUGH: f64 = 0.5;
 
-/// The model with the shape of its last effect where `merit` is larger than `best`, as far as steps downhill lead.
+/// The model with the shape of its last effect where `merit` is larger than `best`, as far as steps downhill lead, and what
+/// it is worth there.
 pub(crate) fn descend(
     bench: &Bench,
     mut model: Model,
     noise: &Noise,
     mut best: f64,
     merit: &dyn Fn(&Model) -> f64,
-) -> Model {
+) -> (f64, Model) {
     let last = model.effects.len() - 1;
     let movable = library::movable(&model.effects[last], bench.span);
     for _ in 0..STEPS {
@@ -48,7 +49,7 @@ pub(crate) fn descend(
             break;
         }
     }
-    model
+    (best, model)
 }
 
 /// The change of each value's logarithm that would leave the least.

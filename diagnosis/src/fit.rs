@@ -211,14 +211,17 @@ impl Fit {
 
     /// A shared coefficient by its key (the first recording's where each has its own).
     pub(crate) fn value(&self, key: Key) -> Option<f64> {
-        let column = self.prepared[0].columns.iter().position(|c| c.key == key)?;
-        Some(self.theta(0)[column])
+        self.value_on(0, key)
     }
 
     /// Acceleration by the force that is there all the time in one recording.
     pub(crate) fn bias(&self, r: usize) -> f64 {
-        let column = self.prepared[r].columns.iter().position(|c| c.key == Key::Offset);
-        column.map_or(0.0, |column| self.theta(r)[column])
+        self.value_on(r, Key::Offset).unwrap_or(0.0)
+    }
+
+    fn value_on(&self, r: usize, key: Key) -> Option<f64> {
+        let column = self.prepared[r].columns.iter().position(|c| c.key == key)?;
+        Some(self.theta(r)[column])
     }
 
     /// Amplitudes of an effect whose terms are pairs of cosine and sine, in the first recording.

@@ -13,7 +13,7 @@ fn scales_drive(name: EffectName) -> bool {
 }
 
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
-/// time, `drive` is the command's input, asked for only where the effect scales it.
+/// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.
 pub(crate) fn effect_inputs(
     track: &Track,
     effect: &Effect,
@@ -42,9 +42,9 @@ pub(crate) fn effect_inputs(
             command: 1.0,
             tilt: track.tilt_at(j),
             external: track.force_at(j),
-            bias,
             time: track.start[j] + 0.5 * track.span[j],
             dt: track.span[j],
+            ..State::default()
         };
         law.terms(&state, &mut out);
         for (column, term) in columns.iter_mut().zip(&out) {

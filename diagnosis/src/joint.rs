@@ -23,6 +23,10 @@ pub(crate) fn is_joint(effect: &Effect) -> bool {
     effect.shape.contains_key("per_command")
 }
 
+fn ends_in_joint(model: &Model) -> bool {
+    model.effects.last().is_some_and(is_joint)
+}
+
 /// Factors on the values of a shape that go together, to look for its optimum elsewhere.
 fn factors(name: N) -> &'static [(&'static str, &'static [f64])] {
     match name {
@@ -62,22 +66,19 @@ pub(crate) fn search(
     noise: &Noise,
     merit: &(dyn Fn(&Model) -> f64 + Sync),
 ) -> Option<(f64, Model)> {
-    if !model.effects.last().is_some_and(is_joint) {
+    if !ends_in_joint(model) {
         return None;
     }
-    let judged = |model: Model| (merit(&model), model);
-    let best = |models: Vec<Model>, count: usize| {
-        let mut judged: Vec<(f64, Model)> = models.into_par_iter().map(judged).collect();
-        judged.sort_by(|a, b| b.0.total_cmp(&a.0));
-        judged.truncate(count);
-        judged
+    let best = |mut found: Vec<(f64, Model)>, count: usize| {
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(count);
+        found
     };
-    let starts = best(elsewhere(bench, model), STARTS);
+    let starts = elsewhere(bench, model).into_par_iter().map(|start| (merit(&start), start)).collect();
     let down = |(value, start): (f64, Model)| descend(bench, start, noise, value, merit);
-    let ends = best(starts.into_par_iter().map(down).collect(), SETTLED);
-    let settled = |(_, end): (f64, Model)| judged(settle(bench, end, noise, merit));
-    let settled: Vec<(f64, Model)> = ends.into_par_iter().map(settled).collect();
-    settled.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    let ends = best(starts, STARTS).into_par_iter().map(down).collect();
+    let settled = best(ends, SETTLED).into_par_iter().map(|end| settle(bench, end, noise, merit));
+    settled.collect::<Vec<_>>().into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// The model with its joint on another machine.
@@ -95,18 +96,21 @@ fn on(machine: &Machine, model: &Model) -> Model {
 
 /// Gives the law of a joint the machine and the standing forces that were fitted with it, where it began with others, and moves
 /// its shape again, for as long as that helps; a model without one stays as it is.
-pub(crate) fn settle(bench: &Bench, mut model: Model, noise: &Noise, merit: &dyn Fn(&Model) -> f64) -> Model {
-    if !model.effects.last().is_some_and(is_joint) {
-        return model;
+pub(crate) fn settle(
+    bench: &Bench,
+    (mut best, mut model): (f64, Model),
+    noise: &Noise,
+    merit: &dyn Fn(&Model) -> f64,
+) -> (f64, Model) {
+    if !ends_in_joint(&model) {
+        return (best, model);
     }
-    let mut best = merit(&model);
     for _ in 0..ROUNDS {
         let fit = Fit::new(&model, bench.nominal, bench.tracks, noise);
         let mut trial = on(&bench.nominal.machine(Some(&fit)), &model);
         trial.bias = (0..bench.tracks.len()).map(|r| fit.bias(r)).collect();
         let start = merit(&trial);
-        let trial = descend(bench, trial, noise, start, merit);
-        let value = merit(&trial);
+        let (value, trial) = descend(bench, trial, noise, start, merit);
         if value <= best {
             break;
         }
@@ -116,15 +120,16 @@ pub(crate) fn settle(bench: &Bench, mut model: Model, noise: &Noise, merit: &dyn
             break;
         }
     }
-    model
+    (best, model)
 }
 
 /// A fitted model with its joint, if its last effect is one, settled on motion that has changed.
 pub(crate) fn settled(bench: &Bench, candidate: Candidate) -> Candidate {
-    if !candidate.model.effects.last().is_some_and(is_joint) {
+    if !ends_in_joint(&candidate.model) {
         return candidate;
     }
     let merit = |model: &Model| bench.merit_of(model, &candidate.noise);
-    let model = settle(bench, candidate.model.clone(), &candidate.noise, &merit);
+    let found = (merit(&candidate.model), candidate.model.clone());
+    let (_, model) = settle(bench, found, &candidate.noise, &merit);
     bench.fit(model, &candidate.noise, Colour::White)
 }

@@ -295,8 +295,8 @@ impl Bench<'_> {
                 model.effects[last] = effect;
             }
         }
-        let model = descend(self, model, &candidate.noise, best, &merit);
-        let model = joint::settle(self, model, &candidate.noise, &merit);
+        let found = descend(self, model, &candidate.noise, best, &merit);
+        let (_, model) = joint::settle(self, found, &candidate.noise, &merit);
         self.fit(model, &candidate.noise, Colour::White)
     }
 }
