@@ -6,6 +6,7 @@
 //! for its cause (prediction-error identification in closed loop, Ljung 1999, chapter 13).
 
 use crate::track::{Input, Total, Track};
+use std::ops::Range;
 
 /// Noise of sensor and disturbance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,44 +152,53 @@ impl Gains {
 
     /// What one unit of an input does to the whitened innovations, with the sign of a regressor.
     pub(crate) fn response(&self, track: &Track, input: &Input) -> Vec<f64> {
-        let n = track.blocks();
-        let mut out = Vec::with_capacity(n);
+        let all = 0..track.blocks();
+        let free = |j: usize| !track.stuck[j];
+        match input {
+            Input::Held(a) => self.response_over(track, all, |j| {
+                let (a, h) = (if free(j) { a[j] } else { 0.0 }, track.span[j]);
+                [a * h, 0.5 * a * h * h, a * track.tau2[j]]
+            }),
+            Input::Rows { dv, dq, dz } => {
+                self.response_over(track, all, |j| if free(j) { [dv[j], dq[j], dz[j]] } else { [0.0; 3] })
+            }
+            Input::Sensor(a) => self.response_over(track, all, |j| [0.0, 0.0, a[j]]),
+        }
+    }
+
+    /// What a reading that jumps by one from block `over.start` on does there.
+    pub(crate) fn response_to_jump(&self, track: &Track, over: Range<usize>) -> Vec<f64> {
+        self.response_over(track, over, |_| [0.0, 0.0, 1.0])
+    }
+
+    /// What a jump of speed by one within block `over.start` does there.
+    pub(crate) fn response_to_impact(&self, track: &Track, over: Range<usize>) -> Vec<f64> {
+        let (at, h) = (over.start, track.span[over.start]);
+        let impact = [1.0, 0.5 * h, track.tau2[at] / h];
+        self.response_over(track, over, |j| if j == at { impact } else { [0.0; 3] })
+    }
+
+    /// What changes of speed, of position and of the reading in some blocks do to the innovations there.
+    fn response_over(
+        &self,
+        track: &Track,
+        over: Range<usize>,
+        input: impl Fn(usize) -> [f64; 3],
+    ) -> Vec<f64> {
         let (mut q, mut v, mut d) = (0.0, 0.0, 0.0);
-        let mut run = |j: usize, dv: f64, dq: f64, dz: f64| {
-            let h = track.span[j];
+        let mut run = |j: usize| {
+            let (h, [dv, dq, dz]) = (track.span[j], input(j));
             let e = q + v * track.tau1[j] + d * track.tau2[j] + dz;
             let k = &self.k[j];
             q -= k[0] * e;
             v -= k[1] * e;
             d -= k[2] * e;
-            out.push(if j < 3 { 0.0 } else { e * self.weight[j] });
             q += (v + 0.5 * d * h) * h + dq;
             v += d * h + dv;
             d *= self.rho[j];
+            if j < 3 { 0.0 } else { e * self.weight[j] }
         };
-        match input {
-            Input::Held(a) => {
-                for (j, a) in a.iter().enumerate() {
-                    let (a, h) = (if track.stuck[j] { 0.0 } else { *a }, track.span[j]);
-                    run(j, a * h, 0.5 * a * h * h, a * track.tau2[j]);
-                }
-            }
-            Input::Rows { dv, dq, dz } => {
-                for j in 0..n {
-                    if track.stuck[j] {
-                        run(j, 0.0, 0.0, 0.0);
-                    } else {
-                        run(j, dv[j], dq[j], dz[j]);
-                    }
-                }
-            }
-            Input::Sensor(a) => {
-                for (j, a) in a.iter().enumerate() {
-                    run(j, 0.0, 0.0, *a);
-                }
-            }
-        }
-        out
+        over.map(&mut run).collect()
     }
 }
 

@@ -10,7 +10,7 @@ pub(crate) struct Span {
     /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown.
     pub(crate) speed: f64,
     pub(crate) speed_floor: f64,
-    /// Speed that a quarter of the moving blocks stay below.
+    /// Speed that a twelfth of the moving blocks stay below.
     pub(crate) slow: f64,
     /// Travel relative to the start of each recording.
     pub(crate) low: f64,
@@ -57,7 +57,7 @@ impl Span {
         let command = fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs())));
         let fast = speeds[speeds.len() * 99 / 100];
         Self {
-            slow: moving.get(moving.len() / 4).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
+            slow: moving.get(moving.len() / 12).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
             speed: fast,
             speed_floor: fold(&|t| t.speed_floor),
             low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),

@@ -24,7 +24,7 @@ const PER_ORDER: f64 = 8.0;
 fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     let travel = span.travel();
     // A wave must be resolved by the encoder and stay in the band of the filter at slow speed.
-    let shortest = (6.0 * span.count).max(span.slow * 4.0 * span.block);
+    let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
     if let Some(turn) = nominal.rig.turn().filter(|turn| travel > 0.6 * turn) {
         let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
         return Some((turn, (1..=highest).map(|n| n as f64).collect()));

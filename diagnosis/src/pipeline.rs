@@ -16,6 +16,7 @@ use crate::recording::Recording;
 use crate::residuals::{drive_force, forces};
 use crate::rig::Rig;
 use crate::select::{Bench, Candidate, MOST};
+use crate::steps::Asked;
 use crate::track::{Total, Track};
 use crate::values;
 
@@ -78,19 +79,32 @@ fn is_balanced(refit: &Fit, nominal: &Nominal, tracks: &[Track], noise: &Noise, 
     estimator.rms(&left, tracks) < BALANCED * estimator.rms(&force, tracks)
 }
 
-/// Looks for lost counts in every recording under the null, and again with the noise that is left without them.
-fn find_steps(nominal: &Nominal, span: &Span, tracks: &mut [Track], noise: &Noise, scale: f64) {
+fn loses_counts(tracks: &[Track]) -> bool {
+    tracks.iter().any(|track| track.lost.iter().any(|lost| *lost != 0.0))
+}
+
+/// Looks for lost counts in every recording under the null, and again with the noise that is left without them and with
+/// the knowledge that counts get lost.
+fn find_steps(
+    nominal: &Nominal,
+    span: &Span,
+    tracks: &mut [Track],
+    noise: &Noise,
+    scale: f64,
+    mut asked: Asked,
+) {
     let mut noise = *noise;
     for _ in 0..2 {
         for track in tracks.iter_mut() {
             let alone = std::slice::from_ref(&*track);
             let fit = Fit::new(&Model::default(), nominal, alone, &noise);
             let residual = fit.residual(0);
-            track.lost = crate::steps::find(track, &fit, 0, &residual, span.count);
+            track.lost = crate::steps::find(track, &fit, 0, &residual, span.count, asked);
         }
-        if tracks.iter().all(|track| track.lost.iter().all(|lost| *lost == 0.0)) {
+        if !loses_counts(tracks) {
             return;
         }
+        asked = Asked::KNOWN;
         let model =
             Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])], ..Model::default() };
         let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
@@ -179,11 +193,12 @@ pub(crate) fn search(
     let scale = null::command_scale(&nominal, &tracks);
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = Span::of(&tracks, &nominal);
-    find_steps(&nominal, &span, &mut tracks, &noise, scale);
+    find_steps(&nominal, &span, &mut tracks, &noise, scale, Asked::UNKNOWN);
+    let asked = if loses_counts(&tracks) { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = Candidate { model: Model::default(), noise, fit: first, merit: 0.0 };
     smooth_held(&first, &nominal, &span, &mut held, scale);
-    find_steps(&nominal, &span, &mut held, &noise, scale);
+    find_steps(&nominal, &span, &mut held, &noise, scale, asked);
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }

@@ -1,139 +1,105 @@
 //! Lost counts: jumps of what the encoder reads that no force could bring about, found in the innovations.
 
 use crate::fit::{Fit, dot};
+use crate::kalman::Gains;
 use crate::solve::{Factor, Square};
 use crate::track::{Input, Track};
 
-/// Gain of log-likelihood of a single jump: above every jump that noise makes in a recording.
-const PER_JUMP: f64 = 14.0;
+/// What is asked of a jump and of a recording.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked {
+    /// Least gain of log-likelihood of a jump.
+    gain: f64,
+    /// Its least size, counts.
+    least: f64,
+    /// Fewest jumps of a recording.
+    fewest: usize,
+}
+
+impl Asked {
+    /// Before it is known that counts get lost: more than any jump that noise makes in a recording, and more than one.
+    pub(crate) const UNKNOWN: Self = Self { gain: 14.0, least: 0.7, fewest: 2 };
+    /// Where counts do get lost, one block in some hundreds: what makes another loss likelier than none.
+    pub(crate) const KNOWN: Self = Self { gain: 8.0, least: 0.55, fewest: 1 };
+}
+
 /// A jump of position must explain this many times what a jump of speed would: impacts are forces.
 const OVER_IMPACT: f64 = 1.3;
-/// Most jumps per recording, fewest for it to be a fault, and the reach of a response in blocks.
+/// Most jumps per recording, and the reach of a response in blocks.
 const MOST: usize = 80;
-const FEWEST: usize = 2;
 const REACH: usize = 40;
-/// Least size, counts: what falls into the middle of a block shows as little as half.
-const LEAST: f64 = 0.45;
-/// Gain of log-likelihood of a second part of a jump, in the next block.
-const PER_PART: f64 = 4.0;
+/// Fewest blocks after a jump that tell it from an impact.
+const FEWEST_AFTER: usize = 6;
 /// How often what is left is looked through again: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
 /// Travel lost so far per block, from the residual of a fit that knows of no jumps; zero everywhere where too few are seen.
-pub(crate) fn find(track: &Track, fit: &Fit, r: usize, residual: &[f64], count: f64) -> Vec<f64> {
+pub(crate) fn find(
+    track: &Track,
+    fit: &Fit,
+    r: usize,
+    residual: &[f64],
+    count: f64,
+    asked: Asked,
+) -> Vec<f64> {
     let n = track.blocks();
-    let Some(templates) = Templates::new(track, fit, r) else { return vec![0.0; n] };
-    let mut jumps: Vec<usize> = Vec::new();
-    let mut sizes: Vec<f64> = Vec::new();
+    let mut jumps = Jumps { track, fit, r, all: Vec::new() };
     let mut left = residual.to_vec();
     for _ in 0..ROUNDS {
-        let before = jumps.len();
-        for (j, size) in templates.peaks(track, &left) {
-            let is_new = jumps.iter().all(|k| k.abs_diff(j) > 1);
-            if jumps.len() < MOST && size.abs() > LEAST * count && is_new {
-                jumps.push(j);
+        let before = jumps.all.len();
+        for (j, pair) in peaks(track, &fit.prepared[r].gains, &left, asked.gain) {
+            let is_new = jumps.all.iter().all(|jump| jump.block.abs_diff(j) > 1);
+            if jumps.all.len() < MOST && pair.size().abs() > asked.least * count && is_new {
+                jumps.push(j, pair.later());
             }
         }
-        if jumps.len() == before {
+        if jumps.all.len() == before {
             break;
         }
-        jumps.sort_unstable();
-        (jumps, sizes, left) = together(track, fit, r, residual, &jumps, count);
+        jumps.all.sort_by_key(|jump| jump.block);
+        left =
+            jumps.settle(residual, |jump| jump.gain() > asked.gain && jump.size.abs() > asked.least * count);
     }
     let mut lost = vec![0.0; n];
-    if jumps.len() < FEWEST {
+    if jumps.all.len() < asked.fewest {
         return lost;
     }
-    let mut parts = Jumps::new(track, fit, r, &jumps);
-    parts.split(&sizes, residual);
-    for (block, size) in parts.blocks.iter().zip(parts.sizes(residual)) {
-        lost[*block..].iter_mut().for_each(|lost| *lost += size);
+    for Jump { block, later, size, .. } in jumps.all {
+        lost[block] += (1.0 - later) * size;
+        lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
     }
     lost
 }
 
-/// What a jump of position and a jump of speed look like at one place where the axis moves: elsewhere they are nearly the
-/// same.
-struct Template {
-    /// Logarithm of the variance that quantisation has there: the faster, the less, and the sharper the response.
-    quantum: f64,
-    position: Vec<f64>,
-    speed: Vec<f64>,
-}
-
-/// Templates from slow motion to fast.
-struct Templates(Vec<Template>);
-
-/// Parts of the moving blocks, ordered by quantisation, at which templates are taken.
-const TEMPLATES: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
-
-impl Template {
-    fn new(track: &Track, fit: &Fit, r: usize, at: usize) -> Self {
-        let n = track.blocks();
-        let gains = &fit.prepared[r].gains;
-        let mut step = vec![0.0; n];
-        step[at..].fill(1.0);
-        let mut pulse = vec![0.0; n];
-        pulse[at - 1] = 1.0 / track.span[at - 1];
-        let cut = |input: Input| gains.response(track, &input)[at..at + REACH].to_vec();
-        Self {
-            quantum: track.quantum[at].ln(),
-            position: cut(Input::Sensor(step)),
-            speed: cut(Input::Held(pulse)),
+/// Blocks at which a jump of the reading stands out, the clearest first.
+fn peaks(track: &Track, gains: &Gains, residual: &[f64], least: f64) -> Vec<(usize, Pair)> {
+    let mut found: Vec<(usize, Pair)> = Vec::new();
+    let n = residual.len();
+    for j in (5..n.saturating_sub(FEWEST_AFTER)).filter(|j| !track.rest[*j]) {
+        let window = j - 1..(j + REACH).min(n);
+        let left = &residual[window.clone()];
+        let since = |at: usize, response: Vec<f64>| [vec![0.0; at - window.start], response].concat();
+        let jump = |at: usize| since(at, gains.response_to_jump(track, at..window.end));
+        let jump = Pair::new(&jump(j), &jump(j + 1), left);
+        // What is lost is lost on the way: the reading falls behind the motion.
+        if jump.gain <= least || jump.size() * track.v[j] >= 0.0 {
+            continue;
+        }
+        let [before, now, next] =
+            [j - 1, j, j + 1].map(|at| since(at, gains.response_to_impact(track, at..window.end)));
+        let impact = Pair::new(&before, &now, left).gain.max(Pair::new(&now, &next, left).gain);
+        if jump.gain > OVER_IMPACT * impact {
+            found.push((j, jump));
         }
     }
-}
-
-impl Templates {
-    fn new(track: &Track, fit: &Fit, r: usize) -> Option<Self> {
-        let n = track.blocks();
-        let moves = |j: &usize| !track.rest[*j - 1..*j + REACH].iter().any(|rest| *rest);
-        let mut places: Vec<usize> = (1..n.checked_sub(REACH)?).filter(moves).collect();
-        if places.is_empty() && n >= 4 * REACH {
-            places.push(n / 2);
+    found.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain).then(a.0.cmp(&b.0)));
+    let mut apart: Vec<(usize, Pair)> = Vec::new();
+    for (j, jump) in found {
+        if apart.iter().all(|(k, _)| k.abs_diff(j) > REACH / 4) {
+            apart.push((j, jump));
         }
-        places.sort_by(|a, b| track.quantum[*a].total_cmp(&track.quantum[*b]).then(a.cmp(b)));
-        let last = places.len().checked_sub(1)?;
-        let mut at: Vec<usize> = TEMPLATES.iter().map(|part| places[(part * last as f64) as usize]).collect();
-        at.dedup();
-        Some(Self(at.into_iter().map(|at| Template::new(track, fit, r, at)).collect()))
     }
-
-    fn nearest(&self, quantum: f64) -> &Template {
-        let distance = |t: &&Template| (t.quantum - quantum.ln()).abs();
-        self.0
-            .iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .expect("there is at least one template")
-    }
-
-    /// Blocks at which a jump of position stands out, with its size, the clearest first.
-    fn peaks(&self, track: &Track, residual: &[f64]) -> Vec<(usize, f64)> {
-        let mut found: Vec<(f64, usize, f64)> = Vec::new();
-        for j in 5..residual.len().saturating_sub(REACH + 2) {
-            let Template { position, speed, .. } = self.nearest(track.quantum[j]);
-            if track.rest[j] {
-                continue;
-            }
-            let jump = Pair::new(position, &residual[j..=j + REACH]);
-            // What is lost is lost on the way: the reading falls behind the motion.
-            if jump.gain <= PER_JUMP || jump.size() * track.v[j] >= 0.0 {
-                continue;
-            }
-            let impact = |from: usize| Pair::new(speed, &residual[from..=from + REACH]).gain;
-            if jump.gain > OVER_IMPACT * impact(j).max(impact(j + 1)) {
-                found.push((jump.gain, j + usize::from(jump.second.abs() > jump.first.abs()), jump.size()));
-            }
-        }
-        found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut apart: Vec<(usize, f64)> = Vec::new();
-        for (_, j, size) in found {
-            if apart.iter().all(|(k, _)| k.abs_diff(j) > REACH / 4) {
-                apart.push((j, size));
-            }
-        }
-        apart
-    }
+    apart
 }
 
 /// What falls into a block shows in part in it and whole in the next one: a response from some block on and the same from the
@@ -146,71 +112,95 @@ struct Pair {
 }
 
 impl Pair {
-    /// `left` is longer than the response by the one block that the second comes later.
-    fn new(response: &[f64], left: &[f64]) -> Self {
-        let n = response.len();
-        let square = dot(response, response).max(1e-300);
-        let both = dot(&response[..n - 1], &response[1..]);
-        let (first, second) = (dot(response, &left[..n]), dot(response, &left[1..]));
-        let determinant = square * square - both * both;
-        let a = (square * first - both * second) / determinant;
+    /// What a response and a later one, as far as `left` goes, explain of what is left.
+    fn new(response: &[f64], later: &[f64], left: &[f64]) -> Self {
+        let (square, square_later) = (dot(response, response).max(1e-300), dot(later, later).max(1e-300));
+        let both = dot(response, later);
+        let (first, second) = (dot(response, left), dot(later, left));
+        let determinant = square * square_later - both * both;
+        let a = (square_later * first - both * second) / determinant;
         let b = (square * second - both * first) / determinant;
         if a * b > 0.0 {
             Self { first: a, second: b, gain: 0.5 * (a * first + b * second) }
-        } else if first.abs() > second.abs() {
+        } else if first * first / square > second * second / square_later {
             Self { first: first / square, second: 0.0, gain: 0.5 * first * first / square }
         } else {
-            Self { first: 0.0, second: second / square, gain: 0.5 * second * second / square }
+            Self { first: 0.0, second: second / square_later, gain: 0.5 * second * second / square_later }
         }
     }
 
     fn size(&self) -> f64 {
         self.first + self.second
     }
+
+    /// Part of it that shows a block later.
+    fn later(&self) -> f64 {
+        self.second / self.size()
+    }
 }
 
-/// Jumps that are fitted together, with what each does to the residual.
+/// A jump with what it does to the residual.
+struct Jump {
+    block: usize,
+    /// Part of it that shows a block later.
+    later: f64,
+    size: f64,
+    /// To a jump by one at the block and at the next one.
+    responses: [Vec<f64>; 2],
+}
+
+impl Jump {
+    fn response(&self) -> Vec<f64> {
+        let [now, next] = &self.responses;
+        now.iter().zip(next).map(|(now, next)| (1.0 - self.later) * now + self.later * next).collect()
+    }
+
+    /// Of log-likelihood.
+    fn gain(&self) -> f64 {
+        let response = self.response();
+        0.5 * self.size * self.size * dot(&response, &response)
+    }
+}
+
+/// Jumps that are fitted together.
 struct Jumps<'a> {
     track: &'a Track,
     fit: &'a Fit,
     r: usize,
-    blocks: Vec<usize>,
-    responses: Vec<Vec<f64>>,
+    all: Vec<Jump>,
 }
 
-impl<'a> Jumps<'a> {
-    fn new(track: &'a Track, fit: &'a Fit, r: usize, blocks: &[usize]) -> Self {
-        let mut all = Self { track, fit, r, blocks: Vec::new(), responses: Vec::new() };
-        blocks.iter().for_each(|block| all.push(*block));
-        all
+impl Jumps<'_> {
+    fn push(&mut self, block: usize, later: f64) {
+        let response = |block: usize| {
+            let mut step = vec![0.0; self.track.blocks()];
+            step[block..].fill(1.0);
+            self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step))
+        };
+        self.all.push(Jump { block, later, size: 0.0, responses: [response(block), response(block + 1)] });
     }
 
-    /// What a jump by one at `block` does to the residual.
-    fn response(&self, block: usize) -> Vec<f64> {
-        let mut step = vec![0.0; self.track.blocks()];
-        step[block..].fill(1.0);
-        self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step))
+    /// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits
+    /// again; gives what is left of the residual.
+    fn settle(&mut self, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
+        let left = self.fit_sizes(residual);
+        for jump in &mut self.all {
+            let with: Vec<f64> =
+                left.iter().zip(jump.response()).map(|(left, x)| left + jump.size * x).collect();
+            let pair = Pair::new(&jump.responses[0], &jump.responses[1], &with);
+            jump.later = pair.later();
+        }
+        self.fit_sizes(residual);
+        self.all.retain(stands);
+        self.fit_sizes(residual)
     }
 
-    fn push(&mut self, block: usize) {
-        let response = self.response(block);
-        self.blocks.push(block);
-        self.responses.push(response);
-    }
-
-    fn keep(&mut self, stands: &[bool]) {
-        let mut kept = stands.iter();
-        self.blocks.retain(|_| *kept.next().unwrap_or(&false));
-        let mut kept = stands.iter();
-        self.responses.retain(|_| *kept.next().unwrap_or(&false));
-    }
-
-    /// Sizes that leave the least, all fitted at once.
-    fn sizes(&self, residual: &[f64]) -> Vec<f64> {
-        let count = self.blocks.len();
-        let mut m = Square::zero(count);
-        for (a, i) in self.responses.iter().enumerate() {
-            for (b, j) in self.responses.iter().enumerate().take(a + 1) {
+    /// Sizes that leave the least, all fitted at once, and what they leave.
+    fn fit_sizes(&mut self, residual: &[f64]) -> Vec<f64> {
+        let responses: Vec<Vec<f64>> = self.all.iter().map(Jump::response).collect();
+        let mut m = Square::zero(responses.len());
+        for (a, i) in responses.iter().enumerate() {
+            for (b, j) in responses.iter().enumerate().take(a + 1) {
                 let product = dot(i, j);
                 m.add(a, b, product);
                 if a != b {
@@ -218,85 +208,80 @@ impl<'a> Jumps<'a> {
                 }
             }
         }
-        let right: Vec<f64> = self.responses.iter().map(|response| dot(response, residual)).collect();
-        Factor::new(&m).solve(&right)
-    }
-
-    fn left(&self, sizes: &[f64], residual: &[f64]) -> Vec<f64> {
+        let right: Vec<f64> = responses.iter().map(|response| dot(response, residual)).collect();
         let mut left = residual.to_vec();
-        for (response, size) in self.responses.iter().zip(sizes) {
+        for ((jump, size), response) in self.all.iter_mut().zip(Factor::new(&m).solve(&right)).zip(&responses)
+        {
+            jump.size = size;
             left.iter_mut().zip(response).for_each(|(left, x)| *left -= size * x);
         }
         left
     }
-
-    /// A jump within a block shows in part in that block and whole in the next one: gives each jump a second part in the
-    /// neighbour that explains more, where one does.
-    fn split(&mut self, sizes: &[f64], residual: &[f64]) {
-        let left = self.left(sizes, residual);
-        let places: Vec<(usize, f64)> = self.blocks.iter().copied().zip(sizes.iter().copied()).collect();
-        for (i, (block, size)) in places.into_iter().enumerate() {
-            let mut best: Option<(f64, usize)> = None;
-            for neighbour in [block - 1, block + 1] {
-                if self.blocks.contains(&neighbour) {
-                    continue;
-                }
-                let other = self.response(neighbour);
-                // Moves a part of the jump to the neighbour, a part between none and all of it.
-                let moved: Vec<f64> = other.iter().zip(&self.responses[i]).map(|(a, b)| a - b).collect();
-                let (along, square) = (dot(&moved, &left), dot(&moved, &moved));
-                let gain = 0.5 * along * along / square.max(1e-300);
-                if along * size > 0.0 && gain > PER_PART && best.is_none_or(|(most, _)| gain > most) {
-                    best = Some((gain, neighbour));
-                }
-            }
-            if let Some((_, neighbour)) = best {
-                self.push(neighbour);
-            }
-        }
-    }
-}
-
-/// Fits the sizes of all jumps at once and drops those that do not stand: places, sizes, and the residual without them.
-fn together(
-    track: &Track,
-    fit: &Fit,
-    r: usize,
-    residual: &[f64],
-    jumps: &[usize],
-    count: f64,
-) -> (Vec<usize>, Vec<f64>, Vec<f64>) {
-    let mut all = Jumps::new(track, fit, r, jumps);
-    let stands = |(size, response): (&f64, &Vec<f64>)| {
-        0.5 * size * size * dot(response, response) > PER_JUMP && size.abs() > LEAST * count
-    };
-    let stand: Vec<bool> = all.sizes(residual).iter().zip(&all.responses).map(stands).collect();
-    all.keep(&stand);
-    let sizes = all.sizes(residual);
-    let left = all.left(&sizes, residual);
-    (all.blocks, sizes, left)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kalman::Noise;
+    use crate::model::{Model, Nominal};
+    use crate::recording::Recording;
+    use crate::rig::Rig;
 
     #[test]
     fn a_jump_within_a_block_is_one_in_two_parts_and_parts_that_oppose_each_other_are_none() {
-        let response = [1.0, -0.6, 0.1, 0.0];
-        let left = |a: f64, b: f64| -> Vec<f64> {
-            let at = |i: usize| {
-                a * response.get(i).unwrap_or(&0.0) + b * i.checked_sub(1).map_or(0.0, |i| response[i])
-            };
-            (0..=response.len()).map(at).collect()
-        };
-        let half = Pair::new(&response, &left(2.0, 2.0));
+        let (now, next) = ([1.0, -0.6, 0.1, 0.0, 0.0], [0.0, 1.0, -0.6, 0.1, 0.0]);
+        let left =
+            |a: f64, b: f64| -> Vec<f64> { now.iter().zip(next).map(|(x, y)| a * x + b * y).collect() };
+        let pair = |left: &[f64]| Pair::new(&now, &next, left);
+        let half = pair(&left(2.0, 2.0));
         let all: f64 = left(2.0, 2.0).iter().map(|x| x * x).sum();
         assert!((half.size() - 4.0).abs() < 1e-9 && (half.gain - 0.5 * all).abs() < 1e-9);
-        let opposed = Pair::new(&response, &left(3.0, -1.0));
+        assert!((pair(&left(1.0, 3.0)).later() - 0.75).abs() < 1e-9);
+        let opposed = pair(&left(3.0, -1.0));
         assert!(
             opposed.second == 0.0 && opposed.gain < 0.5 * left(3.0, -1.0).iter().map(|x| x * x).sum::<f64>()
         );
-        assert!(Pair::new(&response, &left(0.0, 5.0)).second > 4.9);
+        assert!(pair(&left(0.0, 5.0)).second > 4.9);
+    }
+
+    const ROWS_PER_S: f64 = 5000.0;
+
+    /// What is found to be lost, counts, and the blocks' starts, s, on an axis whose reading and speed change as told.
+    fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+        let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
+        let recording = Recording {
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.iter().map(|t| counts(*t).floor()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let count = 1.0 / rig.encoder.counts_per_unit;
+        let mut tracks = [Track::new(&recording, &rig)];
+        tracks[0].v.fill(3.0);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
+        let lost = find(&tracks[0], &fit, 0, &fit.residual(0), count, asked);
+        (lost.iter().map(|lost| lost / count).collect(), tracks[0].start.clone())
+    }
+
+    #[test]
+    fn lost_counts_are_found_where_in_a_block_they_fall_and_how_many() {
+        let after = |at: f64, t: f64| f64::from(u8::from(t >= at));
+        let reads = |t: f64| 3000.3 * t - 2.0 * after(0.6003, t) - after(1.2349, t);
+        let (lost, start) = lost(reads, Asked::UNKNOWN);
+        let at = |t: f64| lost[start.partition_point(|start| *start < t)];
+        assert_eq!(at(0.58), 0.0);
+        assert!((at(0.62) + 2.0).abs() < 0.1 && (at(1.26) + 3.0).abs() < 0.1, "{} {}", at(0.62), at(1.26));
+    }
+
+    #[test]
+    fn one_loss_is_none_before_it_is_known_that_counts_get_lost_and_an_impact_never_is() {
+        let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
+        let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
+        assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
+        let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
+        assert!(!any(lost(impact, Asked::KNOWN)));
     }
 }
