@@ -14,6 +14,7 @@ use crate::residuals::{above, forces, relative_gain};
 use crate::select::{Bench, Candidate};
 use crate::track::{Total, Track};
 use crate::values;
+use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.
 #[derive(Clone)]
@@ -58,7 +59,8 @@ const HALF: f64 = 0.5;
 /// Part of a gain that is nothing.
 const LITTLE: f64 = 0.05;
 /// Factors on an effect that are the same size.
-const SAME_SIZE: std::ops::Range<f64> = 0.75..1.33;
+const SAME_SIZE: Range<f64> = 0.75..1.33;
+const HARDLY_ANOTHER_SIZE: Range<f64> = 0.85..1.18;
 /// What a dry friction may gain with time, as parts of what it is at first.
 const DRIFT: std::ops::Range<f64> = -0.95..3.0;
 /// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
@@ -94,7 +96,7 @@ impl Found {
         let least = if takes_all { PROMISING } else { SURE };
         likely
             || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= least)
-            || self.is_all_there_is()
+            || self.agrees_everywhere()
     }
 
     /// Whether each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
@@ -102,23 +104,31 @@ impl Found {
         self.effect.name == EffectName::MissedCounts
     }
 
-    /// Whether it is nearly all that was left out, as large on every recording, and costs nothing in those moments of the
-    /// held-out ones that do not play it, however few do.
-    fn is_all_there_is(&self) -> bool {
+    /// Whether it is nearly all that was left out and as large on every recording, or most of it and hardly differs between
+    /// them, and costs nothing in those moments of the held-out ones that do not play it, however few do.
+    fn agrees_everywhere(&self) -> bool {
         let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -LITTLE * gain.sum;
-        self.is_same_size()
-            && self.share >= NEARLY_ALL
-            && harms_nowhere(&self.holdout)
-            && harms_nowhere(&self.force)
+        let is_nearly_all = self.share >= NEARLY_ALL && self.is_same_size();
+        let is_most = self.share >= MOST_SHARE && self.has_sizes_in(&HARDLY_ANOTHER_SIZE);
+        (is_nearly_all || is_most) && harms_nowhere(&self.holdout) && harms_nowhere(&self.force)
+    }
+
+    fn has_sizes_in(&self, range: &Range<f64>) -> bool {
+        !self.sizes.is_empty() && self.sizes.iter().all(|size| range.contains(size))
     }
 
     fn is_same_size(&self) -> bool {
-        !self.sizes.is_empty() && self.sizes.iter().all(|size| SAME_SIZE.contains(size))
+        self.has_sizes_in(&SAME_SIZE)
     }
 
     /// Whether it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
     fn recurs(&self) -> bool {
         self.is_same_size() && self.share >= MOST_SHARE && self.holdout.low > 0.0 && self.force.low > 0.0
+    }
+
+    /// Whether it takes most of what the others leave, surely, however much they explain.
+    fn takes_most_of_the_rest(&self) -> bool {
+        self.is_same_size() && self.force.sum >= HALF && self.force.low > 0.0
     }
 
     fn takes_all(&self) -> bool {
@@ -142,10 +152,11 @@ impl Found {
             return Some("its gain does not carry to the held-out recordings".into());
         }
         let rare = self.fit.z.max(self.fit.steady) < 2.0 && self.holdout.z < 3.0;
-        if rare && !self.recurs() && !self.is_all_there_is() {
+        if rare && !self.recurs() && !self.agrees_everywhere() {
             return Some("its gain rests on few moments of the fitted recordings".into());
         }
-        if self.share < SHARE && !(self.share >= LEAST_SHARE && self.is_certain()) {
+        let may_be_little = self.is_certain() || self.takes_most_of_the_rest();
+        if self.share < SHARE && !(self.share >= LEAST_SHARE && may_be_little) {
             return Some(format!(
                 "it explains {:.1} % of what the noise leaves, less than 5 %",
                 100.0 * self.share
@@ -171,8 +182,6 @@ impl Found {
 #[derive(Clone, Debug)]
 pub(crate) struct Rival {
     pub(crate) name: EffectName,
-    /// Its shape, as well fitted as it was compared.
-    pub(crate) effect: Effect,
     /// Mean lead of the winner over its standard error, over all segments.
     pub(crate) z: f64,
     /// Lead of the winner in log-likelihood.
@@ -382,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_nearly_all_there_is_may_rest_on_one_moment_if_it_harms_in_no_other() {
+    fn what_is_as_large_everywhere_may_rest_on_one_moment_if_it_harms_in_no_other() {
         let once = |found: &mut Found| {
             found.fit = gain(900.0, 100.0, 1.4);
             found.holdout = gain(300.0, -5.0, 1.0);
@@ -390,10 +399,14 @@ mod tests {
             found.share = 0.93;
         };
         assert!(may_be_named(once));
+        assert!(may_be_named(|found| {
+            once(found);
+            found.share = 0.6;
+        }));
         let harms: [fn(&mut Found); 4] = [
             |found| found.holdout.low = -60.0,
             |found| found.force.low = -0.05,
-            |found| found.share = 0.85,
+            |found| (found.share, found.sizes[2]) = (0.85, 0.8),
             |found| found.sizes[2] = 0.6,
         ];
         for change in harms {
@@ -429,6 +442,7 @@ mod tests {
         let hardly = |share: f64| {
             may_be_named(|found| {
                 found.fit = gain(130.0, 30.0, 2.2);
+                found.sizes[1] = 1.25;
                 found.share = share;
             })
         };
@@ -451,6 +465,15 @@ mod tests {
         assert!(!may_be_named(|found| {
             found.share = 0.04;
             found.holdout = gain(50.0, 20.0, 4.0);
+        }));
+        let beside_more = |found: &mut Found| {
+            found.share = 0.02;
+            (found.holdout.z, found.holdout.steady) = (5.0, 20.0);
+        };
+        assert!(may_be_named(beside_more), "it takes most of what the others leave");
+        assert!(!may_be_named(|found| {
+            beside_more(found);
+            found.force.sum = 0.4;
         }));
     }
 

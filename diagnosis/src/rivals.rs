@@ -95,8 +95,7 @@ pub(crate) fn fit_rivals(
                 }
                 let last = rival.model.effects.len() - 1;
                 let absence = (gain.z < BEHIND_Z).then(|| values::absence(bench, &rival, last)).flatten();
-                let effect = rival.model.effects.remove(last);
-                Rival { name: effect.name, effect, z: gain.z, lead: gain.sum, absence }
+                Rival { name: effect.name, z: gain.z, lead: gain.sum, absence }
             })
             .collect();
         // Needed only where a rival comes near, and the same for all of them.

@@ -47,7 +47,7 @@ pub(crate) struct Weighed {
     pub(crate) is_there: bool,
     /// Whether more effects than a class may hold explain it as well.
     pub(crate) undecided: bool,
-    /// Part of the travel over which it bends, or what explains as much does, where that is more than bristles do.
+    /// Part of the travel over which it bends, where that is more than bristles do.
     pub(crate) creeps: Option<f64>,
     /// What it would rather be, where physics without a name explains surely more.
     pub(crate) rather: Option<String>,
@@ -302,13 +302,7 @@ impl Scales<'_> {
                 let undecided = nearest < rivals::BEHIND_Z;
                 let most = if undecided { UNDECIDED } else { 1.0 };
                 let confidence = confidence::confidence(&evidence).min(most);
-                let creeps = found
-                    .rivals
-                    .iter()
-                    .filter(|rival| class.contains(&rival.name))
-                    .map(|rival| &rival.effect)
-                    .chain([&found.effect])
-                    .find_map(|effect| library::creeps(effect, bench.span))
+                let creeps = library::creeps(&found.effect, bench.span)
                     // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
                     .filter(|_| !found.fits_everywhere());
                 let rather = foreign::rather(bench, patched, i, found.fit.sum);
