@@ -135,7 +135,7 @@ impl Pair {
 
     /// Part of it that shows a block later.
     fn later(&self) -> f64 {
-        self.second / self.size()
+        if self.size() == 0.0 { 0.0 } else { self.second / self.size() }
     }
 }
 
