@@ -71,12 +71,10 @@ fn numbers(out: &mut String, outcome: &Outcome) {
         outcome.report.residual_bandwidth_hz
     );
     if found {
-        let _ = write!(
-            out,
-            " From refit to patched the mean square falls by {:.0} to {:.0} % (95 %).",
-            100.0 * f.holdout_gain_ci95[0],
-            100.0 * f.holdout_gain_ci95[1]
-        );
+        // Adding zero takes the sign from what rounds to nothing.
+        let [low, high] = f.holdout_gain_ci95.map(|part| (100.0 * part).round() + 0.0);
+        let _ =
+            write!(out, " From refit to patched the mean square falls by {low:.0} to {high:.0} % (95 %).");
     }
     out.push_str("</p></section>");
 }
