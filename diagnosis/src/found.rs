@@ -62,7 +62,7 @@ const LITTLE: f64 = 0.05;
 const SAME_SIZE: Range<f64> = 0.75..1.33;
 const HARDLY_ANOTHER_SIZE: Range<f64> = 0.85..1.18;
 /// What a dry friction may gain with time, as parts of what it is at first.
-const DRIFT: std::ops::Range<f64> = -0.95..3.0;
+const DRIFT: Range<f64> = -0.95..3.0;
 /// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
 const LEAST_SHARE: f64 = 0.01;
 const CERTAIN: f64 = 6.0;

@@ -16,7 +16,7 @@ use crate::recording::Recording;
 use crate::residuals::{drive_force, forces};
 use crate::rig::Rig;
 use crate::select::{Bench, Candidate, MOST};
-use crate::steps::Asked;
+use crate::steps::{self, Asked};
 use crate::track::{Total, Track};
 use crate::values;
 
@@ -98,8 +98,7 @@ fn find_steps(
         for track in tracks.iter_mut() {
             let alone = std::slice::from_ref(&*track);
             let fit = Fit::new(&Model::default(), nominal, alone, &noise);
-            let residual = fit.residual(0);
-            track.lost = crate::steps::find(track, &fit, 0, &residual, span.count, asked);
+            track.lost = steps::find(track, &fit, span.count, asked);
         }
         if !loses_counts(tracks) {
             return;

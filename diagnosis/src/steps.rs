@@ -3,7 +3,7 @@
 use crate::fit::{Fit, dot};
 use crate::kalman::Gains;
 use crate::solve::{Factor, Square};
-use crate::track::{Input, Track};
+use crate::track::Track;
 
 /// What is asked of a jump and of a recording.
 #[derive(Clone, Copy)]
@@ -33,60 +33,59 @@ const FEWEST_AFTER: usize = 6;
 /// How often what is left is looked through again: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
-/// Travel lost so far per block, from the residual of a fit that knows of no jumps; zero everywhere where too few are seen.
-pub(crate) fn find(
-    track: &Track,
-    fit: &Fit,
-    r: usize,
-    residual: &[f64],
-    count: f64,
-    asked: Asked,
-) -> Vec<f64> {
+/// Travel lost so far per block of a recording, from what a fit of it alone that knows of no jumps leaves; zero everywhere
+/// where too few are seen.
+pub(crate) fn find(track: &Track, alone: &Fit, count: f64, asked: Asked) -> Vec<f64> {
     let n = track.blocks();
-    let mut jumps = Jumps { track, fit, r, all: Vec::new() };
-    let mut left = residual.to_vec();
+    let (gains, residual) = (&alone.prepared[0].gains, alone.residual(0));
+    let mut jumps: Vec<Jump> = Vec::new();
+    let mut left = residual.clone();
     for _ in 0..ROUNDS {
-        let before = jumps.all.len();
-        for (j, pair) in peaks(track, &fit.prepared[r].gains, &left, asked.gain) {
-            let is_new = jumps.all.iter().all(|jump| jump.block.abs_diff(j) > 1);
-            if jumps.all.len() < MOST && pair.size().abs() > asked.least * count && is_new {
-                jumps.push(j, pair.later());
+        let before = jumps.len();
+        for (j, pair) in peaks(track, gains, &left, asked.gain) {
+            let is_new = jumps.iter().all(|jump| jump.block.abs_diff(j) > 1);
+            if jumps.len() < MOST && pair.size().abs() > asked.least * count && is_new {
+                jumps.push(Jump::new(track, gains, j, pair.later()));
             }
         }
-        if jumps.all.len() == before {
+        if jumps.len() == before {
             break;
         }
-        jumps.all.sort_by_key(|jump| jump.block);
-        left =
-            jumps.settle(residual, |jump| jump.gain() > asked.gain && jump.size.abs() > asked.least * count);
+        jumps.sort_by_key(|jump| jump.block);
+        let stands = |jump: &Jump| jump.gain() > asked.gain && jump.size.abs() > asked.least * count;
+        left = settle(&mut jumps, &residual, stands);
     }
     let mut lost = vec![0.0; n];
-    if jumps.all.len() < asked.fewest {
+    if jumps.len() < asked.fewest {
         return lost;
     }
-    for Jump { block, later, size, .. } in jumps.all {
+    for Jump { block, later, size, .. } in jumps {
         lost[block] += (1.0 - later) * size;
         lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
     }
     lost
 }
 
+/// A response after blocks in which there is none.
+fn after(blocks: usize, response: Vec<f64>) -> Vec<f64> {
+    [vec![0.0; blocks], response].concat()
+}
+
 /// Blocks at which a jump of the reading stands out, the clearest first.
-fn peaks(track: &Track, gains: &Gains, residual: &[f64], least: f64) -> Vec<(usize, Pair)> {
+fn peaks(track: &Track, gains: &Gains, residual: &[f64], least_gain: f64) -> Vec<(usize, Pair)> {
     let mut found: Vec<(usize, Pair)> = Vec::new();
     let n = residual.len();
     for j in (5..n.saturating_sub(FEWEST_AFTER)).filter(|j| !track.rest[*j]) {
         let window = j - 1..(j + REACH).min(n);
         let left = &residual[window.clone()];
-        let since = |at: usize, response: Vec<f64>| [vec![0.0; at - window.start], response].concat();
-        let jump = |at: usize| since(at, gains.response_to_jump(track, at..window.end));
+        let jump = |at: usize| after(at - window.start, gains.response_to_jump(track, at..window.end));
         let jump = Pair::new(&jump(j), &jump(j + 1), left);
         // What is lost is lost on the way: the reading falls behind the motion.
-        if jump.gain <= least || jump.size() * track.v[j] >= 0.0 {
+        if jump.gain <= least_gain || jump.size() * track.v[j] >= 0.0 {
             continue;
         }
-        let [before, now, next] =
-            [j - 1, j, j + 1].map(|at| since(at, gains.response_to_impact(track, at..window.end)));
+        let impact = |at: usize| after(at - window.start, gains.response_to_impact(track, at..window.end));
+        let [before, now, next] = [j - 1, j, j + 1].map(impact);
         let impact = Pair::new(&before, &now, left).gain.max(Pair::new(&now, &next, left).gain);
         if jump.gain > OVER_IMPACT * impact {
             found.push((j, jump));
@@ -150,6 +149,12 @@ struct Jump {
 }
 
 impl Jump {
+    fn new(track: &Track, gains: &Gains, block: usize, later: f64) -> Self {
+        let n = track.blocks();
+        let responses = [block, block + 1].map(|at| after(at, gains.response_to_jump(track, at..n)));
+        Self { block, later, size: 0.0, responses }
+    }
+
     fn response(&self) -> Vec<f64> {
         let [now, next] = &self.responses;
         now.iter().zip(next).map(|(now, next)| (1.0 - self.later) * now + self.later * next).collect()
@@ -162,61 +167,39 @@ impl Jump {
     }
 }
 
-/// Jumps that are fitted together.
-struct Jumps<'a> {
-    track: &'a Track,
-    fit: &'a Fit,
-    r: usize,
-    all: Vec<Jump>,
+/// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits again;
+/// gives what is left of the residual.
+fn settle(jumps: &mut Vec<Jump>, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
+    let left = fit_sizes(jumps, residual);
+    for jump in jumps.iter_mut() {
+        let with: Vec<f64> = left.iter().zip(jump.response()).map(|(left, x)| left + jump.size * x).collect();
+        jump.later = Pair::new(&jump.responses[0], &jump.responses[1], &with).later();
+    }
+    fit_sizes(jumps, residual);
+    jumps.retain(stands);
+    fit_sizes(jumps, residual)
 }
 
-impl Jumps<'_> {
-    fn push(&mut self, block: usize, later: f64) {
-        let response = |block: usize| {
-            let mut step = vec![0.0; self.track.blocks()];
-            step[block..].fill(1.0);
-            self.fit.prepared[self.r].gains.response(self.track, &Input::Sensor(step))
-        };
-        self.all.push(Jump { block, later, size: 0.0, responses: [response(block), response(block + 1)] });
-    }
-
-    /// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits
-    /// again; gives what is left of the residual.
-    fn settle(&mut self, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
-        let left = self.fit_sizes(residual);
-        for jump in &mut self.all {
-            let with: Vec<f64> =
-                left.iter().zip(jump.response()).map(|(left, x)| left + jump.size * x).collect();
-            let pair = Pair::new(&jump.responses[0], &jump.responses[1], &with);
-            jump.later = pair.later();
-        }
-        self.fit_sizes(residual);
-        self.all.retain(stands);
-        self.fit_sizes(residual)
-    }
-
-    /// Sizes that leave the least, all fitted at once, and what they leave.
-    fn fit_sizes(&mut self, residual: &[f64]) -> Vec<f64> {
-        let responses: Vec<Vec<f64>> = self.all.iter().map(Jump::response).collect();
-        let mut m = Square::zero(responses.len());
-        for (a, i) in responses.iter().enumerate() {
-            for (b, j) in responses.iter().enumerate().take(a + 1) {
-                let product = dot(i, j);
-                m.add(a, b, product);
-                if a != b {
-                    m.add(b, a, product);
-                }
+/// Sizes that leave the least, all fitted at once, and what they leave.
+fn fit_sizes(jumps: &mut [Jump], residual: &[f64]) -> Vec<f64> {
+    let responses: Vec<Vec<f64>> = jumps.iter().map(Jump::response).collect();
+    let mut m = Square::zero(responses.len());
+    for (a, i) in responses.iter().enumerate() {
+        for (b, j) in responses.iter().enumerate().take(a + 1) {
+            let product = dot(i, j);
+            m.add(a, b, product);
+            if a != b {
+                m.add(b, a, product);
             }
         }
-        let right: Vec<f64> = responses.iter().map(|response| dot(response, residual)).collect();
-        let mut left = residual.to_vec();
-        for ((jump, size), response) in self.all.iter_mut().zip(Factor::new(&m).solve(&right)).zip(&responses)
-        {
-            jump.size = size;
-            left.iter_mut().zip(response).for_each(|(left, x)| *left -= size * x);
-        }
-        left
     }
+    let right: Vec<f64> = responses.iter().map(|response| dot(response, residual)).collect();
+    let mut left = residual.to_vec();
+    for ((jump, size), response) in jumps.iter_mut().zip(Factor::new(&m).solve(&right)).zip(&responses) {
+        jump.size = size;
+        left.iter_mut().zip(response).for_each(|(left, x)| *left -= size * x);
+    }
+    left
 }
 
 #[cfg(test)]
@@ -262,7 +245,7 @@ mod tests {
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
-        let lost = find(&tracks[0], &fit, 0, &fit.residual(0), count, asked);
+        let lost = find(&tracks[0], &fit, count, asked);
         (lost.iter().map(|lost| lost / count).collect(), tracks[0].start.clone())
     }
 
