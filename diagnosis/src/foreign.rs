@@ -1,5 +1,6 @@
 //! Physics that has no name in the library and looks like some that has: a spring that creeps, a load that changes at once,
-//! an inertia that changes along the travel. Nothing here is named; it only speaks against a name.
+//! an inertia that changes along the travel, a gear that loses a part of what it carries. Nothing here is named; it only
+//! speaks against a name.
 
 use crate::effects::{Effect, EffectName as N};
 use crate::fit::Fit;
@@ -31,7 +32,7 @@ fn like(effect: &Effect, bench: &Bench) -> Vec<Foreign> {
         effect.shape.insert(key.into(), value);
         Foreign { effect, freedom: 4.0, says }
     };
-    match effect.name {
+    let mut all: Vec<Foreign> = match effect.name {
         N::PositionSpring => FADES_S
             .map(|time| {
                 let says = format!("its force would fade within {time} s, as that of a spring that creeps does");
@@ -60,7 +61,15 @@ fn like(effect: &Effect, bench: &Bench) -> Vec<Foreign> {
             }]
         }
         _ => Vec::new(),
-    }
+    };
+    // Whatever bends with speed, force or command may be the loss of a gear.
+    all.push(Foreign {
+        effect: Effect::shaped(N::LoadDependentFriction, &[("of_drive", 1.0)]),
+        freedom: 1.0,
+        says: "friction in proportion to the force of the drive, as a gear loses it, would explain more"
+            .into(),
+    });
+    all
 }
 
 /// What foreign physics a fitted effect would rather be, where some in its place explains surely more; `gain` is the

@@ -30,6 +30,7 @@ pub(crate) fn effect_inputs(
     }
     let count = law.names().len();
     let n = track.blocks();
+    let carried = effect.shape.contains_key("of_drive").then(|| track.block_mean(command));
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
@@ -38,7 +39,7 @@ pub(crate) fn effect_inputs(
             velocity: track.v[j],
             acceleration: track.acceleration(j),
             rest: track.rest[j],
-            drive: 1.0,
+            drive: carried.as_ref().map_or(1.0, |carried| carried[j]),
             command: 1.0,
             tilt: track.tilt_at(j),
             external: track.force_at(j),

@@ -183,6 +183,16 @@ fn a_load_that_changes_at_once_is_no_drift_and_the_report_says_what_it_resembles
 }
 
 #[test]
+fn a_gear_that_loses_a_part_of_what_it_carries_is_no_effect_of_the_library() {
+    for seed in [5, 6] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { size: 2.0, seed, ..setup("gear_loss") });
+        assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
+        assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
+        assert!(outcome.report.sentence.contains("as a gear loses it"), "{}", outcome.report.sentence);
+    }
+}
+
+#[test]
 fn counts_that_only_one_of_the_fitted_recordings_loses_are_counts_lost() {
     let missed = setup("missed_counts");
     let fit = [record(&setup("none"), 1), record(&missed, 3)];

@@ -54,6 +54,8 @@ pub struct Law {
     at_once_s: f64,
     /// Whether a profile along the travel is of the inertia.
     of_inertia: bool,
+    /// Whether the load that friction grows with is the drive's own force.
+    of_drive: bool,
     waves: Vec<f64>,
     times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
@@ -76,7 +78,7 @@ impl Law {
         let fades_s = get("fades_s", f64::INFINITY);
         let at_once_s = get("at_once_s", f64::INFINITY);
         let set = |key: &str| get(key, 0.0) > 0.5;
-        let of_inertia = set("of_inertia");
+        let (of_inertia, of_drive) = (set("of_inertia"), set("of_drive"));
         let names: Vec<String> = match effect.name {
             N::ViscousFriction => vec!["viscous".into()],
             N::CoulombFriction => vec!["coulomb".into()],
@@ -145,6 +147,7 @@ impl Law {
             fades_s,
             at_once_s,
             of_inertia,
+            of_drive,
             waves,
             times,
             names,
@@ -202,7 +205,10 @@ impl Law {
                 }
             }
             N::QuadraticDrag => out[0] = -velocity * velocity.abs(),
-            N::LoadDependentFriction => out[0] = -way * s.external.abs(),
+            N::LoadDependentFriction => {
+                let load = if self.of_drive { s.drive } else { s.external };
+                out[0] = -way * load.abs();
+            }
             N::PositionDependentFriction => legendre(self.along(s.position), -way, out),
             N::PositionDependentDamping if self.of_inertia => self.inertia(s, out),
             N::PositionDependentDamping => legendre(self.along(s.position), -velocity, out),
@@ -395,6 +401,18 @@ mod tests {
         for (term, expected) in out.iter().zip([-0.5 * 5.0 - 0.25 * 4.0, 0.125 * 5.0 - 0.375 * 4.0]) {
             assert!((term - expected).abs() < 1e-4, "{term} instead of {expected}");
         }
+    }
+
+    #[test]
+    fn friction_grows_with_the_load_or_with_what_the_drive_carries() {
+        let friction = |of_drive: f64, velocity: f64| {
+            let effect = Effect::shaped(EffectName::LoadDependentFriction, &[("of_drive", of_drive)]);
+            let (mut law, mut out) = (Law::new(&effect).unwrap(), [0.0]);
+            law.terms(&State { velocity, external: 2.0, drive: -3.0, ..State::default() }, &mut out);
+            out[0]
+        };
+        assert_eq!([friction(0.0, 1.0), friction(0.0, -1.0)], [-2.0, 2.0]);
+        assert_eq!([friction(1.0, 1.0), friction(1.0, -1.0)], [-3.0, 3.0]);
     }
 
     #[test]

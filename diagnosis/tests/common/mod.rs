@@ -196,6 +196,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 dry += 0.5 * s * load.abs();
                 force += load;
             }
+            if is("gear_loss") {
+                dry += 0.25 * s * (GAIN * u).abs();
+            }
             if is("quadratic_drag") {
                 force -= 4e-7 * s * v * v.abs();
             }
