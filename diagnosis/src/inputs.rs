@@ -3,10 +3,6 @@
 use crate::effects::{Effect, EffectName, Law, State};
 use crate::track::{Input, Track};
 
-/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
-const SECOND_MASS_STEP_S: f64 = 6e-4;
-const GRIP_STEP_S: f64 = 1e-3;
-
 /// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
 fn scales_drive(name: EffectName) -> bool {
     matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
@@ -70,26 +66,21 @@ pub(crate) fn effect_inputs(
 
 /// What a second mass does is faster than a block.
 fn of_second_mass(track: &Track, effect: &Effect, law: &mut Law, command: &[f64], bias: f64) -> Input {
-    let mut out = vec![0.0];
-    let mut signal = Vec::with_capacity(command.len());
-    let last = track.blocks() - 1;
-    let longest = if effect.name == EffectName::RollerSlip { GRIP_STEP_S } else { SECOND_MASS_STEP_S };
-    let (block, step) = (track.rows_per_block, track.rows_per_step(longest));
-    let blocks = command.chunks(block).zip(track.row_hold.chunks(block));
-    for (j, (command, hold)) in blocks.enumerate() {
-        let j = j.min(last);
+    let slices = if effect.name == EffectName::RollerSlip { &track.of_grip } else { &track.of_contact };
+    let mut out = [0.0];
+    let mut signal = Vec::new();
+    for (j, slices) in slices.blocks().enumerate() {
         let (tilt, external) = (track.tilt_at(j), track.force_at(j));
-        let mut passed = 0.0;
-        for (command, hold) in command.chunks(step).zip(hold.chunks(step)) {
-            let dt: f64 = hold.iter().sum();
-            let velocity = track.velocity_within(j, passed + 0.5 * dt);
-            passed += dt;
-            let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / dt;
+        for slice in slices {
+            let (command, hold) = (&command[slice.rows.clone()], &track.row_hold[slice.rows.clone()]);
+            let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / slice.span;
+            let velocity = track.velocity_within(j, slice.start + 0.5 * slice.span);
+            let dt = slice.span;
             let state =
                 State { drive: mean, command: mean, velocity, tilt, external, bias, dt, ..State::default() };
             law.terms(&state, &mut out);
-            signal.extend(std::iter::repeat_n(out[0], command.len()));
+            signal.push(out[0]);
         }
     }
-    track.rows_input(&signal)
+    slices.input(&signal)
 }

@@ -49,6 +49,7 @@ mod rivals;
 mod screen;
 mod select;
 mod shown;
+mod slices;
 mod solve;
 mod steps;
 mod track;

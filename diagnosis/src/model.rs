@@ -353,7 +353,7 @@ impl Model {
     pub(crate) fn columns(&self, nominal: &Nominal, track: &Track, noise: &Noise) -> Vec<Column> {
         let effective = effective_command(track, &self.effects);
         let command = effective.as_deref().unwrap_or(&track.command);
-        let drive = track.rows_input(command);
+        let drive = track.drive(effective.as_deref());
         let direction = direction(track);
         let mut columns = Vec::new();
         let mut push = |key: Key, input: Input, own: bool| {

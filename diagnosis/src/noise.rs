@@ -1,8 +1,9 @@
 //! How large sensor noise and disturbance are: maximum likelihood of the innovations, by a deterministic pattern search.
 
 use crate::kalman::{Gains, Noise, tolerant};
-use crate::track::{Total, Track};
+use crate::track::{Input, Total, Track};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
 const LOOKED_AT: usize = 8000;
@@ -42,6 +43,9 @@ fn excerpt(track: &Track, total: &Total, from: usize, to: usize) -> Excerpt {
         row_time: [].into(),
         row_hold: [].into(),
         command: [].into(),
+        command_input: Arc::new(Input::Held(Vec::new())),
+        of_contact: Arc::default(),
+        of_grip: Arc::default(),
         tilt: None,
         force: None,
         reference: None,

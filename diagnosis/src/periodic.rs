@@ -60,10 +60,8 @@ pub(crate) fn search(
     let drives: Vec<Option<Input>> = tracks
         .iter()
         .map(|track| {
-            (name == N::TorqueRipple).then(|| {
-                let effective = effective_command(track, &model.effects);
-                track.rows_input(effective.as_deref().unwrap_or(&track.command))
-            })
+            (name == N::TorqueRipple)
+                .then(|| track.drive(effective_command(track, &model.effects).as_deref()))
         })
         .collect();
     let terms_of = |order: f64| -> Terms {

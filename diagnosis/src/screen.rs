@@ -29,7 +29,7 @@ fn added_inputs(model: &Model, track: &Track, effect: &Effect, after: Option<&Ve
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
         return vec![track.rows_input(&change)];
     }
-    effect_inputs(track, effect, command, track.bias, || track.rows_input(command))
+    effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
 
 /// Sums that a score test needs: information of the terms with the model projected out, and their score.

@@ -5,6 +5,7 @@
 
 use crate::recording::Recording;
 use crate::rig::Rig;
+use crate::slices::Slices;
 use std::sync::Arc;
 
 /// What an input does over each block, from the state at the block's start.
@@ -40,6 +41,11 @@ pub(crate) struct Track {
     pub(crate) row_hold: Arc<[f64]>,
     /// Command per row.
     pub(crate) command: Arc<[f64]>,
+    /// What the command does over each block.
+    pub(crate) command_input: Arc<Input>,
+    /// Rows taken together for a resonance or a contact, and for a grip.
+    pub(crate) of_contact: Arc<Slices>,
+    pub(crate) of_grip: Arc<Slices>,
     /// Block means.
     pub(crate) tilt: Option<Vec<f64>>,
     pub(crate) force: Option<Vec<f64>>,
@@ -74,6 +80,9 @@ const FASTEST_BLOCKS_HZ: f64 = 400.0;
 /// Shortest segment, s, and how many segments a recording is cut into at the most.
 const SEGMENT_S: f64 = 0.2;
 const SEGMENTS: f64 = 60.0;
+/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
+const CONTACT_STEP_S: f64 = 6e-4;
+const GRIP_STEP_S: f64 = 1e-3;
 
 impl Track {
     /// Cuts a checked recording into blocks.
@@ -98,6 +107,9 @@ impl Track {
             z: Vec::with_capacity(n),
             quantum: Vec::with_capacity(n),
             command: recording.command[..rows].iter().map(|u| u.clamp(-limit, limit)).collect(),
+            command_input: Arc::new(Input::Held(Vec::new())),
+            of_contact: Arc::default(),
+            of_grip: Arc::default(),
             tilt: None,
             force: None,
             reference: None,
@@ -140,6 +152,12 @@ impl Track {
             track.quantum.push(scale * scale / 12.0 / (1.0 + moved.min(count - 1.0)));
         }
         track.inflate_where_slow(scale);
+        track.command_input = track.rows_input(&track.command).into();
+        let slices = |longest: f64| {
+            let rows = (longest * track.block_rate() * m as f64).round() as usize;
+            Arc::new(Slices::new(&track.row_hold, m, rows.clamp(1, m)))
+        };
+        (track.of_contact, track.of_grip) = (slices(CONTACT_STEP_S), slices(GRIP_STEP_S));
         track.x = track.z.clone();
         track.tilt = recording.tilt_rad.as_deref().map(mean);
         track.force = recording.force.as_deref().map(mean);
@@ -200,10 +218,9 @@ impl Track {
         self.v[block] + part.abs() * (self.v[other] - self.v[block])
     }
 
-    /// Rows that fit into a step of `seconds`, at least one and at most a block.
-    pub(crate) fn rows_per_step(&self, seconds: f64) -> usize {
-        let rows = seconds * self.block_rate() * self.rows_per_block as f64;
-        (rows.round() as usize).clamp(1, self.rows_per_block)
+    /// What an effective command does over each block; that of the command as it was sent where there is none.
+    pub(crate) fn drive(&self, effective: Option<&[f64]>) -> Input {
+        effective.map_or_else(|| Input::clone(&self.command_input), |command| self.rows_input(command))
     }
 
     /// What a signal held row by row does over each block.
@@ -325,7 +342,7 @@ impl Total {
     /// What the command alone does, with `gain` the acceleration per unit of it.
     pub(crate) fn of_command(track: &Track, gain: f64) -> Self {
         let mut total = Self::zero(track.blocks());
-        track.rows_input(&track.command).add_to(&mut total, track, gain);
+        track.command_input.add_to(&mut total, track, gain);
         total
     }
 }
