@@ -1,6 +1,7 @@
 //! From what the search found and what was weighed to the report: places, the verdict, what to record next.
 
 use crate::excitation::Excitation;
+use crate::foreign;
 use crate::known;
 use crate::locate::{self, Map};
 use crate::model::Model;
@@ -41,7 +42,9 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
         locate::maps((&fit_tracks, on_fit), (&held_tracks, on_held), nominal.rig.turn())
     };
     let maps_with_all = maps_of(&weighing.shown);
-    let (verdict, reason) = verdict(&weighing, &maps_with_all, &held_tracks, &excitation);
+    let foreign =
+        if weighing.named().is_empty() { foreign::alone(&bench, &refit, &held_tracks) } else { None };
+    let (verdict, reason) = verdict(&weighing, &maps_with_all, &held_tracks, &excitation, foreign);
     // The verdict rests on all that was weighed, what people see on what is named.
     let with_named = only_named(&weighing, &bench, &refit, &held_tracks, &s);
     let Shown { patched, on_fit, on_held, table } = with_named.as_ref().unwrap_or(&weighing.shown);

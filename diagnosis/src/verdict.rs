@@ -37,12 +37,14 @@ pub(crate) fn misfit(weighing: &Weighing, nominal: &Nominal) -> Option<String> {
     })
 }
 
-/// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves.
+/// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves,
+/// `foreign` what physics without a name alone would explain.
 pub(crate) fn verdict(
     weighing: &Weighing,
     maps: &[Map],
     held: &[Track],
     excitation: &Excitation,
+    foreign: Option<String>,
 ) -> (Verdict, Option<String>) {
     let Shown { on_held, table, .. } = &weighing.shown;
     let left = above(table.patched.holdout, weighing.floor, 0.0).sqrt();
@@ -56,8 +58,12 @@ pub(crate) fn verdict(
         (Verdict::MissingPhysics, None)
     } else if excitation.is_one_speed() {
         (Verdict::InsufficientExcitation, Some(excitation.one_speed()))
-    } else if (weighing.understood && helps) || (disturbed && repeats) || swings.is_some() {
-        (Verdict::Unexplained, swings.or_else(|| weighing.foreign()))
+    } else if (weighing.understood && helps)
+        || (disturbed && repeats)
+        || swings.is_some()
+        || foreign.is_some()
+    {
+        (Verdict::Unexplained, swings.or_else(|| weighing.foreign()).or(foreign))
     } else if disturbed {
         (Verdict::RandomDisturbance, None)
     } else if refit_matters(&weighing.estimator, held, on_held, table.force_rms.holdout) {
