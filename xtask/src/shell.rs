@@ -34,7 +34,9 @@ impl fmt::Display for Failure {
 
 /// The top of the repository.
 pub(crate) fn top() -> PathBuf {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    // Where cargo runs this crate, for clones that share a target directory share its program too.
+    let here = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+    let top = Path::new(&here).join("..");
     top.canonicalize().unwrap_or(top)
 }
 
