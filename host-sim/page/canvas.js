@@ -13,6 +13,9 @@ export function surface(canvas) {
     canvas.width = Math.round(result.width * ratio);
     canvas.height = Math.round(result.height * ratio);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    // What cannot be seen through is black until it is drawn on, and after every change of size.
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--panel").trim();
+    context.fillRect(0, 0, result.width, result.height);
   };
   new ResizeObserver(fit).observe(canvas);
   fit();
