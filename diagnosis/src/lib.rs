@@ -4,64 +4,28 @@
 //! [`effects::EffectName`] in what remains, judges them on recordings that were not used for fitting, and reports.
 //! This crate knows rigs and recordings; it may not know devices, links or plots of other crates.
 //!
-//! Order of the stages, one module each: [`recording`], [`rig`] and `check` (read and check), `track` (blocks), `kalman`
-//! and `noise` (innovations, smoother), `model`, `solve` and `fit` (the linear fit), `null` (the refit), `library`,
-//! `screen`, `periodic`, `descend`, `select` and `pipeline` (name), `judge`, `known` and `found` (held-out recordings),
-//! `locate` and `excitation` (where, and what cannot be told), `rivals`, `foreign`, `weigh` and `confidence` (how sure),
-//! `residuals`, `shown`, `verdict`, `conclude`, `patch`, `values` and `prescribe` (what follows), `outcome` and `html`
-//! (what people read).
+//! Folders, each using only those before it: `numerics` (linear algebra, searches, bootstrap), `effects` (the laws), `io`
+//! (rigs, recordings, the report's shape), `simulation` (a rig run forward), `estimation` (blocks, filter, noise, fit),
+//! `selection` (candidates and their shapes), `validation` (held-out recordings) and `report` (what people read).
+//! `tests/layout.rs` holds them to it.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
 
-mod check;
-mod conclude;
-mod confidence;
-mod descend;
 pub mod effects;
-mod error;
-mod estimate;
-mod excitation;
-mod fit;
-mod foreign;
-mod found;
-mod html;
-mod inputs;
-mod joint;
-mod judge;
-mod kalman;
-mod known;
-mod library;
-mod locate;
-mod model;
-mod noise;
-mod null;
-mod outcome;
-mod patch;
-mod periodic;
-mod pipeline;
-mod prescribe;
-pub mod recording;
+mod estimation;
+mod io;
+mod numerics;
 pub mod report;
-mod residuals;
-pub mod rig;
-mod rivals;
-mod screen;
-mod select;
-mod shown;
-mod slices;
-mod solve;
-mod steps;
-mod track;
-mod unnamed;
-mod values;
-mod verdict;
-mod weigh;
+mod selection;
+pub mod simulation;
+mod validation;
 
-pub use error::InputError;
-pub use locate::Map;
-pub use outcome::{Evidence, Outcome, Series};
+pub use io::error::InputError;
+pub use io::{recording, rig};
+pub use report::outcome::{Evidence, Outcome, Series};
 pub use report::{Report, Verdict};
+pub use validation::residual_maps::Map;
 
 use recording::Recording;
 use rig::Rig;
@@ -97,12 +61,12 @@ pub fn diagnose_recordings(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
-    if let Some(reason) = fit.iter().chain(holdout).find_map(|r| check::too_little(r, rig)) {
+    if let Some(reason) = fit.iter().chain(holdout).find_map(|r| io::sufficiency::too_little(r, rig)) {
         return Ok(Outcome::cannot_tell(rig, reason));
     }
-    let search = pipeline::search(rig, fit, holdout, progress)?;
+    let search = validation::stepwise::search(rig, fit, holdout, progress)?;
     progress("writing down", 0.95);
-    let outcome = conclude::conclude(search);
+    let outcome = report::conclude::conclude(search);
     progress("done", 1.0);
     Ok(outcome)
 }

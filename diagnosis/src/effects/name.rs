@@ -63,6 +63,22 @@ names! {
     MissedCounts "missed_counts" Sensor "the encoder loses counts";
 }
 
+impl EffectName {
+    /// Whether a single coefficient must be positive for the effect to be what its name says.
+    pub(crate) fn is_positive(self) -> bool {
+        matches!(
+            self,
+            Self::ViscousFriction
+                | Self::CoulombFriction
+                | Self::StribeckFriction
+                | Self::PreslidingFriction
+                | Self::QuadraticDrag
+                | Self::LoadDependentFriction
+                | Self::PositionSpring
+        )
+    }
+}
+
 impl fmt::Display for EffectName {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(self.as_str())

@@ -3,8 +3,8 @@
 
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Plan, TICK_HZ, TickInput};
-use diagnosis::effects::{Plant, Surroundings};
 use diagnosis::rig::{Kind, Rig};
+use diagnosis::simulation::{Plant, Surroundings};
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 

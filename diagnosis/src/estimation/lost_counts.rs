@@ -1,0 +1,271 @@
+//! Lost counts: jumps of what the encoder reads that no force could bring about, found in the innovations.
+
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::filter::Gains;
+use crate::estimation::fit::Fit;
+use crate::numerics::linear::dot;
+use crate::numerics::linear::{Factor, Square};
+
+/// What is asked of a jump and of a recording.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked {
+    /// Least gain of log-likelihood of a jump.
+    gain: f64,
+    /// Its least size, counts.
+    least: f64,
+    /// Fewest jumps of a recording.
+    fewest: usize,
+}
+
+impl Asked {
+    /// Before it is known that counts get lost: more than any jump that noise makes in a recording, and more than one.
+    pub(crate) const UNKNOWN: Self = Self { gain: 14.0, least: 0.7, fewest: 2 };
+    /// Where counts do get lost, one block in some hundreds: what makes another loss likelier than none.
+    pub(crate) const KNOWN: Self = Self { gain: 8.0, least: 0.55, fewest: 1 };
+}
+
+/// A jump of position must explain this many times what a jump of speed would: impacts are forces.
+const OVER_IMPACT: f64 = 1.3;
+/// Most jumps per recording, and the reach of a response in blocks.
+const MOST: usize = 80;
+const REACH: usize = 40;
+/// Fewest blocks after a jump that tell it from an impact.
+const FEWEST_AFTER: usize = 6;
+/// How often what is left is looked through again: a large jump hides its neighbours.
+const ROUNDS: usize = 3;
+
+/// Travel lost so far per block of a recording, from what a fit of it alone that knows of no jumps leaves; zero everywhere
+/// where too few are seen.
+pub(crate) fn find(track: &BlockedRecording, alone: &Fit, count: f64, asked: Asked) -> Vec<f64> {
+    let n = track.blocks();
+    let (gains, residual) = (&alone.prepared[0].gains, alone.residual(0));
+    let mut jumps: Vec<Jump> = Vec::new();
+    let mut left = residual.clone();
+    for _ in 0..ROUNDS {
+        let before = jumps.len();
+        for (j, pair) in peaks(track, gains, &left, asked.gain) {
+            let is_new = jumps.iter().all(|jump| jump.block.abs_diff(j) > 1);
+            if jumps.len() < MOST && pair.size().abs() > asked.least * count && is_new {
+                jumps.push(Jump::new(track, gains, j, pair.later()));
+            }
+        }
+        if jumps.len() == before {
+            break;
+        }
+        jumps.sort_by_key(|jump| jump.block);
+        let stands = |jump: &Jump| jump.gain() > asked.gain && jump.size.abs() > asked.least * count;
+        left = settle(&mut jumps, &residual, stands);
+    }
+    let mut lost = vec![0.0; n];
+    if jumps.len() < asked.fewest {
+        return lost;
+    }
+    for Jump { block, later, size, .. } in jumps {
+        lost[block] += (1.0 - later) * size;
+        lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
+    }
+    lost
+}
+
+/// A response after blocks in which there is none.
+fn after(blocks: usize, response: Vec<f64>) -> Vec<f64> {
+    [vec![0.0; blocks], response].concat()
+}
+
+/// Blocks at which a jump of the reading stands out, the clearest first.
+fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: f64) -> Vec<(usize, Pair)> {
+    let mut found: Vec<(usize, Pair)> = Vec::new();
+    let n = residual.len();
+    for j in (5..n.saturating_sub(FEWEST_AFTER)).filter(|j| !track.rest[*j]) {
+        let window = j - 1..(j + REACH).min(n);
+        let left = &residual[window.clone()];
+        let jump = |at: usize| after(at - window.start, gains.response_to_jump(track, at..window.end));
+        let jump = Pair::new(&jump(j), &jump(j + 1), left);
+        // What is lost is lost on the way: the reading falls behind the motion.
+        if jump.gain <= least_gain || jump.size() * track.v[j] >= 0.0 {
+            continue;
+        }
+        let impact = |at: usize| after(at - window.start, gains.response_to_impact(track, at..window.end));
+        let [before, now, next] = [j - 1, j, j + 1].map(impact);
+        let impact = Pair::new(&before, &now, left).gain.max(Pair::new(&now, &next, left).gain);
+        if jump.gain > OVER_IMPACT * impact {
+            found.push((j, jump));
+        }
+    }
+    found.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain).then(a.0.cmp(&b.0)));
+    let mut apart: Vec<(usize, Pair)> = Vec::new();
+    for (j, jump) in found {
+        if apart.iter().all(|(k, _)| k.abs_diff(j) > REACH / 4) {
+            apart.push((j, jump));
+        }
+    }
+    apart
+}
+
+/// What falls into a block shows in part in it and whole in the next one: a response from some block on and the same from the
+/// next one on, neither against the other.
+struct Pair {
+    first: f64,
+    second: f64,
+    /// Of log-likelihood.
+    gain: f64,
+}
+
+impl Pair {
+    /// What a response and a later one, as far as `left` goes, explain of what is left.
+    fn new(response: &[f64], later: &[f64], left: &[f64]) -> Self {
+        let (square, square_later) = (dot(response, response).max(1e-300), dot(later, later).max(1e-300));
+        let both = dot(response, later);
+        let (first, second) = (dot(response, left), dot(later, left));
+        let determinant = square * square_later - both * both;
+        let a = (square_later * first - both * second) / determinant;
+        let b = (square * second - both * first) / determinant;
+        if a * b > 0.0 {
+            Self { first: a, second: b, gain: 0.5 * (a * first + b * second) }
+        } else if first * first / square > second * second / square_later {
+            Self { first: first / square, second: 0.0, gain: 0.5 * first * first / square }
+        } else {
+            Self { first: 0.0, second: second / square_later, gain: 0.5 * second * second / square_later }
+        }
+    }
+
+    fn size(&self) -> f64 {
+        self.first + self.second
+    }
+
+    /// Part of it that shows a block later.
+    fn later(&self) -> f64 {
+        if self.size() == 0.0 { 0.0 } else { self.second / self.size() }
+    }
+}
+
+/// A jump with what it does to the residual.
+struct Jump {
+    block: usize,
+    /// Part of it that shows a block later.
+    later: f64,
+    size: f64,
+    /// To a jump by one at the block and at the next one.
+    responses: [Vec<f64>; 2],
+}
+
+impl Jump {
+    fn new(track: &BlockedRecording, gains: &Gains, block: usize, later: f64) -> Self {
+        let n = track.blocks();
+        let responses = [block, block + 1].map(|at| after(at, gains.response_to_jump(track, at..n)));
+        Self { block, later, size: 0.0, responses }
+    }
+
+    fn response(&self) -> Vec<f64> {
+        let [now, next] = &self.responses;
+        now.iter().zip(next).map(|(now, next)| (1.0 - self.later) * now + self.later * next).collect()
+    }
+
+    /// Of log-likelihood.
+    fn gain(&self) -> f64 {
+        let response = self.response();
+        0.5 * self.size * self.size * dot(&response, &response)
+    }
+}
+
+/// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits again;
+/// gives what is left of the residual.
+fn settle(jumps: &mut Vec<Jump>, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
+    let left = fit_sizes(jumps, residual);
+    for jump in jumps.iter_mut() {
+        let with: Vec<f64> = left.iter().zip(jump.response()).map(|(left, x)| left + jump.size * x).collect();
+        jump.later = Pair::new(&jump.responses[0], &jump.responses[1], &with).later();
+    }
+    fit_sizes(jumps, residual);
+    jumps.retain(stands);
+    fit_sizes(jumps, residual)
+}
+
+/// Sizes that leave the least, all fitted at once, and what they leave.
+fn fit_sizes(jumps: &mut [Jump], residual: &[f64]) -> Vec<f64> {
+    let responses: Vec<Vec<f64>> = jumps.iter().map(Jump::response).collect();
+    let mut m = Square::zero(responses.len());
+    for (a, i) in responses.iter().enumerate() {
+        for (b, j) in responses.iter().enumerate().take(a + 1) {
+            let product = dot(i, j);
+            m.add(a, b, product);
+            if a != b {
+                m.add(b, a, product);
+            }
+        }
+    }
+    let right: Vec<f64> = responses.iter().map(|response| dot(response, residual)).collect();
+    let mut left = residual.to_vec();
+    for ((jump, size), response) in jumps.iter_mut().zip(Factor::new(&m).solve(&right)).zip(&responses) {
+        jump.size = size;
+        left.iter_mut().zip(response).for_each(|(left, x)| *left -= size * x);
+    }
+    left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::filter::Noise;
+    use crate::estimation::model::{Model, Nominal};
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    #[test]
+    fn a_jump_within_a_block_is_one_in_two_parts_and_parts_that_oppose_each_other_are_none() {
+        let (now, next) = ([1.0, -0.6, 0.1, 0.0, 0.0], [0.0, 1.0, -0.6, 0.1, 0.0]);
+        let left =
+            |a: f64, b: f64| -> Vec<f64> { now.iter().zip(next).map(|(x, y)| a * x + b * y).collect() };
+        let pair = |left: &[f64]| Pair::new(&now, &next, left);
+        let half = pair(&left(2.0, 2.0));
+        let all: f64 = left(2.0, 2.0).iter().map(|x| x * x).sum();
+        assert!((half.size() - 4.0).abs() < 1e-9 && (half.gain - 0.5 * all).abs() < 1e-9);
+        assert!((pair(&left(1.0, 3.0)).later() - 0.75).abs() < 1e-9);
+        let opposed = pair(&left(3.0, -1.0));
+        assert!(
+            opposed.second == 0.0 && opposed.gain < 0.5 * left(3.0, -1.0).iter().map(|x| x * x).sum::<f64>()
+        );
+        assert!(pair(&left(0.0, 5.0)).second > 4.9);
+    }
+
+    const ROWS_PER_S: f64 = 5000.0;
+
+    /// What is found to be lost, counts, and the blocks' starts, s, on an axis whose reading and speed change as told.
+    fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+        let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
+        let recording = Recording {
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.iter().map(|t| counts(*t).floor()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let count = 1.0 / rig.encoder.counts_per_unit;
+        let mut tracks = [BlockedRecording::new(&recording, &rig)];
+        tracks[0].v.fill(3.0);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
+        let lost = find(&tracks[0], &fit, count, asked);
+        (lost.iter().map(|lost| lost / count).collect(), tracks[0].start.clone())
+    }
+
+    #[test]
+    fn lost_counts_are_found_where_in_a_block_they_fall_and_how_many() {
+        let after = |at: f64, t: f64| f64::from(u8::from(t >= at));
+        let reads = |t: f64| 3000.3 * t - 2.0 * after(0.6003, t) - after(1.2349, t);
+        let (lost, start) = lost(reads, Asked::UNKNOWN);
+        let at = |t: f64| lost[start.partition_point(|start| *start < t)];
+        assert_eq!(at(0.58), 0.0);
+        assert!((at(0.62) + 2.0).abs() < 0.1 && (at(1.26) + 3.0).abs() < 0.1, "{} {}", at(0.62), at(1.26));
+    }
+
+    #[test]
+    fn one_loss_is_none_before_it_is_known_that_counts_get_lost_and_an_impact_never_is() {
+        let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
+        let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
+        assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
+        let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
+        assert!(!any(lost(impact, Asked::KNOWN)));
+    }
+}

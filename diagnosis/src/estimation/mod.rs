@@ -1,0 +1,12 @@
+//! From recordings and a model of fixed structure to coefficients, noise and motion. Nothing here chooses between effects.
+
+pub(crate) mod blocked_recording;
+pub(crate) mod filter;
+pub(crate) mod fit;
+pub(crate) mod force_residual;
+pub(crate) mod lost_counts;
+pub(crate) mod model;
+pub(crate) mod noise;
+pub(crate) mod refit;
+pub(crate) mod regressors;
+pub(crate) mod slices;

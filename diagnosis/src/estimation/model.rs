@@ -1,0 +1,455 @@
+//! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
+
+use crate::effects::{CommandLaw, Effect, EffectName};
+use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::filter::Noise;
+use crate::estimation::fit::Fit;
+use crate::estimation::regressors::effect_inputs;
+use crate::io::rig::Rig;
+use crate::numerics::linear::Prior;
+
+/// A column's meaning. Coefficients are accelerations: force divided by inertia.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Key {
+    /// Effective command: gain over inertia.
+    Gain,
+    Viscous,
+    Coulomb,
+    Offset,
+    Weight,
+    /// The measured external load.
+    External,
+    /// Term of an effect of the model.
+    Term {
+        effect: usize,
+        term: usize,
+    },
+}
+
+/// One column over one recording.
+pub(crate) struct Column {
+    pub(crate) key: Key,
+    pub(crate) input: Input,
+    /// Whether each recording has a coefficient of its own.
+    pub(crate) own: bool,
+    pub(crate) prior: Prior,
+}
+
+/// The nominal model in units of acceleration, with what may move.
+#[derive(Debug, Clone)]
+pub(crate) struct Nominal {
+    pub(crate) rig: Rig,
+    /// Sign with which the measured load acts; zero where it was not seen to act.
+    pub(crate) external: f64,
+    /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard deviation).
+    pub(crate) anchor: Option<(f64, f64)>,
+    /// Whether the refit explains most of the force.
+    pub(crate) is_balanced: bool,
+}
+
+/// What the law of a joint takes from the whole machine, all per inertia: per unit of command and of the measured load, by dry
+/// and viscous friction, and by the weight.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Machine {
+    pub(crate) per_command: f64,
+    pub(crate) dry: f64,
+    viscous: f64,
+    per_force: f64,
+    weight: f64,
+}
+
+impl Machine {
+    /// The values of a shape.
+    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
+        let Self { per_command, dry, viscous, per_force, weight } = *self;
+        [
+            ("per_command", per_command),
+            ("dry", dry),
+            ("viscous", viscous),
+            ("per_force", per_force),
+            ("weight", weight),
+        ]
+    }
+}
+
+/// How many standard deviations a nominal value may move in a refit.
+const REACH: f64 = 3.0;
+/// The same of gain over inertia: a refit that stops at the end of it makes a drift of the rest.
+const RATIO_REACH: f64 = 3.5;
+/// How many standard deviations a nominal value may be below the truth.
+const FARTHEST: f64 = 2.5;
+
+/// Least part of the truth that a nominal value of some relative standard deviation may be.
+fn least_of_truth(sd: f64) -> f64 {
+    1.0 - (FARTHEST * sd).min(0.98)
+}
+
+/// Most that the truth may be over its nominal value: one that is off by its deviation may be small against the truth, so
+/// that this is farther than the way down.
+fn most_over_nominal(sd: f64) -> f64 {
+    (2.0 * (1.0 + REACH * sd)).max(1.0 / least_of_truth(sd))
+}
+
+/// Largest part of the command that may do nothing: where forces are in balance, where the inertia is hardly known, and
+/// where forces are not in balance.
+const IGNORED: f64 = 0.9;
+const IGNORED_UNANCHORED: f64 = 0.35;
+const IGNORED_UNBALANCED: f64 = 0.2;
+
+impl Nominal {
+    /// Gain over inertia as the rig states it.
+    pub(crate) fn gain(&self) -> f64 {
+        self.rig.actuator.gain / self.rig.model.inertia
+    }
+
+    /// Gain over inertia as far as it is known: by the anchor, where there is one.
+    pub(crate) fn known_gain(&self) -> f64 {
+        self.anchor.map_or(self.gain(), |(value, _)| value)
+    }
+
+    /// The inertia that goes with it and the rig's gain.
+    fn known_inertia(&self) -> f64 {
+        self.anchor.map_or(self.rig.model.inertia, |(value, _)| (self.rig.actuator.gain / value).abs())
+    }
+
+    /// Factor by which gain over inertia may differ from its nominal value.
+    pub(crate) fn gain_reach(&self) -> f64 {
+        1.0 + REACH * self.gain_sd()
+    }
+
+    /// Relative standard deviation of gain over inertia.
+    pub(crate) fn gain_sd(&self) -> f64 {
+        (self.rig.gain_sd().powi(2) + self.rig.inertia_sd().powi(2)).sqrt()
+    }
+
+    fn has_offset(&self) -> bool {
+        self.rig.model.offset.is_some()
+    }
+
+    /// Whether the nominal model holds an effect already, so that it cannot have been left out.
+    pub(crate) fn holds(&self, name: EffectName) -> bool {
+        let model = &self.rig.model;
+        match name {
+            EffectName::ViscousFriction => model.viscous.is_some_and(|x| x > 0.0),
+            EffectName::CoulombFriction => model.coulomb.is_some_and(|x| x > 0.0),
+            EffectName::TiltGravity => model.weight.is_some_and(|x| x != 0.0),
+            _ => false,
+        }
+    }
+
+    fn priors(&self, key: Key, noise: &Noise) -> Prior {
+        let rig = &self.rig;
+        let j = self.known_inertia();
+        let common = rig.inertia_sd().min(self.anchor.map_or(f64::INFINITY, |(_, sd)| sd));
+        let relative = |value: f64, sd: f64| {
+            let mean = value / j;
+            let sd = (sd * sd + common * common).sqrt();
+            // Friction never vanishes where the rig declares it.
+            let (a, b) = (mean / (2.0 * (1.0 + REACH * sd)), mean * most_over_nominal(sd));
+            let least = least_of_truth(sd).max(0.2);
+            Prior { mean, sd: sd / least * mean.abs(), low: a.min(b), high: a.max(b) }
+        };
+        match key {
+            Key::Gain => {
+                let (mean, sd) = self.anchor.unwrap_or((self.gain(), self.gain_sd()));
+                let (a, b) = (mean / (1.0 + RATIO_REACH * sd), mean / (1.0 - RATIO_REACH * sd).max(0.05));
+                Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
+            }
+            Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
+            Key::Coulomb => relative(rig.model.coulomb.unwrap_or(0.0), rig.coulomb_sd()),
+            Key::Weight => relative(rig.model.weight.unwrap_or(0.0), rig.weight_sd()),
+            Key::Offset => {
+                // A rig without an offset still sees a bias that wanders by a fraction of the disturbance.
+                let wander = 0.5 * noise.slow.sqrt();
+                let sd = if self.has_offset() {
+                    let declared = rig.uncertainty.offset.unwrap_or(0.0) / j;
+                    declared.max(wander).max(0.3 * self.force_scale() / j)
+                } else {
+                    wander
+                };
+                Prior { mean: rig.model.offset.unwrap_or(0.0) / j, sd, ..Prior::FREE }
+            }
+            Key::External => Prior { mean: self.external / j, sd: 0.5 / j, ..Prior::FREE },
+            Key::Term { .. } => Prior::FREE,
+        }
+    }
+
+    /// What the coefficient of an effect's term may be for the effect to be what its name says.
+    pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
+        let gain = self.known_gain();
+        match name {
+            EffectName::GainDrift => {
+                // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
+                let least = 0.6 * gain.abs() / self.gain_reach();
+                (-least, least)
+            }
+            // What warms changes both frictions alike.
+            EffectName::FrictionDrift if term > 0 && self.holds(EffectName::ViscousFriction) => {
+                let viscous = self.most_friction(self.rig.model.viscous);
+                (-0.9 * viscous, 3.0 * viscous)
+            }
+            EffectName::AsymmetricFriction if term == 0 && self.holds(EffectName::ViscousFriction) => {
+                let viscous = self.most_friction(self.rig.model.viscous);
+                (-viscous, viscous)
+            }
+            EffectName::AsymmetricFriction if term > 0 && self.holds(EffectName::CoulombFriction) => {
+                let dry = self.most_friction(self.rig.model.coulomb);
+                (-dry, dry)
+            }
+            EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
+                // How much of the friction as it is may go or come is judged where that is known.
+                let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
+                let most = most_over_nominal(self.rig.coulomb_sd()) * dry;
+                (-0.9 * most, 3.0 * most)
+            }
+            // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
+            // hardly known, a ripple as large explains what cogging does.
+            EffectName::TorqueRipple => {
+                let part = if self.anchor.is_some() { 0.45 } else { 0.9 * self.gain_reach() };
+                (-part * gain.abs(), part * gain.abs())
+            }
+            EffectName::Backlash => ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain)),
+            // A small mass that always slips is a friction of another form, not a drive that lets go.
+            EffectName::RollerSlip => ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain)),
+            EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
+            EffectName::MissedCounts => (0.5, 1.5),
+            EffectName::PositionSpring if term > 0 => (f64::NEG_INFINITY, f64::INFINITY),
+            name if name.is_positive() => (0.0, f64::INFINITY),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+
+    /// Most that a friction of the rig may be over the inertia: twice what the rig says, anything where it says nought.
+    fn most_friction(&self, value: Option<f64>) -> f64 {
+        let most = 2.0 * value.unwrap_or(0.0) / self.known_inertia();
+        if most > 0.0 { most } else { f64::INFINITY }
+    }
+
+    /// Largest part of the command that may do nothing. Where the inertia is hardly known or the forces are far from balance,
+    /// a drive that ignores its command explains anything, and so explains nothing.
+    pub(crate) fn most_ignored(&self) -> f64 {
+        match (self.anchor, self.is_balanced) {
+            (Some(_), _) => IGNORED_UNANCHORED,
+            (None, true) => IGNORED,
+            (None, false) => IGNORED_UNBALANCED,
+        }
+    }
+
+    /// Whether effective commands leave less of the command of some recordings than may be left.
+    pub(crate) fn ignores_too_much(&self, tracks: &[BlockedRecording], effective: &[Vec<f64>]) -> bool {
+        let (mut taken, mut whole) = (0.0, 0.0);
+        for (track, effective) in tracks.iter().zip(effective) {
+            taken += effective.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum::<f64>();
+            whole += track.command.iter().map(|u| u.abs()).sum::<f64>();
+        }
+        taken > self.most_ignored() * whole
+    }
+
+    /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.
+    pub(crate) fn dry_deceleration(&self) -> f64 {
+        let dry = self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale());
+        dry / self.known_inertia()
+    }
+
+    /// What the law of a joint takes from the whole machine: as fitted, or as the rig has it.
+    pub(crate) fn machine(&self, fit: Option<&Fit>) -> Machine {
+        let model = &self.rig.model;
+        let fitted = |key: Key, otherwise: f64| fit.and_then(|fit| fit.value(key)).unwrap_or(otherwise);
+        let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
+        Machine {
+            per_command: fitted(Key::Gain, self.known_gain()),
+            dry: fitted(Key::Coulomb, self.dry_deceleration()),
+            viscous: fitted(Key::Viscous, per_inertia(model.viscous)),
+            per_force: fitted(Key::External, per_inertia(Some(self.external))),
+            weight: fitted(Key::Weight, per_inertia(model.weight)),
+        }
+    }
+
+    /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
+    pub(crate) fn force_scale(&self) -> f64 {
+        let limit = self.rig.actuator.limit.map_or(0.0, |limit| 0.1 * limit * self.rig.actuator.gain.abs());
+        self.rig.model.coulomb.unwrap_or(0.0).max(limit)
+    }
+}
+
+/// A model: the nominal terms plus effects whose shapes are fixed and whose coefficients are fitted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Model {
+    pub(crate) effects: Vec<Effect>,
+    /// Acceleration by the force that is there all the time, for a second mass to take up, per fitted recording; where there is
+    /// none the track's own.
+    pub(crate) bias: Vec<f64>,
+}
+
+/// The effective commands of recordings under effects of which the last acts on the command; none where it does not.
+pub(crate) fn effective_commands(tracks: &[BlockedRecording], effects: &[Effect]) -> Option<Vec<Vec<f64>>> {
+    CommandLaw::new(effects.last()?)?;
+    tracks.iter().map(|track| effective_command(track, effects)).collect()
+}
+
+/// The effective command of a recording under the command effects of a model, per row.
+pub(crate) fn effective_command(track: &BlockedRecording, effects: &[Effect]) -> Option<Vec<f64>> {
+    let mut laws: Vec<CommandLaw> = effects.iter().filter_map(CommandLaw::new).collect();
+    if laws.is_empty() {
+        return None;
+    }
+    // A delay alone is what most trials are of.
+    if let [CommandLaw::Delay { delay, .. }] = laws.as_slice() {
+        return Some(delayed(&track.command, &track.row_hold, *delay));
+    }
+    let holdout = track.command.iter().zip(track.row_hold.iter());
+    Some(holdout.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
+}
+
+/// Mean over each row of commands that arrive late, as [`CommandLaw::Delay`] makes it: differences of the command's
+/// integral, which cost no queue.
+fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
+    // The row that holds what arrives now, when it began, and the integral until then.
+    let (mut row, mut began, mut before) = (0, 0.0, 0.0);
+    let mut integral = |time: f64| {
+        while row + 1 < command.len() && began + hold[row] <= time {
+            before += command[row] * hold[row];
+            began += hold[row];
+            row += 1;
+        }
+        // Before the first row the command is taken to have stood still.
+        before + command[row] * (time - began)
+    };
+    let (mut time, mut last) = (-delay, integral(-delay));
+    hold.iter()
+        .map(|h| {
+            time += h;
+            let now = integral(time);
+            let mean = (now - last) / h;
+            last = now;
+            mean
+        })
+        .collect()
+}
+
+/// Whether each recording has its own phase, so that coefficients are not shared.
+pub(crate) fn own_phase(name: EffectName) -> bool {
+    matches!(
+        name,
+        EffectName::Cogging
+            | EffectName::TorqueRipple
+            | EffectName::MassImbalance
+            | EffectName::EncoderEccentricity
+    )
+}
+
+/// Sign of the velocity where it is known, per block.
+pub(crate) fn direction(track: &BlockedRecording) -> Vec<f64> {
+    track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
+}
+
+impl Model {
+    /// Acceleration by the force that is there all the time in a recording.
+    fn bias_on(&self, track: &BlockedRecording) -> f64 {
+        track.place.and_then(|place| self.bias.get(place)).copied().unwrap_or(track.bias)
+    }
+
+    /// The columns of this model over a recording, nominal terms first.
+    pub(crate) fn columns(&self, nominal: &Nominal, track: &BlockedRecording, noise: &Noise) -> Vec<Column> {
+        let effective = effective_command(track, &self.effects);
+        let command = effective.as_deref().unwrap_or(&track.command);
+        let drive = track.drive(effective.as_deref());
+        let direction = direction(track);
+        let mut columns = Vec::new();
+        let mut push = |key: Key, input: Input, own: bool| {
+            columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
+        };
+        if nominal.holds(EffectName::ViscousFriction) {
+            push(Key::Viscous, Input::Held(track.v.iter().map(|v| -v).collect()), false);
+        }
+        if nominal.holds(EffectName::CoulombFriction) {
+            push(Key::Coulomb, Input::Held(direction.iter().map(|s| -s).collect()), false);
+        }
+        push(Key::Offset, Input::Held(vec![1.0; track.blocks()]), true);
+        if let (true, Some(tilt)) = (nominal.holds(EffectName::TiltGravity), &track.tilt) {
+            push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
+        }
+        if let Some(force) = &track.force {
+            push(Key::External, Input::Held(force.clone()), false);
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            for (term, input) in effect_inputs(track, effect, command, self.bias_on(track), || drive.clone())
+                .into_iter()
+                .enumerate()
+            {
+                push(Key::Term { effect: index, term }, input, own_phase(effect.name));
+            }
+        }
+        for column in &mut columns {
+            if let Key::Term { effect, term } = column.key {
+                (column.prior.low, column.prior.high) = nominal.limits(self.effects[effect].name, term);
+            }
+        }
+        let mut push = |key: Key, input: Input, own: bool| {
+            columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
+        };
+        push(Key::Gain, drive, false);
+        columns.rotate_right(1);
+        columns
+    }
+}
+
+/// The total input of columns with their coefficients.
+pub(crate) fn total(track: &BlockedRecording, columns: &[Column], theta: &[f64]) -> Total {
+    let mut total = Total::zero(track.blocks());
+    for (column, theta) in columns.iter().zip(theta) {
+        if *theta != 0.0 {
+            column.input.add_to(&mut total, track, *theta);
+        }
+    }
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nominal(viscous: f64, coulomb: f64) -> Nominal {
+        let rig = Rig::of_values(0.01, viscous, coulomb);
+        Nominal { rig, external: 0.0, anchor: None, is_balanced: true }
+    }
+
+    #[test]
+    fn a_delayed_command_is_what_the_law_of_a_delay_makes_of_it() {
+        let hold: Vec<f64> = (0..500).map(|i| 1e-3 * (1.0 + 0.2 * f64::from(i % 7))).collect();
+        let command: Vec<f64> = (0..500).map(|i| (0.3 * f64::from(i)).sin() + 0.5).collect();
+        for delay in [1e-6, 0.4e-3, 1e-3, 7.3e-3, 0.9] {
+            let effect = Effect::shaped(EffectName::CommandDelay, &[("delay", delay)]);
+            let mut law = CommandLaw::new(&effect).expect("a delay acts on the command");
+            for (now, (u, h)) in delayed(&command, &hold, delay).iter().zip(command.iter().zip(&hold)) {
+                let expected = law.step(*u, *h);
+                assert!((now - expected).abs() < 1e-9, "{now} {expected} at a delay of {delay}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_differs_or_drifts_stays_within_what_the_rigs_frictions_allow() {
+        let (asymmetric, drift) = (EffectName::AsymmetricFriction, EffectName::FrictionDrift);
+        let known = nominal(0.02, 0.05);
+        let near = |(low, high): (f64, f64), (a, b): (f64, f64)| {
+            assert!((low - a).abs() < 1e-9 && (high - b).abs() < 1e-9, "{low} {high}");
+        };
+        near(known.limits(asymmetric, 0), (-4.0, 4.0));
+        near(known.limits(asymmetric, 1), (-10.0, 10.0));
+        let most = most_over_nominal(0.5) * 5.0;
+        near(known.limits(drift, 0), (-0.9 * most, 3.0 * most));
+        near(known.limits(drift, 1), (-3.6, 12.0));
+        // A part of the gain as it is, and that may be larger than the rig's.
+        let part = 0.9 * known.gain() * known.gain_reach();
+        assert!(known.gain_reach() > 1.0);
+        near(known.limits(EffectName::TorqueRipple, 0), (-part, part));
+        // Gain over inertia twice the rig's: half the inertia, twice the deceleration.
+        let anchored = Nominal { anchor: Some((20.0, 0.3)), ..known };
+        near(anchored.limits(asymmetric, 0), (-8.0, 8.0));
+        let nought = nominal(0.0, 0.0);
+        for term in [0, 1] {
+            assert_eq!(nought.limits(asymmetric, term), (f64::NEG_INFINITY, f64::INFINITY));
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! How large sensor noise and disturbance are: maximum likelihood of the innovations, by a deterministic pattern search.
+
+use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::filter::{Gains, Noise, robust_loss};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
+const LOOKED_AT: usize = 8000;
+
+/// Blocks that are forgiven together where they are worse than the noise.
+const STRETCH: usize = 100;
+
+/// A stretch of a recording with the input of the current model.
+struct Excerpt {
+    track: BlockedRecording,
+    total: Total,
+}
+
+fn excerpts(track: &BlockedRecording, total: &Total) -> Vec<Excerpt> {
+    let n = track.blocks();
+    if n <= LOOKED_AT {
+        return vec![excerpt(track, total, 0, n)];
+    }
+    let half = LOOKED_AT / 2;
+    let first = (n / 2 - half) / 2;
+    let second = n - half - first;
+    vec![excerpt(track, total, first, first + half), excerpt(track, total, second, second + half)]
+}
+
+fn excerpt(track: &BlockedRecording, total: &Total, from: usize, to: usize) -> Excerpt {
+    let cut = |column: &[f64]| column[from..to].to_vec();
+    let z0 = track.z[from];
+    let mut part = BlockedRecording {
+        file: String::new(),
+        rows_per_block: track.rows_per_block,
+        start: track.start[from..to].iter().map(|t| t - track.start[from]).collect(),
+        span: cut(&track.span),
+        tau1: cut(&track.tau1),
+        tau2: cut(&track.tau2),
+        z: track.z[from..to].iter().map(|z| z - z0).collect(),
+        quantum: cut(&track.quantum),
+        row_time: [].into(),
+        row_hold: [].into(),
+        command: [].into(),
+        command_input: Arc::new(Input::Held(Vec::new())),
+        of_contact: Arc::default(),
+        of_grip: Arc::default(),
+        tilt: None,
+        force: None,
+        reference: None,
+        x: Vec::new(),
+        v: Vec::new(),
+        rest: track.rest[from..to].to_vec(),
+        stuck: track.stuck[from..to].to_vec(),
+        unknown: vec![false; to - from],
+        segments: vec![0, to - from],
+        place: None,
+        bias: 0.0,
+        lost: Vec::new(),
+        speed_floor: track.speed_floor,
+        stops_from: track.stops_from,
+    };
+    part.x = Vec::new();
+    let total = Total { dv: cut(&total.dv), dq: cut(&total.dq), dz: cut(&total.dz) };
+    Excerpt { track: part, total }
+}
+
+fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
+    let each: Vec<f64> = parts
+        .par_iter()
+        .map(|part| {
+            let gains = Gains::new(&part.track, noise);
+            let e = gains.innovations(&part.track, &part.total);
+            let cost: f64 = e
+                .chunks(STRETCH)
+                .map(|e| {
+                    let square: f64 = e.iter().map(|e| e * e).sum();
+                    e.len() as f64 * robust_loss(square / e.len() as f64).0
+                })
+                .sum();
+            gains.log_det - 0.5 * cost
+        })
+        .collect();
+    each.iter().sum()
+}
+
+/// Which disturbance is allowed for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Colour {
+    /// White force: every frequency of the band counts the same, as in a plain force error. Ranks effects.
+    White,
+    /// White force and a slow disturbance: what wanders by itself proves nothing. Tests effects.
+    Slow,
+}
+
+/// Bounds of the correlation time of the disturbance, s: longer would be an offset, shorter would be white.
+const TAU: (f64, f64) = (0.004, 0.1);
+
+/// The noise under which the innovations of these recordings are the most likely, starting from `from`.
+pub(crate) fn estimate(
+    tracks: &[BlockedRecording],
+    totals: &[Total],
+    from: &Noise,
+    scale: f64,
+    colour: Colour,
+) -> Noise {
+    let parts: Vec<Excerpt> =
+        tracks.iter().zip(totals).flat_map(|(track, total)| excerpts(track, total)).collect();
+    let span = tracks[0].span.iter().sum::<f64>() / tracks[0].blocks() as f64;
+    let mut at = [from.sensor.ln(), from.white.ln(), from.slow.ln(), from.tau.ln()];
+    let floor = scale * scale * 1e-12;
+    let lower = [0.3_f64.ln(), (floor * span).ln(), floor.ln(), TAU.0.ln()];
+    let upper = [1e9_f64.ln(), (scale * scale * 10.0 * span).ln(), (scale * scale * 10.0).ln(), TAU.1.ln()];
+    let noise_at = |at: &[f64; 4]| Noise {
+        sensor: at[0].exp(),
+        white: at[1].exp(),
+        slow: at[2].exp(),
+        tau: at[3].exp(),
+        rest: from.rest,
+    };
+    let mut step = [1.5, 2.0, 2.0, 1.0];
+    let moved_values = match colour {
+        Colour::White => 2,
+        Colour::Slow => 4,
+    };
+    if colour == Colour::White {
+        at[2] = lower[2];
+    } else if at[2] <= lower[2] + 1e-9 {
+        // Coming from white noise: start where both kinds are as strong at the correlation time.
+        at[2] = (0.5 * at[1].exp() / TAU.1).ln();
+    }
+    for i in 0..4 {
+        at[i] = at[i].clamp(lower[i], upper[i]);
+    }
+    let mut best = log_likelihood(&parts, &noise_at(&at));
+    for _ in 0..14 {
+        let mut moved = false;
+        for i in 0..moved_values {
+            for way in [1.0, -1.0] {
+                let mut trial = at;
+                trial[i] = (at[i] + way * step[i]).clamp(lower[i], upper[i]);
+                if trial[i] == at[i] {
+                    continue;
+                }
+                let value = log_likelihood(&parts, &noise_at(&trial));
+                if value > best + 0.05 {
+                    best = value;
+                    at = trial;
+                    step[i] *= 1.3;
+                    moved = true;
+                    break;
+                }
+            }
+        }
+        if !moved {
+            for step in &mut step {
+                *step *= 0.45;
+            }
+            if step[..moved_values].iter().all(|step| *step < 0.12) {
+                break;
+            }
+        }
+    }
+    noise_at(&at)
+}
+
+/// Where the search starts before anything is known: `scale` is the acceleration that the command makes.
+pub(crate) fn guess(tracks: &[BlockedRecording], scale: f64) -> Noise {
+    let span = tracks[0].span.iter().sum::<f64>() / tracks[0].blocks() as f64;
+    Noise {
+        sensor: 1.0,
+        white: (0.01 * scale).powi(2) * span,
+        slow: (0.1 * scale).powi(2),
+        tau: 0.1,
+        rest: scale * scale * span.max(1e-3),
+    }
+}

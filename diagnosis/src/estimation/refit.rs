@@ -1,0 +1,193 @@
+//! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
+
+use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::filter::{Noise, smooth};
+use crate::estimation::fit::Fit;
+use crate::estimation::model::{Key, Model, Nominal};
+use crate::estimation::noise::{self, Colour};
+use crate::numerics::linear::{Prior, Square, bounded};
+
+/// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
+const MARGIN: usize = 1;
+
+/// No count for this long is rest, s: the steadiest slow motion that is told from it makes fifty counts a second.
+const STILL_S: f64 = 0.02;
+
+/// Counts that a smoothed motion passes and the encoder does not before they contradict each other: the motion rests there.
+const CONTRADICTED: f64 = 2.0;
+
+/// Blocks at rest whatever a filter makes of the speed `v`: the encoder gives no count for a while, or for less where by
+/// that speed it should have given some.
+fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
+    let n = track.blocks();
+    let reach = ((STILL_S * track.block_rate()).ceil() as usize).max(2);
+    let mut out = vec![false; n];
+    let mut from = 0;
+    while from < n {
+        // The mean of a block within which a count falls is no whole count.
+        let same = |j: &usize| (track.z[*j] - track.z[from]).abs() <= 1e-3 * count;
+        let to = (from + 1..n).take_while(same).last().unwrap_or(from);
+        let passed: f64 = (from..=to).map(|j| v[j] * track.span[j]).sum();
+        if to - from >= reach || (to > from && passed.abs() > CONTRADICTED * count) {
+            out[from..=to].fill(true);
+        }
+        from = to + 1;
+    }
+    out
+}
+
+/// Smooths the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
+/// encoder's.
+pub(crate) fn resmooth(tracks: &mut [BlockedRecording], totals: &[Total], noise: &Noise, count: f64) {
+    for (track, total) in tracks.iter_mut().zip(totals) {
+        let state = smooth(track, noise, total);
+        let mut sd: Vec<f64> =
+            state.v_sd.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(sd, _)| *sd).collect();
+        if sd.len() < 10 {
+            sd = state.v_sd.clone();
+        }
+        sd.sort_by(f64::total_cmp);
+        let typical = sd[sd.len() / 2];
+        let mut speeds: Vec<f64> = state.v.iter().map(|v| v.abs()).collect();
+        speeds.sort_by(f64::total_cmp);
+        // A quarter of the fast speed is moving, whatever the noise estimate says.
+        let fast = speeds[speeds.len() * 95 / 100];
+        let floor = (2.5 * typical).min(0.25 * fast).max(1e-6 * fast);
+        let still = still(track, &state.v, count);
+        let n = still.len();
+        let slow: Vec<bool> =
+            state.v.iter().zip(&still).map(|(v, still)| *still || v.abs() < floor).collect();
+        track.rest = (0..n)
+            .map(|j| {
+                let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
+                slow[a..=b].iter().any(|slow| *slow) || state.v[a] * state.v[b] <= 0.0
+            })
+            .collect();
+        track.stuck = still;
+        track.speed_floor = floor;
+        track.x = state.x;
+        track.v = state.v;
+    }
+}
+
+/// Relative standard deviation of gain over inertia above which the rig hardly knows it.
+const LOOSE: f64 = 0.5;
+
+/// Where the rig hardly knows the inertia, slow motion under a speed loop is explained as well by an axis too heavy to
+/// be moved as by forces in balance. Regressing the command on the motion, rather than the motion on the command, has
+/// no such way out; what it finds anchors the fits that follow.
+fn anchor(nominal: &mut Nominal, fit: &Fit) {
+    let size = fit.keys.len();
+    // Unknowns: the data's own column takes the place of the gain's.
+    let mut m = Square::zero(size);
+    let mut b = vec![0.0; size];
+    for (one, places) in fit.prepared.iter().zip(&fit.places) {
+        let p = places.len();
+        // Undo the reference: the data as it stands is the residual plus the reference's columns.
+        let mut raw: Vec<f64> = one.reference.clone();
+        raw.push(1.0);
+        for segment in &one.segments {
+            let with_raw: Vec<f64> =
+                (0..=p).map(|i| (0..=p).map(|j| segment.at(i, j) * raw[j]).sum()).collect();
+            let raw_square: f64 = with_raw.iter().zip(&raw).map(|(a, b)| a * b).sum();
+            // Column 0 is the gain's: command = (1/gain)·data − Σ forces/gain.
+            let inner = |i: usize, j: usize| match (i, j) {
+                (0, 0) => raw_square,
+                (0, j) => with_raw[j],
+                (i, 0) => with_raw[i],
+                (i, j) => segment.at(i, j),
+            };
+            for i in 0..p {
+                b[places[i]] += if i == 0 { with_raw[0] } else { segment.at(i, 0) };
+                for j in 0..p {
+                    m.add(places[i], places[j], inner(i, j));
+                }
+            }
+        }
+    }
+    let solution = bounded(&m, &b, &vec![Prior::FREE; size]);
+    let place = fit.places[0][0];
+    let inverse = solution.x[place];
+    if inverse * nominal.gain() > 0.0 {
+        let reach = 40.0;
+        let gain = (1.0 / inverse).abs().clamp(nominal.gain().abs() / reach, nominal.gain().abs() * reach);
+        nominal.anchor = Some((gain * nominal.gain().signum(), 0.3));
+    }
+}
+
+/// The sign with which the measured load acts, where it is seen to act as a load does.
+fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
+    let seen = fit.value(Key::External)? * nominal.rig.model.inertia;
+    (seen.abs() > 0.5 && seen.abs() < 2.0).then(|| seen.signum())
+}
+
+/// Scale of acceleration that the command makes.
+pub(crate) fn command_scale(nominal: &Nominal, tracks: &[BlockedRecording]) -> f64 {
+    let (mut square, mut rows) = (0.0, 0.0);
+    for track in tracks {
+        square += track.command.iter().map(|u| u * u).sum::<f64>();
+        rows += track.command.len() as f64;
+    }
+    nominal.known_gain().abs() * (square / rows).sqrt().max(1e-12)
+}
+
+/// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
+pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> (Noise, Fit) {
+    let mut scale = command_scale(nominal, tracks);
+    let mut noise = noise::guess(tracks, scale);
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
+    resmooth(tracks, &totals, &noise, count);
+    let model = Model::default();
+    let mut fit = Fit::new(&model, nominal, tracks, &noise);
+    for round in 0..2 {
+        if round == 0 && nominal.gain_sd() > LOOSE {
+            let white = noise::estimate(tracks, &totals, &noise, scale, Colour::White);
+            anchor(nominal, &Fit::new(&model, nominal, tracks, &white));
+            scale = command_scale(nominal, tracks);
+            fit = Fit::new(&model, nominal, tracks, &noise);
+        }
+        let totals = fit.totals(tracks);
+        noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
+        resmooth(tracks, &totals, &noise, count);
+        fit = Fit::new(&model, nominal, tracks, &noise);
+    }
+    if let Some(sign) = load_sign(nominal, &fit) {
+        nominal.external = sign;
+        fit = Fit::new(&model, nominal, tracks, &noise);
+    }
+    (noise, fit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    /// Blocks of 2.5 ms on which an axis passes one count each and from 40 on, for five blocks, none.
+    fn stopped_for_a_moment() -> BlockedRecording {
+        let count = |row: i32| f64::from(if row <= 40 { row } else { (row - 5).max(40) });
+        let recording = Recording {
+            time_s: (0..101).map(|row| f64::from(row) * 2.5e-3).collect(),
+            command: vec![0.0; 101],
+            position_counts: (0..101).map(count).collect(),
+            ..Recording::default()
+        };
+        BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
+    }
+
+    #[test]
+    fn an_axis_rests_where_the_smoothed_speed_promises_counts_that_do_not_come() {
+        let track = stopped_for_a_moment();
+        let count = track.z[1] - track.z[0];
+        let at = |counts_per_block: f64| {
+            let v: Vec<f64> = track.span.iter().map(|h| counts_per_block * count / h).collect();
+            still(&track, &v, count)
+        };
+        let resting = |at: &[bool]| (0..at.len()).filter(|j| at[*j]).collect::<Vec<_>>();
+        assert_eq!(resting(&at(0.6)), [40, 41, 42, 43, 44, 45], "3.6 counts promised");
+        assert!(resting(&at(0.2)).is_empty(), "1.2 counts are one more block's");
+    }
+}

@@ -1,0 +1,92 @@
+//! What one effect puts into a recording: the inputs of its terms. Nothing here is fitted.
+
+use crate::effects::{Effect, EffectName, Law, State};
+use crate::estimation::blocked_recording::{BlockedRecording, Input};
+
+/// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
+fn scales_drive(name: EffectName) -> bool {
+    matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
+}
+
+/// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
+/// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.
+pub(crate) fn effect_inputs(
+    track: &BlockedRecording,
+    effect: &Effect,
+    command: &[f64],
+    bias: f64,
+    drive: impl FnOnce() -> Input,
+) -> Vec<Input> {
+    if effect.name == EffectName::MissedCounts {
+        return vec![Input::Sensor(track.lost.clone())];
+    }
+    let Some(mut law) = Law::new(effect) else { return Vec::new() };
+    if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
+        return vec![of_second_mass(track, effect, &mut law, command, bias)];
+    }
+    let count = law.names().len();
+    let n = track.blocks();
+    let carried = effect.shape.contains_key("of_drive").then(|| track.block_mean(command));
+    let mut columns = vec![Vec::with_capacity(n); count];
+    let mut out = vec![0.0; count];
+    for j in 0..n {
+        let state = State {
+            position: track.x[j],
+            velocity: track.v[j],
+            acceleration: track.acceleration(j),
+            rest: track.rest[j],
+            drive: carried.as_ref().map_or(1.0, |carried| carried[j]),
+            command: 1.0,
+            tilt: track.tilt_at(j),
+            external: track.force_at(j),
+            time: track.start[j] + 0.5 * track.span[j],
+            dt: track.span[j],
+            ..State::default()
+        };
+        law.terms(&state, &mut out);
+        for (column, term) in columns.iter_mut().zip(&out) {
+            column.push(*term);
+        }
+    }
+    let sensor = law.in_sensor();
+    let drive = scales_drive(effect.name).then(drive);
+    columns
+        .into_iter()
+        .map(|column| {
+            if sensor {
+                Input::Sensor(column)
+            } else if let Some(drive) = &drive {
+                drive.scaled(&column)
+            } else {
+                Input::Held(column)
+            }
+        })
+        .collect()
+}
+
+/// What a second mass does is faster than a block.
+fn of_second_mass(
+    track: &BlockedRecording,
+    effect: &Effect,
+    law: &mut Law,
+    command: &[f64],
+    bias: f64,
+) -> Input {
+    let slices = if effect.name == EffectName::RollerSlip { &track.of_grip } else { &track.of_contact };
+    let mut out = [0.0];
+    let mut signal = Vec::new();
+    for (j, slices) in slices.blocks().enumerate() {
+        let (tilt, external) = (track.tilt_at(j), track.force_at(j));
+        for slice in slices {
+            let (command, hold) = (&command[slice.rows.clone()], &track.row_hold[slice.rows.clone()]);
+            let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / slice.span;
+            let velocity = track.velocity_within(j, slice.start + 0.5 * slice.span);
+            let dt = slice.span;
+            let state =
+                State { drive: mean, command: mean, velocity, tilt, external, bias, dt, ..State::default() };
+            law.terms(&state, &mut out);
+            signal.push(out[0]);
+        }
+    }
+    slices.input(&signal)
+}

@@ -1,0 +1,7 @@
+//! Files in and the shape of the report: rigs, recordings, their checks and `diagnosis.json`. Nothing here fits anything.
+
+pub(crate) mod error;
+pub mod recording;
+pub mod rig;
+pub(crate) mod schema;
+pub(crate) mod sufficiency;

@@ -1,0 +1,165 @@
+//! Recordings: CSV with a header line, read and checked; nothing is dropped in silence.
+
+use crate::io::error::InputError;
+use std::path::Path;
+
+/// One recording. All columns have the same length.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Recording {
+    /// What reports call it: the file's name.
+    pub file: String,
+    /// s, strictly increasing.
+    pub time_s: Vec<f64>,
+    /// In the rig's command unit, held until the next row.
+    pub command: Vec<f64>,
+    /// Counts; the zero is arbitrary.
+    pub position_counts: Vec<f64>,
+    /// Inclination below the horizontal, rad.
+    pub tilt_rad: Option<Vec<f64>>,
+    /// What a position loop was asked to follow, counts.
+    pub reference_counts: Option<Vec<f64>>,
+    /// An independently measured external load on the coordinate, N·m or N.
+    pub force: Option<Vec<f64>>,
+}
+
+const COLUMNS: [&str; 6] = ["time_s", "command", "position_counts", "tilt_rad", "reference_counts", "force"];
+
+/// Larger than anything a sensor says, small enough that squares of squares stay finite.
+const LARGEST: f64 = 1e15;
+
+impl Recording {
+    /// Reads and checks a recording.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let shown = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|cause| {
+            InputError::new(format!("{shown}: the recording cannot be read ({cause}); check its path"))
+        })?;
+        let text = String::from_utf8(bytes).map_err(|cause| {
+            let valid = cause.utf8_error().valid_up_to();
+            let line = cause.as_bytes()[..valid].iter().filter(|byte| **byte == b'\n').count() + 1;
+            InputError::new(format!("{shown}, line {line}: not text; a recording is a CSV file in UTF-8"))
+        })?;
+        let name = path.file_name().map_or(shown.clone(), |name| name.to_string_lossy().into_owned());
+        let mut recording = Self::parse(&text, &shown)?;
+        recording.file = name;
+        Ok(recording)
+    }
+
+    /// Checks the text of a recording; `file` is what errors call it.
+    pub fn parse(text: &str, file: &str) -> Result<Self, InputError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let at = |line: usize, what: String| InputError::new(format!("{file}, line {line}: {what}"));
+        let mut lines = text.lines();
+        let header = lines.next().unwrap_or("");
+        let names: Vec<&str> = header.split(',').map(|name| name.trim().trim_matches('"')).collect();
+        let mut place = [None; 6];
+        for (index, name) in names.iter().enumerate() {
+            if let Some(known) = COLUMNS.iter().position(|column| column == name)
+                && place[known].replace(index).is_some()
+            {
+                return Err(at(1, format!("the column {name} stands there twice; keep one of them")));
+            }
+        }
+        for needed in 0..3 {
+            if place[needed].is_none() {
+                let name = COLUMNS[needed];
+                return Err(at(1, format!("the column {name} is missing; name it in the header line")));
+            }
+        }
+        let wanted: Vec<Option<usize>> =
+            (0..names.len()).map(|index| place.iter().position(|p| *p == Some(index))).collect();
+        let mut columns: [Vec<f64>; 6] = Default::default();
+        let guess = text.len() / header.len().max(12);
+        for (column, place) in columns.iter_mut().zip(place) {
+            if place.is_some() {
+                column.reserve(guess);
+            }
+        }
+        let mut blank = None;
+        for (index, row) in lines.enumerate() {
+            let line = index + 2;
+            if row.trim().is_empty() {
+                blank = blank.or(Some(line));
+                continue;
+            }
+            if let Some(blank) = blank {
+                return Err(at(blank, "an empty line between rows; remove it or restore the row".into()));
+            }
+            let mut count = 0;
+            for field in row.split(',') {
+                if let Some(Some(known)) = wanted.get(count) {
+                    let field = field.trim();
+                    let value = field.parse::<f64>().ok().filter(|x| x.is_finite() && x.abs() < LARGEST);
+                    let Some(value) = value else {
+                        let name = COLUMNS[*known];
+                        let field: String = field.chars().take(24).collect();
+                        return Err(at(
+                            line,
+                            format!(
+                                "{name} is \"{field}\", not a usable number; correct or cut the recording"
+                            ),
+                        ));
+                    };
+                    columns[*known].push(value);
+                }
+                count += 1;
+            }
+            if count != names.len() {
+                return Err(at(
+                    line,
+                    format!(
+                        "{count} fields where the header names {}; restore the row or cut the recording before it",
+                        names.len()
+                    ),
+                ));
+            }
+            let times = &columns[0];
+            if let [.., before, now] = times[..]
+                && now <= before
+            {
+                return Err(at(
+                    line,
+                    format!(
+                        "the time {now} s does not come after {before} s; times must increase from row to row"
+                    ),
+                ));
+            }
+        }
+        let [time_s, command, position_counts, tilt, reference, force] = columns;
+        if time_s.len() < 2 {
+            return Err(InputError::new(format!(
+                "{file}: fewer than two rows; record some seconds of motion"
+            )));
+        }
+        let optional = |column: Vec<f64>, known: usize| place[known].map(|_| column);
+        Ok(Self {
+            file: file.to_owned(),
+            time_s,
+            command,
+            position_counts,
+            tilt_rad: optional(tilt, 3),
+            reference_counts: optional(reference, 4),
+            force: optional(force, 5),
+        })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// From the first row to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        self.time_s[self.len() - 1] - self.time_s[0]
+    }
+
+    /// Mean rate of the rows, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        (self.len() - 1) as f64 / self.duration_s()
+    }
+}

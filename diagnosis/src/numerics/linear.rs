@@ -1,0 +1,216 @@
+//! Small dense linear algebra: symmetric positive systems with a prior, bounds and removal of rows.
+
+/// A square symmetric matrix, row by row.
+#[derive(Debug, Clone)]
+pub(crate) struct Square {
+    pub(crate) n: usize,
+    pub(crate) a: Vec<f64>,
+}
+
+impl Square {
+    pub(crate) fn zero(n: usize) -> Self {
+        Self { n, a: vec![0.0; n * n] }
+    }
+    pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
+        self.a[i * self.n + j]
+    }
+    pub(crate) fn add(&mut self, i: usize, j: usize, x: f64) {
+        self.a[i * self.n + j] += x;
+    }
+}
+
+/// Cholesky factor of a symmetric matrix scaled to a unit diagonal; directions without information are left out.
+#[derive(Debug, Clone)]
+pub(crate) struct Factor {
+    n: usize,
+    l: Vec<f64>,
+    scale: Vec<f64>,
+    live: Vec<bool>,
+}
+
+/// Smallest pivot of the scaled matrix that still counts as information.
+const PIVOT: f64 = 1e-10;
+
+impl Factor {
+    pub(crate) fn new(m: &Square) -> Self {
+        let n = m.n;
+        let scale: Vec<f64> = (0..n)
+            .map(|i| m.at(i, i))
+            .map(|d| if d > 0.0 && d.is_finite() { 1.0 / d.sqrt() } else { 0.0 })
+            .collect();
+        let mut l = vec![0.0; n * n];
+        let mut live = vec![true; n];
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = m.at(i, j) * scale[i] * scale[j];
+                for k in 0..j {
+                    sum -= l[i * n + k] * l[j * n + k];
+                }
+                if i == j {
+                    if sum > PIVOT {
+                        l[i * n + i] = sum.sqrt();
+                    } else {
+                        live[i] = false;
+                        for k in 0..=i {
+                            l[i * n + k] = 0.0;
+                        }
+                    }
+                } else if live[j] {
+                    l[i * n + j] = sum / l[j * n + j];
+                }
+            }
+        }
+        Self { n, l, scale, live }
+    }
+
+    pub(crate) fn solve(&self, b: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let mut x: Vec<f64> = b.iter().zip(&self.scale).map(|(b, s)| b * s).collect();
+        for i in 0..n {
+            if !self.live[i] {
+                x[i] = 0.0;
+                continue;
+            }
+            for k in 0..i {
+                x[i] -= self.l[i * n + k] * x[k];
+            }
+            x[i] /= self.l[i * n + i];
+        }
+        for i in (0..n).rev() {
+            if !self.live[i] {
+                continue;
+            }
+            for k in i + 1..n {
+                x[i] -= self.l[k * n + i] * x[k];
+            }
+            x[i] /= self.l[i * n + i];
+        }
+        x.iter().zip(&self.scale).map(|(x, s)| x * s).collect()
+    }
+
+    /// The inverse, zero in directions without information.
+    pub(crate) fn inverse(&self) -> Square {
+        let mut out = Square::zero(self.n);
+        for j in 0..self.n {
+            let mut unit = vec![0.0; self.n];
+            unit[j] = 1.0;
+            let column = self.solve(&unit);
+            for (i, x) in column.iter().enumerate() {
+                out.a[i * self.n + j] = if self.live[j] { *x } else { 0.0 };
+            }
+        }
+        out
+    }
+}
+
+/// Inner product of two stretches.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four partial sums in a fixed order: fast, and the same on every machine and thread count.
+    let mut sum = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a4.zip(b4) {
+        for i in 0..4 {
+            sum[i] += a[i] * b[i];
+        }
+    }
+    (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
+}
+
+/// What is known of a coefficient before the recordings, and how far it may go.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prior {
+    pub(crate) mean: f64,
+    /// Infinite where nothing is known.
+    pub(crate) sd: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+impl Prior {
+    pub(crate) const FREE: Self =
+        Self { mean: 0.0, sd: f64::INFINITY, low: f64::NEG_INFINITY, high: f64::INFINITY };
+}
+
+/// The answer of [`bounded`].
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    pub(crate) x: Vec<f64>,
+    /// Whether a coefficient stands at a bound.
+    pub(crate) bound: Vec<bool>,
+    /// Covariance with the prior, for unit residual variance; zero at bounds.
+    pub(crate) covariance: Square,
+    /// ½·prior square.
+    pub(crate) prior_cost: f64,
+}
+
+/// Minimises ½ xᵀMx − bᵀx plus the priors within bounds, by an active set.
+pub(crate) fn bounded(m: &Square, b: &[f64], priors: &[Prior]) -> Solution {
+    let n = m.n;
+    let mut full = m.clone();
+    let mut right = b.to_vec();
+    for (i, prior) in priors.iter().enumerate() {
+        if prior.sd.is_finite() {
+            let w = 1.0 / (prior.sd * prior.sd);
+            full.add(i, i, w);
+            right[i] += w * prior.mean;
+        }
+    }
+    let mut fixed: Vec<Option<f64>> = vec![None; n];
+    let mut x = vec![0.0; n];
+    let mut covariance = Square::zero(n);
+    for _ in 0..=n {
+        let free: Vec<usize> = (0..n).filter(|i| fixed[*i].is_none()).collect();
+        let mut part = Square::zero(free.len());
+        let mut rhs = vec![0.0; free.len()];
+        for (a, i) in free.iter().enumerate() {
+            rhs[a] = right[*i];
+            for (j, value) in fixed.iter().enumerate() {
+                if let Some(value) = value {
+                    rhs[a] -= full.at(*i, j) * value;
+                }
+            }
+            for (b, j) in free.iter().enumerate() {
+                part.a[a * free.len() + b] = full.at(*i, *j);
+            }
+        }
+        let factor = Factor::new(&part);
+        let y = factor.solve(&rhs);
+        for (i, value) in fixed.iter().enumerate() {
+            if let Some(value) = value {
+                x[i] = *value;
+            }
+        }
+        for (a, i) in free.iter().enumerate() {
+            x[*i] = y[a];
+        }
+        let worst = free
+            .iter()
+            .map(|i| {
+                let out = (priors[*i].low - x[*i]).max(x[*i] - priors[*i].high).max(0.0);
+                let width = priors[*i].high - priors[*i].low;
+                (*i, out / if width.is_finite() { width } else { x[*i].abs().max(1e-300) })
+            })
+            .filter(|(_, out)| *out > 0.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        match worst {
+            Some((i, _)) => fixed[i] = Some(x[i].clamp(priors[i].low, priors[i].high)),
+            None => {
+                let inverse = factor.inverse();
+                for (a, i) in free.iter().enumerate() {
+                    for (b, j) in free.iter().enumerate() {
+                        covariance.a[i * n + j] = inverse.at(a, b);
+                    }
+                }
+                break;
+            }
+        }
+    }
+    let mut prior_cost = 0.0;
+    for (x, prior) in x.iter().zip(priors) {
+        if prior.sd.is_finite() {
+            prior_cost += 0.5 * ((x - prior.mean) / prior.sd).powi(2);
+        }
+    }
+    Solution { x, bound: fixed.iter().map(Option::is_some).collect(), covariance, prior_cost }
+}

@@ -1,0 +1,356 @@
+//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here, a few lines of script for tabs
+//! would be one too many.
+
+use crate::io::rig::Kind;
+use crate::io::schema::{Named, Verdict};
+use crate::numerics::digits::{short, short_within};
+use crate::report::outcome::{Outcome, Series, unit};
+use crate::validation::residual_maps::Map;
+use std::fmt::Write as _;
+
+const STYLE: &str = include_str!("report.css");
+
+/// Text that may stand in a page.
+fn safe(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// The page.
+pub(crate) fn page(outcome: &Outcome) -> String {
+    let r = &outcome.report;
+    let mut out = String::with_capacity(200_000);
+    let _ = write!(
+        out,
+        "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
+         <title>Diagnosis: {}</title><style>{STYLE}</style></head><body><main><p class=rig>{}</p><h1>{}.</h1>",
+        safe(&outcome.evidence.rig),
+        safe(&outcome.evidence.rig),
+        safe(&r.sentence)
+    );
+    if let Some(next) = &r.separating_experiment {
+        let _ = write!(out, "<section><h2>What to record next</h2><p>{}.</p></section>", safe(next));
+    }
+    if r.verdict != Verdict::InsufficientExcitation {
+        numbers(&mut out, outcome);
+        what(&mut out, outcome);
+        over_time(&mut out, outcome);
+        over_states(&mut out, outcome);
+        hypotheses(&mut out, outcome);
+        remains(&mut out, outcome);
+    }
+    out.push_str("</main></body></html>\n");
+    out
+}
+
+fn numbers(out: &mut String, outcome: &Outcome) {
+    let f = &outcome.report.fit;
+    let unit = safe(&f.unit);
+    let percent = |x: f64| if f.force_rms.holdout > 0.0 { 100.0 * x / f.force_rms.holdout } else { 0.0 };
+    let most = f.nominal.holdout.max(f.refit.holdout).max(f.patched.holdout).max(1e-300);
+    out.push_str(
+        "<section><h2>Before and after, on recordings that were not used for fitting</h2><div class=bars>",
+    );
+    let models = [
+        ("the simulation as it stands", "a", f.nominal),
+        ("with its values refitted", "b", f.refit),
+        ("with what was found", "c", f.patched),
+    ];
+    let found = !outcome.report.effects.is_empty();
+    for (label, class, both) in &models[..if found { 3 } else { 2 }] {
+        let _ = write!(
+            out,
+            "<div class=bar><span>{label}</span><i class={class} style=\"width:{:.1}%\"></i><b>{:.1} % <small>{} {unit}</small></b></div>",
+            (100.0 * both.holdout / most).max(0.5),
+            percent(both.holdout),
+            short(both.holdout)
+        );
+    }
+    let _ = write!(
+        out,
+        "</div><p class=note>Root mean square of the force that each model leaves, in per cent of the force itself ({} {unit}), below {:.0} Hz.",
+        short(f.force_rms.holdout),
+        outcome.report.residual_bandwidth_hz
+    );
+    if found {
+        // Adding zero takes the sign from what rounds to nothing.
+        let [low, high] = f.holdout_gain_ci95.map(|part| (100.0 * part).round() + 0.0);
+        let _ =
+            write!(out, " From refit to patched the mean square falls by {low:.0} to {high:.0} % (95 %).");
+    }
+    out.push_str("</p></section>");
+}
+
+fn what(out: &mut String, outcome: &Outcome) {
+    let r = &outcome.report;
+    if r.effects.is_empty() {
+        return;
+    }
+    out.push_str("<section><h2>What was left out</h2>");
+    for effect in &r.effects {
+        one(out, effect, outcome.evidence.kind);
+    }
+    out.push_str("</section>");
+}
+
+fn one(out: &mut String, effect: &Named, kind: Kind) {
+    let _ = write!(
+        out,
+        "<article><h3>{} <em>{:.0} % sure</em></h3><p><code>{}</code>, in the {}</p>",
+        safe(effect.name.in_words()),
+        100.0 * effect.confidence,
+        effect.name,
+        format!("{:?}", effect.subsystem).to_lowercase()
+    );
+    if !effect.parameters.is_empty() {
+        out.push_str(
+            "<div class=scroll><table><tr><th></th><th class=n>value</th><th class=n>95 % interval</th><th>unit</th></tr>",
+        );
+        for (name, p) in &effect.parameters {
+            let _ = write!(
+                out,
+                "<tr><td>{}</td><td class=n>{}</td><td class=n>{} to {}</td><td>{}</td></tr>",
+                safe(name),
+                short(p.value),
+                short(p.ci95[0]),
+                short(p.ci95[1]),
+                safe(&p.unit)
+            );
+        }
+        out.push_str("</table></div>");
+    }
+    for region in &effect.place.states {
+        let _ = write!(
+            out,
+            "<p>Shows most for {} between {} and {}{}.</p>",
+            safe(&region.variable),
+            short(region.low),
+            short(region.high),
+            safe(&unit(&region.variable, kind))
+        );
+    }
+    if effect.class.len() > 1 {
+        let others: Vec<&str> = effect.class[1..].iter().map(|n| n.in_words()).collect();
+        let _ = write!(out, "<p>These recordings cannot tell it from: {}.</p>", safe(&others.join("; ")));
+    }
+    if let Some(next) = &effect.separating_experiment {
+        let _ = write!(out, "<p class=next><b>Record next:</b> {}.</p>", safe(next));
+    }
+    out.push_str("</article>");
+}
+
+const WIDE: f64 = 900.0;
+const HIGH: f64 = 190.0;
+const LEFT: f64 = 136.0;
+const TOP: f64 = 16.0;
+const BOTTOM: f64 = 32.0;
+
+/// A frame with its scales; returns the mapping of values to places.
+fn frame(
+    out: &mut String,
+    x: (f64, f64),
+    y: (f64, f64),
+    x_label: &str,
+    y_label: &str,
+) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
+    let _ = write!(out, "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img>", TOP + HIGH + BOTTOM);
+    let at = move |a: f64, b: f64| {
+        let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - 6.0);
+        let py = 6.0 + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 12.0);
+        (px, py.clamp(0.0, HIGH))
+    };
+    for i in 0..=4 {
+        let value = y.0 + (y.1 - y.0) * f64::from(i) / 4.0;
+        let (_, py) = at(x.0, value);
+        let _ = write!(
+            out,
+            "<line class=grid x1={LEFT} x2={WIDE} y1={py:.1} y2={py:.1} /><text x={} y={:.1} text-anchor=end>{}</text>",
+            LEFT - 5.0,
+            py + 4.0,
+            short_within(value, y.1 - y.0)
+        );
+    }
+    for i in 0..=5 {
+        let value = x.0 + (x.1 - x.0) * f64::from(i) / 5.0;
+        let (px, _) = at(value, y.0);
+        let anchor = if i == 5 { "end" } else { "middle" };
+        let label = short_within(value, x.1 - x.0);
+        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{label}</text>", HIGH + 24.0);
+    }
+    let _ = write!(out, "<title>{} over {}</title>", safe(y_label), safe(x_label));
+    at
+}
+
+/// Envelope of a column over few enough places to draw.
+fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64, f64)> {
+    let length = time.len().div_ceil(parts).max(1);
+    time.chunks(length)
+        .zip(column.chunks(length))
+        .filter_map(|(t, c)| {
+            let mut seen = c.iter().flatten();
+            let first = *seen.next()?;
+            let (low, high) = seen.fold((first, first), |(a, b), x| (a.min(*x), b.max(*x)));
+            Some((t[0], low, high))
+        })
+        .collect()
+}
+
+fn over_time(out: &mut String, outcome: &Outcome) {
+    let unit = &outcome.report.fit.unit;
+    let marked = "<span><i class=\"key m\"></i> where</span>";
+    let (after, marks_say) = match &outcome.report {
+        report if !report.effects.is_empty() => {
+            ("with what was found", format!(" {marked} what was found acts most"))
+        }
+        report if report.place.is_some() => {
+            ("with its values refitted", format!(" {marked} that leaves most"))
+        }
+        _ => ("with its values refitted", String::new()),
+    };
+    let _ = write!(
+        out,
+        "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it stands</span> <span><i class=\"key c\"></i> \
+         {after}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
+    );
+    for series in &outcome.evidence.series {
+        let kind = if series.held_out { "held out" } else { "fitted" };
+        let _ = write!(out, "<h3>{} <small>{kind}</small></h3>", safe(&series.file));
+        let last = series.time_s.last().copied().unwrap_or(1.0);
+        let before = envelope(&series.time_s, &series.nominal, 420);
+        let after = envelope(&series.time_s, &series.patched, 420);
+        let mut sizes: Vec<f64> = before.iter().chain(&after).map(|(_, a, b)| a.abs().max(b.abs())).collect();
+        sizes.sort_by(f64::total_cmp);
+        let top = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-300);
+        let at = frame(out, (0.0, last), (-top, top), "time, s", unit);
+        marks(out, outcome, series, &at);
+        for (class, band) in [("a", &before), ("c", &after)] {
+            let _ = write!(out, "<path class=\"band {class}\" d=\"");
+            for (t, low, high) in band {
+                let (x, y0) = at(*t, *low);
+                let (_, y1) = at(*t, *high);
+                let _ = write!(out, "M{x:.1} {y0:.1}V{:.1}", y1 - 0.6);
+            }
+            out.push_str("\"/>");
+        }
+        let _ = write!(out, "</svg><p class=axis>residual force, {} · time, s</p>", safe(unit));
+    }
+    out.push_str("</section>");
+}
+
+fn marks(out: &mut String, outcome: &Outcome, series: &Series, at: &impl Fn(f64, f64) -> (f64, f64)) {
+    let places = outcome.report.effects.iter().map(|e| &e.place).chain(&outcome.report.place);
+    for place in places {
+        for stretch in place.recordings.iter().filter(|s| s.file == series.file) {
+            for [from, to] in &stretch.intervals_s {
+                let (x0, x1) = (at(*from, 0.0).0, at(*to, 0.0).0);
+                let _ = write!(
+                    out,
+                    "<rect class=mark x={x0:.1} y=0 width={:.1} height={HIGH} />",
+                    (x1 - x0).max(1.0)
+                );
+            }
+        }
+    }
+}
+
+fn over_states(out: &mut String, outcome: &Outcome) {
+    if outcome.evidence.maps.is_empty() {
+        return;
+    }
+    let model = if outcome.report.effects.is_empty() { "refitted" } else { "patched" };
+    let _ = write!(
+        out,
+        "<section><h2>Where: what is left, over states</h2><p class=note><span><i class=\"key f\"></i> moving forward</span> <span><i class=\"key r\"></i> moving \
+         backward.</span> Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
+    );
+    for map in &outcome.evidence.maps {
+        draw(out, map, &outcome.report.fit.unit, outcome.evidence.kind.length());
+    }
+    out.push_str("</div></section>");
+}
+
+fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
+    let x_unit = match map.variable {
+        "speed" => format!("{length}/s"),
+        "time" => "s".to_owned(),
+        "command" => "command units".to_owned(),
+        _ => length.to_owned(),
+    };
+    let top = map.forward.iter().chain(&map.backward).flatten().fold(1e-300_f64, |m, x| m.max(x.abs()));
+    let low = map.edges.first().copied().unwrap_or(0.0);
+    let high = map.edges.last().copied().unwrap_or(1.0);
+    out.push_str("<figure>");
+    let at = frame(out, (low, high), (-top, top), map.variable, unit);
+    for (class, column) in [("f", &map.forward), ("r", &map.backward)] {
+        let _ = write!(out, "<path class=\"line {class}\" d=\"");
+        let mut pen = 'M';
+        for (value, edges) in column.iter().zip(map.edges.windows(2)) {
+            match value {
+                Some(value) => {
+                    let (x, y) = at(0.5 * (edges[0] + edges[1]), *value);
+                    let _ = write!(out, "{pen}{x:.1} {y:.1}");
+                    pen = 'L';
+                }
+                None => pen = 'M',
+            }
+        }
+        out.push_str("\"/>");
+    }
+    let carries = if map.significant {
+        format!(
+            "carries to the held-out recordings: {:.0} % of what is left there",
+            100.0 * map.carries.max(0.0)
+        )
+    } else {
+        "does not carry to the held-out recordings".to_owned()
+    };
+    let _ = write!(
+        out,
+        "</svg><figcaption>over {}, {}: {carries}</figcaption></figure>",
+        map.variable,
+        safe(&x_unit)
+    );
+}
+
+fn hypotheses(out: &mut String, outcome: &Outcome) {
+    let r = &outcome.report;
+    if r.hypotheses.is_empty() {
+        return;
+    }
+    out.push_str(
+        "<section><h2>What was considered</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
+    );
+    let mut sorted: Vec<_> = r.hypotheses.iter().collect();
+    sorted.sort_by(|a, b| b.holdout_gain.total_cmp(&a.holdout_gain));
+    for h in sorted {
+        let outcome = h.rejected_because.as_deref().unwrap_or("named");
+        let _ = write!(
+            out,
+            "<tr><td>{} <small>{}</small></td><td class=n>{}</td><td>{}</td></tr>",
+            safe(h.name.in_words()),
+            h.name,
+            short(h.holdout_gain),
+            safe(outcome)
+        );
+    }
+    out.push_str("</table></div><p class=note>Gain of log-likelihood on the held-out recordings over the model without it.</p></section>");
+}
+
+fn remains(out: &mut String, outcome: &Outcome) {
+    let r = &outcome.report;
+    let _ = write!(
+        out,
+        "<section><h2>What remains</h2><p>{:.0} % of the mean square that the simulation left on the held-out recordings is still \
+         unexplained. The sensor's noise alone would leave {} {}.</p>",
+        100.0 * r.unexplained_fraction,
+        short(r.noise_floor),
+        safe(&r.fit.unit)
+    );
+    if !r.refitted.is_empty() {
+        out.push_str("<p>Refitted values: ");
+        let values: Vec<String> =
+            r.refitted.iter().map(|(key, value)| format!("{key} {}", short(*value))).collect();
+        out.push_str(&safe(&values.join(", ")));
+        out.push_str(".</p>");
+    }
+    out.push_str("</section>");
+}

@@ -1,0 +1,285 @@
+//! What a diagnosis hands back: the report, the evidence behind it, the patched rig, and the files they become.
+
+use crate::effects::EffectName;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::io::rig::{Kind, Rig};
+use crate::io::schema::{Both, FitTable, Report, Verdict};
+use crate::numerics::digits::short;
+use crate::report::html;
+use crate::validation::residual_maps::Map;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+
+/// Residuals of one recording over time, per block of at most 1 kHz.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// The recording's file name.
+    pub file: String,
+    /// Whether it was held out.
+    pub held_out: bool,
+    /// s since the first row.
+    pub time_s: Vec<f64>,
+    /// rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// Residual force, N·m or N; none at rest.
+    pub nominal: Vec<Option<f64>>,
+    /// After the refit.
+    pub refit: Vec<Option<f64>>,
+    /// With the effects found.
+    pub patched: Vec<Option<f64>>,
+    /// The drive's force under the same estimator.
+    pub force: Vec<f64>,
+}
+
+impl Series {
+    pub(crate) fn new(
+        track: &BlockedRecording,
+        held_out: bool,
+        moves: &[bool],
+        nominal: &[f64],
+        refit: &[f64],
+        patched: &[f64],
+        force: &[f64],
+    ) -> Self {
+        let moving =
+            |column: &[f64]| column.iter().zip(moves).map(|(x, moves)| moves.then_some(*x)).collect();
+        Self {
+            file: track.file.clone(),
+            held_out,
+            time_s: track.start.iter().zip(&track.span).map(|(t, h)| t + 0.5 * h).collect(),
+            velocity: track.v.clone(),
+            nominal: moving(nominal),
+            refit: moving(refit),
+            patched: moving(patched),
+            force: force.to_vec(),
+        }
+    }
+}
+
+/// What `report.html` plots.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// Every recording, fitted first.
+    pub series: Vec<Series>,
+    /// What the patched model leaves, over states.
+    pub maps: Vec<Map>,
+    /// Rotary or linear.
+    pub kind: Kind,
+    /// The rig's label.
+    pub rig: String,
+}
+
+/// The outcome of a diagnosis.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// `diagnosis.json`.
+    pub report: Report,
+    /// What is plotted.
+    pub evidence: Evidence,
+    /// The rig with refitted values and the effects found.
+    pub patched_rig: Rig,
+}
+
+/// The verdict in one sentence that a technician understands.
+pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
+    let fit = &report.fit;
+    let percent = |x: f64| if fit.force_rms.holdout > 0.0 { 100.0 * x / fit.force_rms.holdout } else { 0.0 };
+    match report.verdict {
+        Verdict::MissingPhysics => {
+            let mut out = String::new();
+            for (i, effect) in report.effects.iter().enumerate() {
+                if i > 0 {
+                    out.push_str(if i + 1 == report.effects.len() { " and " } else { ", " });
+                }
+                let _ = write!(out, "{} ({:.0} % sure", effect.name.in_words(), 100.0 * effect.confidence);
+                if effect.class.len() > 1 {
+                    let others: Vec<&str> = effect.class[1..].iter().map(|n| n.in_words()).collect();
+                    let _ = write!(out, "; it could also be {}", others.join(" or "));
+                }
+                out.push(')');
+            }
+            let region = report.effects.first().and_then(|e| e.place.states.first());
+            let region = region.map_or(String::new(), |r| {
+                format!(
+                    "; it shows most for {} from {} to {}{}",
+                    r.variable,
+                    short(r.low),
+                    short(r.high),
+                    unit(&r.variable, kind)
+                )
+            });
+            format!(
+                "The simulation leaves something out: {out}{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
+                percent(fit.refit.holdout),
+                percent(fit.patched.holdout)
+            )
+        }
+        Verdict::NoMismatch => "The simulation explains the recordings down to their noise".into(),
+        Verdict::ParametersOnly => format!(
+            "The simulation has the right structure and wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %",
+            percent(fit.nominal.holdout),
+            percent(fit.refit.holdout)
+        ),
+        Verdict::Unexplained => format!(
+            "Simulation and recordings differ repeatably by {:.1} % of the force, and no known effect explains it{}",
+            percent(fit.patched.holdout),
+            report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
+        ),
+        Verdict::RandomDisturbance => format!(
+            "A disturbance of {:.1} % of the force acts on the axis that does not repeat and depends on nothing recorded",
+            percent(fit.patched.holdout)
+        ),
+        Verdict::InsufficientExcitation => format!(
+            "These recordings cannot tell: {}",
+            report.reason.as_deref().unwrap_or("they excite too little")
+        ),
+    }
+}
+
+/// The unit of a variable of a region, with a space before it.
+pub(crate) fn unit(variable: &str, kind: Kind) -> String {
+    match variable {
+        "speed" => format!(" {}/s", kind.length()),
+        "travel" | "angle" => format!(" {}", kind.length()),
+        "time" => " s".into(),
+        "tilt" => " rad".into(),
+        _ => String::new(),
+    }
+}
+
+impl Outcome {
+    /// The outcome where recordings cannot tell, with the reason.
+    pub(crate) fn cannot_tell(rig: &Rig, reason: String) -> Self {
+        let mut report = Report {
+            format: 1,
+            verdict: Verdict::InsufficientExcitation,
+            sentence: String::new(),
+            effects: Vec::new(),
+            fit: FitTable {
+                metric: "force_rmse".into(),
+                unit: rig.kind.force().into(),
+                nominal: Both::default(),
+                refit: Both::default(),
+                patched: Both::default(),
+                force_rms: Both::default(),
+                holdout_gain_ci95: [0.0, 0.0],
+            },
+            refitted: BTreeMap::new(),
+            residual_bandwidth_hz: 0.0,
+            noise_floor: 0.0,
+            unexplained_fraction: 0.0,
+            hypotheses: Vec::new(),
+            place: None,
+            separating_experiment: Some(crate::report::next_experiment::GENERAL.to_owned()),
+            reason: Some(reason),
+        };
+        report.sentence = sentence(&report, rig.kind);
+        let evidence =
+            Evidence { series: Vec::new(), maps: Vec::new(), kind: rig.kind, rig: rig.name.clone() };
+        Self { report, evidence, patched_rig: rig.clone() }
+    }
+
+    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml` and `residuals.csv`, each whole or not at all.
+    pub fn write(&self, dir: &Path) -> io::Result<()> {
+        std::fs::create_dir_all(dir)?;
+        let json = serde_json::to_string_pretty(&self.report).map_err(io::Error::other)?;
+        let files = [
+            ("residuals.csv", self.residuals_csv()),
+            ("patched-rig.toml", self.patched_rig.to_toml()),
+            ("report.html", html::page(self)),
+            ("diagnosis.json", json + "\n"),
+        ];
+        for (name, text) in files {
+            let half = dir.join(format!(".{name}.part"));
+            std::fs::write(&half, text)?;
+            std::fs::rename(&half, dir.join(name))?;
+        }
+        Ok(())
+    }
+
+    fn residuals_csv(&self) -> String {
+        let mut out = String::from("recording,time_s,velocity,nominal,refit,patched\n");
+        for series in &self.evidence.series {
+            let file = series.file.replace([',', '"', '\n', '\r'], "_");
+            for j in 0..series.time_s.len() {
+                let _ = write!(out, "{file},{:.6},{:e}", series.time_s[j], series.velocity[j]);
+                for column in [&series.nominal, &series.refit, &series.patched] {
+                    match column[j] {
+                        Some(x) => {
+                            let _ = write!(out, ",{x:e}");
+                        }
+                        None => out.push(','),
+                    }
+                }
+                out.push('\n');
+            }
+        }
+        out
+    }
+
+    /// Ten lines for the terminal.
+    pub fn summary(&self) -> String {
+        let r = &self.report;
+        let mut out = format!("{}.\n", r.sentence);
+        for effect in &r.effects {
+            let values: Vec<String> = effect
+                .parameters
+                .iter()
+                .take(4)
+                .map(|(name, p)| {
+                    format!(
+                        "{name} {} [{}, {}] {}",
+                        short(p.value),
+                        short(p.ci95[0]),
+                        short(p.ci95[1]),
+                        p.unit
+                    )
+                })
+                .collect();
+            let _ = writeln!(out, "  {} ({:.2}): {}", effect.name, effect.confidence, values.join("; "));
+        }
+        let f = &r.fit;
+        for (name, both) in [("nominal", f.nominal), ("refit", f.refit), ("patched", f.patched)] {
+            let percent = |x: f64, whole: f64| if whole > 0.0 { 100.0 * x / whole } else { 0.0 };
+            let _ = writeln!(
+                out,
+                "  force error, {name:7}: fitted {} {} ({:.2} %), held out {} ({:.2} %)",
+                short(both.fit),
+                f.unit,
+                percent(both.fit, f.force_rms.fit),
+                short(both.holdout),
+                percent(both.holdout, f.force_rms.holdout)
+            );
+        }
+        let _ = writeln!(
+            out,
+            "  residuals below {:.0} Hz; sensor noise {} {}; unexplained {:.0} %",
+            r.residual_bandwidth_hz,
+            short(r.noise_floor),
+            f.unit,
+            100.0 * r.unexplained_fraction
+        );
+        let next: Vec<&String> = r
+            .effects
+            .iter()
+            .filter_map(|e| e.separating_experiment.as_ref())
+            .chain(&r.separating_experiment)
+            .collect();
+        if let Some(next) = next.first() {
+            let _ = writeln!(out, "  record next: {next}");
+        }
+        let losers: Vec<&str> = r
+            .hypotheses
+            .iter()
+            .filter(|h| h.rejected_because.is_some())
+            .map(|h| EffectName::as_str(h.name))
+            .take(6)
+            .collect();
+        if !losers.is_empty() {
+            let _ = writeln!(out, "  looked at and rejected: {}", losers.join(", "));
+        }
+        out
+    }
+}

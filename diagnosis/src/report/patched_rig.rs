@@ -1,0 +1,143 @@
+//! What an effect becomes: the entry of the patched rig, and the place where it acts.
+
+use crate::effects::EffectName;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::model::{Key, total};
+use crate::io::rig::Rig;
+use crate::io::schema::{Place, Region, Stretch};
+use crate::selection::search::FittedModel;
+use crate::validation::parameters;
+use crate::validation::residual_maps;
+use crate::validation::stepwise::Search;
+
+/// The rig with refitted values and the effects found.
+pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
+    let mut rig = s.nominal.rig.clone();
+    let (inertia, gain, _) = parameters::scale(&s.nominal, last);
+    rig.model.inertia = inertia;
+    rig.actuator.gain = gain;
+    let value = |key: Key| last.fit.value(key).map(|x| x * inertia);
+    if let Some(x) = value(Key::Viscous) {
+        rig.model.viscous = Some(x.max(0.0));
+    }
+    if let Some(x) = value(Key::Coulomb) {
+        rig.model.coulomb = Some(x.max(0.0));
+    }
+    if rig.model.offset.is_some() {
+        rig.model.offset = value(Key::Offset);
+    }
+    if let Some(x) = value(Key::Weight) {
+        rig.model.weight = Some(x);
+    }
+    let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
+    let theta = last.fit.theta(0);
+    for (index, effect) in last.model.effects.iter().enumerate() {
+        let mut effect = effect.clone();
+        if effect.name == EffectName::MissedCounts {
+            // The steps of the recording with the most, as they happened.
+            let steps = |track: &&BlockedRecording| track.lost.windows(2).filter(|w| w[0] != w[1]).count();
+            let track = s.fit_tracks.iter().max_by_key(steps).expect("something was fitted");
+            for (i, w) in track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]) {
+                let n = effect.shape.len() + 1;
+                effect.shape.insert(format!("time_{n}"), track.start[i + 1]);
+                effect.coefficients.insert(format!("step_{n}"), w[1] - w[0]);
+            }
+        } else if let Some(law) = crate::effects::Law::new(&effect) {
+            for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
+                let Key::Term { effect: e, term } = column.key else { continue };
+                if e != index {
+                    continue;
+                }
+                let name = law.names()[term].clone();
+                let drive = matches!(
+                    effect.name,
+                    EffectName::TorqueRipple | EffectName::GainDrift | EffectName::DriveCompliance
+                );
+                let unit = if law.in_sensor() {
+                    1.0
+                } else if drive {
+                    1.0 / ratio
+                } else {
+                    inertia
+                };
+                effect.coefficients.insert(name, theta * unit);
+            }
+        }
+        rig.effects.push(effect);
+    }
+    rig.name = format!("{} (patched)", rig.name);
+    rig
+}
+
+/// Where an effect of the model acts: stretches of time, and the states in which it acts most.
+pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
+    let mut place = Place::default();
+    let name = last.model.effects[index].name;
+    let mut pooled: Vec<(f64, f64)> = Vec::new();
+    let variable = match name {
+        EffectName::CommandDeadband
+        | EffectName::CommandSaturation
+        | EffectName::RollerSlip
+        | EffectName::TorqueRipple => "command",
+        EffectName::PositionDependentFriction
+        | EffectName::PositionDependentDamping
+        | EffectName::PositionSpring => "travel",
+        EffectName::FrictionDrift | EffectName::GainDrift | EffectName::MissedCounts => "time",
+        EffectName::TiltGravity => "tilt",
+        EffectName::Cogging | EffectName::MassImbalance | EffectName::EncoderEccentricity => "angle",
+        _ => "speed",
+    };
+    let mut less = last.model.clone();
+    less.effects.remove(index);
+    for (r, track) in s.fit_tracks.iter().enumerate() {
+        // What the effect adds, as acceleration per block.
+        let columns = last.model.columns(&s.nominal, track, &last.noise);
+        let theta = last.fit.theta(r);
+        let with = total(track, &columns, &theta);
+        let columns = less.columns(&s.nominal, track, &last.noise);
+        let without: Vec<f64> = columns
+            .iter()
+            .map(|c| {
+                let key = match c.key {
+                    Key::Term { effect, term } if effect >= index => Key::Term { effect: effect + 1, term },
+                    key => key,
+                };
+                last.fit.prepared[r].columns.iter().position(|c| c.key == key).map_or(0.0, |i| theta[i])
+            })
+            .collect();
+        let without = total(track, &columns, &without);
+        let weight: Vec<f64> = (0..track.blocks())
+            .map(|j| {
+                let force = (with.dv[j] - without.dv[j]) / track.span[j];
+                let travel = with.dz[j] - without.dz[j];
+                if track.rest[j] {
+                    0.0
+                } else if last.model.effects[index].name.subsystem() == crate::effects::Subsystem::Sensor {
+                    travel * travel
+                } else {
+                    force * force
+                }
+            })
+            .collect();
+        let intervals = residual_maps::intervals(track, &weight);
+        if !intervals.is_empty() {
+            place.recordings.push(Stretch { file: track.file.clone(), intervals_s: intervals });
+        }
+        let states: Vec<f64> = match variable {
+            "command" => track.block_mean(&track.command).iter().map(|u| u.abs()).collect(),
+            "travel" => track.x.clone(),
+            "angle" => {
+                track.x.iter().map(|x| s.nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn))).collect()
+            }
+            "time" => track.start.clone(),
+            "tilt" => track.tilt.clone().unwrap_or_default(),
+            _ => track.v.iter().map(|v| v.abs()).collect(),
+        };
+        pooled.extend(states.into_iter().zip(weight));
+    }
+    let (a, b): (Vec<f64>, Vec<f64>) = pooled.into_iter().unzip();
+    if let Some((low, high)) = residual_maps::range(&a, &b) {
+        place.states.push(Region { variable: variable.into(), low, high });
+    }
+    place
+}

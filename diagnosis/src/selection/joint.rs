@@ -1,0 +1,135 @@
+//! The search for the joint between a motor and its load: the values of its law go together, have many optima, and lean on
+//! the rest of the machine. What is here moves shapes; it chooses between no effects.
+
+use crate::effects::{Effect, EffectName as N};
+use crate::estimation::filter::Noise;
+use crate::estimation::fit::Fit;
+use crate::estimation::model::{Machine, Model};
+use crate::estimation::noise::Colour;
+use crate::selection::candidates;
+use crate::selection::search::{FitContext, FittedModel};
+use crate::selection::shape_search::descend;
+use rayon::prelude::*;
+
+/// From how many of the best places a search goes downhill, and how many of the ends are settled.
+const STARTS: usize = 4;
+const SETTLED: usize = 2;
+/// How often the machine is taken from the fit, and the gain of log-likelihood below which it is not worth going on.
+const ROUNDS: usize = 8;
+const ENOUGH: f64 = 1.0;
+
+/// Whether the law of an effect is built on the rest of the machine.
+pub(crate) fn is_joint(effect: &Effect) -> bool {
+    effect.shape.contains_key("per_command")
+}
+
+fn ends_in_joint(model: &Model) -> bool {
+    model.effects.last().is_some_and(is_joint)
+}
+
+/// Factors on the values of a shape that go together, to look for its optimum elsewhere.
+fn factors(name: N) -> &'static [(&'static str, &'static [f64])] {
+    match name {
+        N::RollerSlip => &[
+            ("limit", &[0.72, 0.85, 1.0, 1.2]),
+            ("coast", &[0.6, 0.8, 1.0, 1.3]),
+            ("ratio", &[0.6, 1.0, 1.7]),
+        ],
+        N::Backlash => &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])],
+        _ => &[],
+    }
+}
+
+/// Models with the shape of the last effect at every combination of its factors.
+fn elsewhere(context: &FitContext, model: &Model) -> Vec<Model> {
+    let last = model.effects.len() - 1;
+    let factors = factors(model.effects[last].name);
+    let movable = candidates::movable(&model.effects[last], context.span);
+    let mut out = vec![model.clone()];
+    for (key, factors) in factors {
+        let (_, low, high) = movable.iter().find(|(k, _, _)| k == key).expect("what has factors may move");
+        let moved = |model: &Model, factor: f64| {
+            let mut moved = model.clone();
+            let at = moved.effects[last].shape.get_mut(*key).expect("what may move is there");
+            *at = (*at * factor).clamp(*low, *high);
+            moved
+        };
+        out = out.iter().flat_map(|model| factors.iter().map(|factor| moved(model, *factor))).collect();
+    }
+    out
+}
+
+/// The best model that ways downhill from other places lead to, with its merit; none where the last effect is no joint.
+pub(crate) fn search(
+    context: &FitContext,
+    model: &Model,
+    noise: &Noise,
+    merit: &(dyn Fn(&Model) -> f64 + Sync),
+) -> Option<(f64, Model)> {
+    if !ends_in_joint(model) {
+        return None;
+    }
+    let best = |mut found: Vec<(f64, Model)>, count: usize| {
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(count);
+        found
+    };
+    let starts = elsewhere(context, model).into_par_iter().map(|start| (merit(&start), start)).collect();
+    let down = |(value, start): (f64, Model)| descend(context, start, noise, value, merit);
+    let ends = best(starts, STARTS).into_par_iter().map(down).collect();
+    let settled = best(ends, SETTLED).into_par_iter().map(|end| settle(context, end, noise, merit));
+    settled.collect::<Vec<_>>().into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// The model with its joint on another machine.
+fn on(machine: &Machine, model: &Model) -> Model {
+    let mut on = model.clone();
+    let shape = &mut on.effects.last_mut().expect("there is a joint").shape;
+    // The force at which a grip lets go stays as it is.
+    let scale = shape["per_command"] / machine.per_command;
+    if let Some(limit) = shape.get_mut("limit") {
+        *limit *= scale;
+    }
+    shape.extend(machine.shape().map(|(key, value)| (key.to_owned(), value)));
+    on
+}
+
+/// Gives the law of a joint the machine and the standing forces that were fitted with it, where it began with others, and moves
+/// its shape again, for as long as that helps; a model without one stays as it is.
+pub(crate) fn settle(
+    context: &FitContext,
+    (mut best, mut model): (f64, Model),
+    noise: &Noise,
+    merit: &dyn Fn(&Model) -> f64,
+) -> (f64, Model) {
+    if !ends_in_joint(&model) {
+        return (best, model);
+    }
+    for _ in 0..ROUNDS {
+        let fit = Fit::new(&model, context.nominal, context.tracks, noise);
+        let mut trial = on(&context.nominal.machine(Some(&fit)), &model);
+        trial.bias = (0..context.tracks.len()).map(|r| fit.bias(r)).collect();
+        let start = merit(&trial);
+        let (value, trial) = descend(context, trial, noise, start, merit);
+        if value <= best {
+            break;
+        }
+        let gain = value - best;
+        (best, model) = (value, trial);
+        if gain < ENOUGH {
+            break;
+        }
+    }
+    (best, model)
+}
+
+/// A fitted model with its joint, if its last effect is one, settled on motion that has changed.
+pub(crate) fn settled(context: &FitContext, candidate: FittedModel) -> FittedModel {
+    if !ends_in_joint(&candidate.model) {
+        return candidate;
+    }
+    let merit = |model: &Model| context.merit_of(model, &candidate.noise);
+    let found = (merit(&candidate.model), candidate.model.clone());
+    let (_, model) = settle(context, found, &candidate.noise, &merit);
+    context.fit(model, &candidate.noise, Colour::White)
+}

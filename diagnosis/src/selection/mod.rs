@@ -1,0 +1,10 @@
+//! Which effects are candidates, which shape of each is best, and how models compare on the fitted recordings. Nothing here
+//! sees a held-out recording.
+
+pub(crate) mod candidates;
+pub(crate) mod excitation;
+pub(crate) mod joint;
+pub(crate) mod periodic;
+pub(crate) mod score_test;
+pub(crate) mod search;
+pub(crate) mod shape_search;

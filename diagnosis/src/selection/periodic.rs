@@ -1,0 +1,265 @@
+//! Periodic effects: which orders of a turn, or which period along the travel, stand out of the residual.
+
+use crate::effects::{Effect, EffectName as N, wave_mean};
+use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::fit::Fit;
+use crate::estimation::model::{Model, Nominal, effective_command};
+use crate::numerics::golden::golden;
+use crate::numerics::linear::dot;
+use crate::numerics::linear::{Factor, Square};
+use crate::selection::candidates::Span;
+use crate::selection::score_test::{Sums, Terms, project};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Highest order of a turn that is looked for, and how many orders one effect may have.
+const HIGHEST: usize = 100;
+const MOST: usize = 14;
+/// Most cycles over the travel that are looked for where no turn is known.
+const MOST_CYCLES: f64 = 480.0;
+/// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
+const FEWEST: usize = 6;
+/// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
+const PER_ORDER: f64 = 8.0;
+
+/// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of cycles over the travel.
+fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
+    let travel = span.travel();
+    // A wave must be resolved by the encoder and stay in the band of the filter at slow speed.
+    let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
+    if let Some(turn) = nominal.rig.turn().filter(|turn| travel > 0.6 * turn) {
+        let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
+        return Some((turn, (1..=highest).map(|n| n as f64).collect()));
+    }
+    let most = (travel / shortest).min(MOST_CYCLES);
+    // One over the travel is the reference; cycles over the travel play the part of orders.
+    let count = (most * 2.0) as usize;
+    (count >= 8).then(|| (travel, (FEWEST..=count).map(|i| 0.5 * i as f64).collect()))
+}
+
+fn wave_inputs(track: &BlockedRecording, wave: f64, drive: Option<&Input>) -> [Input; 2] {
+    let (cos, sin): (Vec<f64>, Vec<f64>) = (0..track.blocks())
+        .map(|j| wave_mean(wave, track.x[j], if track.rest[j] { 0.0 } else { track.v[j] * track.span[j] }))
+        .unzip();
+    match drive {
+        Some(drive) => [drive.scaled(&cos), drive.scaled(&sin)],
+        None => [Input::Held(cos), Input::Held(sin)],
+    }
+}
+
+/// Finds the orders of cogging or torque ripple in the residual of a fit; the gain counts every recording's own phases.
+pub(crate) fn search(
+    name: N,
+    fit: &Fit,
+    residuals: &[Vec<f64>],
+    model: &Model,
+    tracks: &[BlockedRecording],
+    span: &Span,
+    nominal: &Nominal,
+) -> Option<(Effect, f64)> {
+    let (turn, orders) = candidates(span, nominal)?;
+    let whole = nominal.rig.turn().is_some_and(|known| known == turn);
+    let drives: Vec<Option<Input>> = tracks
+        .iter()
+        .map(|track| {
+            (name == N::TorqueRipple)
+                .then(|| track.drive(effective_command(track, &model.effects).as_deref()))
+        })
+        .collect();
+    let terms_of = |order: f64| -> Terms {
+        tracks
+            .iter()
+            .zip(&fit.prepared)
+            .zip(&drives)
+            .map(|((track, one), drive)| {
+                let inputs = wave_inputs(track, order * TAU / turn, drive.as_ref());
+                inputs.iter().map(|input| one.gains.response(track, input)).collect()
+            })
+            .collect()
+    };
+    let single: Vec<f64> = orders
+        .par_iter()
+        .map(|order| {
+            let sums = project(fit, residuals, &terms_of(*order), true);
+            gain_of(&sums)
+        })
+        .collect();
+    // Only the best by themselves are fitted together.
+    let mut ranked: Vec<usize> = (0..orders.len()).collect();
+    ranked.sort_by(|a, b| single[*b].total_cmp(&single[*a]).then(a.cmp(b)));
+    let mut kept: Vec<usize> = Vec::new();
+    for index in ranked {
+        // Neighbours on a fine grid are the same peak.
+        let apart = whole || kept.iter().all(|k| (orders[*k] - orders[index]).abs() > 1.2);
+        if apart && single[index] > 3.0 {
+            kept.push(index);
+        }
+        if kept.len() >= if whole { 2 * MOST } else { MOST } {
+            break;
+        }
+    }
+    if kept.is_empty() {
+        return None;
+    }
+    let refined: Vec<f64> = if whole {
+        kept.iter().map(|k| orders[*k]).collect()
+    } else {
+        kept.par_iter()
+            .map(|k| {
+                let at = |order: f64| gain_of(&project(fit, residuals, &terms_of(order), true));
+                golden(orders[*k] - 0.5, orders[*k] + 0.5, 7, at)
+            })
+            .collect()
+    };
+    let columns: Vec<Terms> = refined.par_iter().map(|order| terms_of(*order)).collect();
+    let joined: Terms = (0..tracks.len())
+        .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())
+        .collect();
+    let sums = project(fit, residuals, &joined, true);
+    let (chosen, gain) = forward(&sums, refined.len(), tracks.len(), (orders.len() as f64).ln());
+    if chosen.is_empty() || (whole && name == N::Cogging && chosen.iter().all(|i| refined[*i] == 1.0)) {
+        // Once per turn and nothing else is an off-centre mass.
+        return None;
+    }
+    let mut shape: Vec<(String, f64)> = Vec::new();
+    if whole {
+        shape.push(("turn".into(), turn));
+        for index in &chosen {
+            let order = refined[*index];
+            shape.push((format!("order_{order}"), order));
+        }
+    } else {
+        let mut periods: Vec<f64> = chosen.iter().map(|index| turn / refined[*index]).collect();
+        periods.sort_by(f64::total_cmp);
+        for (i, period) in periods.iter().enumerate() {
+            shape.push((format!("period_{}", i + 1), *period));
+        }
+    }
+    let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
+    Some((Effect::shaped(name, &shape), gain))
+}
+
+fn gain_of(sums: &Sums) -> f64 {
+    let x = Factor::new(&sums.information).solve(&sums.score);
+    let gain = 0.5 * dot(&x, &sums.score);
+    if gain.is_finite() { gain } else { 0.0 }
+}
+
+/// Picks orders one after another while each brings more than it costs.
+fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<usize>, f64) {
+    let places = |order: usize| -> Vec<usize> {
+        (0..recordings).flat_map(|r| [0, 1].map(|i| r * 2 * orders + 2 * order + i)).collect()
+    };
+    let gain_with = |chosen: &[usize]| -> f64 {
+        let index: Vec<usize> = chosen.iter().flat_map(|order| places(*order)).collect();
+        let mut part = Square::zero(index.len());
+        for (a, i) in index.iter().enumerate() {
+            for (b, j) in index.iter().enumerate() {
+                part.a[a * index.len() + b] = sums.information.at(*i, *j);
+            }
+        }
+        let score: Vec<f64> = index.iter().map(|i| sums.score[*i]).collect();
+        gain_of(&Sums { information: part, score })
+    };
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut gain = 0.0;
+    while chosen.len() < MOST.min(orders) {
+        let trials: Vec<(usize, f64)> = (0..orders)
+            .filter(|order| !chosen.contains(order))
+            .map(|order| {
+                let mut with = chosen.clone();
+                with.push(order);
+                (order, gain_with(&with))
+            })
+            .collect();
+        let Some((order, best)) = trials.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+        else {
+            break;
+        };
+        // A later order must also be a fair part of what the first ones brought.
+        if best - gain < PER_ORDER + looked || best - gain < 0.002 * best {
+            break;
+        }
+        gain = best;
+        chosen.push(order);
+    }
+    (chosen, gain)
+}
+
+/// Whether an effect is made of waves that are sought: the search is dear, and only waves are like waves.
+pub(crate) fn is_periodic(name: N) -> bool {
+    matches!(name, N::Cogging | N::TorqueRipple)
+}
+
+/// Longest run of neighbouring orders that teeth or poles make.
+const LONGEST_RUN: usize = 4;
+/// How near to a whole number an order is one.
+const MULTIPLE: f64 = 0.1;
+/// Part of the strongest amplitude that an order must have to count in a run.
+const STANDS: f64 = 0.2;
+
+/// Whether the waves found are those of teeth or poles. A well or a bump at one place needs all orders up to its width, one
+/// after the other, and repeats only because so little of the travel is seen. Orders count from the turn where it is known,
+/// otherwise from the longest wave.
+pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
+    if !is_periodic(effect.name) {
+        return true;
+    }
+    let strongest = amplitudes.iter().copied().fold(0.0, f64::max);
+    let mut waves: Vec<f64> = effect
+        .waves()
+        .iter()
+        .zip(amplitudes)
+        .filter(|(_, amplitude)| **amplitude >= STANDS * strongest)
+        .map(|((_, wave), _)| *wave)
+        .collect();
+    waves.sort_by(f64::total_cmp);
+    let Some(longest_wave) = waves.first() else { return true };
+    let first = effect.shape.get("turn").map_or(*longest_wave, |turn| TAU / turn);
+    // Where no turn is known waves may stand closer than the longest allows teeth to.
+    let orders: Vec<f64> = waves.iter().map(|wave| (wave / first).round()).collect();
+    let mut run = 1;
+    let mut longest = 1;
+    for pair in orders.windows(2) {
+        run = if pair[1] - pair[0] <= 1.0 { run + 1 } else { 1 };
+        longest = longest.max(run);
+    }
+    // Waves that run on and are no multiples of the longest are irregular.
+    let regular = effect.shape.contains_key("turn")
+        || waves.iter().zip(&orders).all(|(wave, order)| (wave / first - order).abs() < MULTIPLE);
+    longest <= if regular { LONGEST_RUN } else { LONGEST_RUN - 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cogging(orders: &[f64]) -> Effect {
+        let keys: Vec<String> = orders.iter().map(|order| format!("order_{order}")).collect();
+        let mut shape: Vec<(&str, f64)> =
+            keys.iter().map(String::as_str).zip(orders.iter().copied()).collect();
+        shape.push(("turn", TAU));
+        Effect::shaped(N::Cogging, &shape)
+    }
+
+    #[test]
+    fn teeth_and_poles_leave_gaps_between_their_orders_and_places_do_not() {
+        assert!(is_comb(&cogging(&[7.0, 12.0, 14.0, 21.0, 28.0]), &[1.0; 5]));
+        assert!(is_comb(&cogging(&[1.0, 2.0, 3.0, 4.0]), &[1.0; 4]));
+        assert!(!is_comb(&cogging(&[2.0, 3.0, 4.0, 5.0, 6.0]), &[1.0; 5]));
+        // Where no turn is known, orders count from the longest wave.
+        let free = |periods: &[f64]| {
+            let keys: Vec<String> = (1..=periods.len()).map(|i| format!("period_{i}")).collect();
+            let shape: Vec<(&str, f64)> =
+                keys.iter().map(String::as_str).zip(periods.iter().copied()).collect();
+            Effect::shaped(N::Cogging, &shape)
+        };
+        assert!(!is_comb(&free(&[0.1, 0.048, 0.031, 0.025, 0.022, 0.0195, 0.016]), &[1.0; 7]));
+        assert!(!is_comb(&free(&[0.13, 0.091, 0.059, 0.047, 0.039, 0.034]), &[1.1, 0.5, 1.4, 0.3, 0.4, 0.7]));
+        assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3]), &[1.0; 3]));
+        assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3, 0.625e-3]), &[1.0; 4]));
+        assert!(!is_comb(&free(&[0.0754, 0.0522, 0.0456, 0.0370]), &[0.79, 1.07, 0.56, 0.35]));
+        // What is weak beside the strongest does not close a gap.
+        assert!(is_comb(&cogging(&[2.0, 3.0, 4.0, 5.0, 6.0]), &[1.0, 1.0, 0.1, 1.0, 1.0]));
+    }
+}

@@ -1,0 +1,314 @@
+//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
+
+use crate::effects::{Effect, EffectName as N};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::filter::Noise;
+use crate::estimation::fit::Fit;
+use crate::estimation::model::{Model, Nominal, effective_commands};
+use crate::estimation::noise::{self, Colour};
+use crate::numerics::golden::golden;
+use crate::selection::candidates::{self, Span};
+use crate::selection::joint;
+use crate::selection::periodic;
+use crate::selection::score_test;
+use crate::selection::shape_search::descend;
+use rayon::prelude::*;
+
+/// A model fitted with the noise that goes with it.
+pub(crate) struct FittedModel {
+    pub(crate) model: Model,
+    pub(crate) noise: Noise,
+    pub(crate) fit: Fit,
+    /// Log-likelihood less what its freedom costs.
+    pub(crate) merit: f64,
+}
+
+/// Everything that selection works on.
+pub(crate) struct FitContext<'a> {
+    pub(crate) nominal: &'a Nominal,
+    pub(crate) tracks: &'a [BlockedRecording],
+    pub(crate) span: &'a Span,
+    /// Acceleration that the command makes: the scale of the noise search.
+    pub(crate) scale: f64,
+}
+
+/// What one value that is fitted costs in log-likelihood: half the logarithm of the number of independent stretches is
+/// about 3; shapes are searched and cost more.
+pub(crate) const PER_COEFFICIENT: f64 = 2.5;
+const PER_SHAPE: f64 = 4.0;
+/// How many effects are fitted in full at each step.
+const FINALISTS: usize = 8;
+/// How many of them have their shapes moved in full fits.
+const POLISHED: usize = 3;
+/// Factors at which optima are looked for that lie apart.
+const APART: [f64; 8] = [0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.4];
+/// How many values of a shape the score test moves, and moves again.
+const MOVED: usize = 3;
+const MOVED_AGAIN: usize = 2;
+/// How often they are looked for farther away.
+const FARTHER: usize = 4;
+/// How often waves are looked for again under the noise that they leave.
+const SEARCHES: usize = 3;
+/// Most effects that are named together.
+pub(crate) const MOST: usize = 3;
+
+/// What an effect's freedom costs.
+fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
+    let movable = candidates::movable(effect, span).len() as f64;
+    let waves = effect.waves().len();
+    let coefficients = match effect.name {
+        N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
+        N::PositionDependentFriction | N::PositionDependentDamping => effect.shape_or("degree", 3.0) as usize,
+        N::FrictionDrift | N::AsymmetricFriction => 2,
+        N::PositionSpring => 1 + usize::from(effect.shape_or("preload", 0.0) > 0.5),
+        N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag => 0,
+        _ => 1,
+    };
+    PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
+}
+
+/// The largest value along one value of a shape between two ends, in its logarithm, and the effect that has it.
+fn along(
+    effect: &Effect,
+    key: &str,
+    (low, high): (f64, f64),
+    steps: usize,
+    value: &dyn Fn(&Effect) -> f64,
+) -> Option<(f64, Effect)> {
+    let with = |x: f64| {
+        let mut trial = effect.clone();
+        trial.shape.insert(key.to_owned(), x.exp());
+        trial
+    };
+    let (a, b) = (low.ln(), high.ln());
+    (b > a).then(|| {
+        let found = with(golden(a, b, steps, |x| value(&with(x))));
+        (value(&found), found)
+    })
+}
+
+/// Effects that change a dry friction, which must be there first.
+fn needs_dry(name: N) -> bool {
+    matches!(
+        name,
+        N::StribeckFriction
+            | N::FrictionDrift
+            | N::PositionDependentFriction
+            | N::PreslidingFriction
+            | N::Backlash
+    )
+}
+
+impl FitContext<'_> {
+    /// Fits a model with noise of its own, starting from known noise.
+    pub(crate) fn fit(&self, model: Model, from: &Noise, colour: Colour) -> FittedModel {
+        let first = Fit::new(&model, self.nominal, self.tracks, from);
+        let totals = first.totals(self.tracks);
+        let noise = noise::estimate(self.tracks, &totals, from, self.scale, colour);
+        let fit = Fit::new(&model, self.nominal, self.tracks, &noise);
+        let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
+        let merit = fit.log_likelihood - spent;
+        FittedModel { model, noise, fit, merit }
+    }
+
+    /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
+    /// what a disturbance explains are two optima.
+    pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
+        let fits =
+            starts.par_iter().map(|from| self.fit(model.clone(), from, Colour::Slow)).collect::<Vec<_>>();
+        fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
+    }
+
+    /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
+    pub(crate) fn screen(
+        &self,
+        now: &FittedModel,
+        wanted: &(dyn Fn(N) -> bool + Sync),
+    ) -> Vec<(Effect, f64)> {
+        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
+        let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
+        let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
+        let no_losses = self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0));
+        let best_of = |name: &N| -> Option<(Effect, f64)> {
+            if there(*name)
+                || (needs_dry(*name) && !dry)
+                || (*name == N::MissedCounts && no_losses)
+                || !wanted(*name)
+            {
+                return None;
+            }
+            let best = match name {
+                N::Cogging | N::TorqueRipple => periodic::search(
+                    *name,
+                    &now.fit,
+                    &residuals,
+                    &now.model,
+                    self.tracks,
+                    self.span,
+                    self.nominal,
+                ),
+                _ => {
+                    let grid = candidates::shapes(*name, self.span, self.nominal);
+                    score_test::best_on_grid(
+                        &now.fit,
+                        &residuals,
+                        &now.model,
+                        self.tracks,
+                        &grid,
+                        self.nominal,
+                    )
+                    .map(|(effect, score)| (effect, score.gain))
+                }
+            };
+            let (effect, gain) = self.refine(now, &residuals, best?.0);
+            let worth = gain - cost(&effect, self.tracks.len(), self.span);
+            (worth > 0.0).then_some((effect, worth))
+        };
+        let mut found: Vec<(Effect, f64)> = N::ALL.par_iter().filter_map(best_of).collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found
+    }
+
+    /// Moves the shape of an effect to its largest score gain, one value after another.
+    fn refine(&self, now: &FittedModel, residuals: &[Vec<f64>], mut effect: Effect) -> (Effect, f64) {
+        let gain = |effect: &Effect| {
+            score_test::score(&now.fit, residuals, &now.model, self.tracks, effect, self.nominal).gain
+        };
+        let movable = candidates::movable(&effect, self.span);
+        let mut best = gain(&effect);
+        for round in 0..2 {
+            // What matters most stands first; the rest is moved where it is fitted.
+            for (key, low, high) in movable.iter().take(if round == 0 { MOVED } else { MOVED_AGAIN }) {
+                let at = effect.shape[*key];
+                let reach = if round == 0 { 2.2_f64 } else { 1.3 };
+                let ends = ((at / reach).max(*low), (at * reach).min(*high));
+                if let Some((value, trial)) = along(&effect, key, ends, 9, &gain).filter(|(v, _)| *v > best) {
+                    (best, effect) = (value, trial);
+                }
+            }
+            if movable.is_empty() {
+                break;
+            }
+        }
+        (effect, best)
+    }
+
+    /// Fits the best effects of a screening in full, each with noise of its own; best first.
+    pub(crate) fn finalists(&self, now: &FittedModel, found: &[(Effect, f64)]) -> Vec<FittedModel> {
+        let mut full: Vec<FittedModel> = found
+            .iter()
+            .take(FINALISTS)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|(effect, _)| {
+                let mut model = now.model.clone();
+                model.effects.push(effect.clone());
+                self.fit(model, &now.noise, Colour::White)
+            })
+            .collect();
+        full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        full
+    }
+
+    /// Polishes the best few candidates and puts them in order again.
+    pub(crate) fn polish(&self, candidates: &mut [FittedModel]) {
+        let polished: Vec<FittedModel> =
+            candidates.par_iter().take(POLISHED).map(|c| self.polish_one(c)).collect();
+        for (old, new) in candidates.iter_mut().zip(polished) {
+            if new.merit > old.merit {
+                *old = new;
+            }
+        }
+        candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    }
+
+    /// Looks for waves again under the noise that those found first have left: weak ones hide in the noise of a null that
+    /// knows of none.
+    fn search_waves_again(&self, candidate: &FittedModel) -> FittedModel {
+        let again = |from: &FittedModel| {
+            let mut model = from.model.clone();
+            let name = model.effects.pop()?.name;
+            let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
+            let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
+            let (effect, _) =
+                periodic::search(name, &base, &residuals, &model, self.tracks, self.span, self.nominal)?;
+            model.effects.push(effect);
+            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
+        };
+        let mut best = self.fit(candidate.model.clone(), &candidate.noise, Colour::White);
+        for _ in 0..SEARCHES {
+            let Some(found) = again(&best) else { break };
+            best = found;
+        }
+        best
+    }
+
+    /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
+    pub(crate) fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
+        let effect = model.effects.last().expect("there is an effect to polish");
+        let effective = effective_commands(self.tracks, &model.effects);
+        let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);
+        if !candidates::is_possible(effect) || effective.is_some_and(ignores) {
+            return f64::NEG_INFINITY;
+        }
+        Fit::new(model, self.nominal, self.tracks, noise).log_likelihood
+    }
+
+    /// Moves the shape of the last effect to the largest likelihood of the whole fit.
+    pub(crate) fn polish_one(&self, candidate: &FittedModel) -> FittedModel {
+        let last = candidate.model.effects.len() - 1;
+        if periodic::is_periodic(candidate.model.effects[last].name) {
+            return self.search_waves_again(candidate);
+        }
+        let mut model = candidate.model.clone();
+        let merit = |model: &Model| self.merit_of(model, &candidate.noise);
+        let mut best = candidate.fit.log_likelihood;
+        let movable = candidates::movable(&candidate.model.effects[last], self.span);
+        // The score test holds the gain and looks near by: delays, drifts and events have optima that lie apart.
+        if let (true, Some((key, low, high))) =
+            (candidates::has_optima_apart(candidate.model.effects[last].name), movable.first().copied())
+        {
+            for _ in 0..FARTHER {
+                let at = model.effects[last].shape[key];
+                let mut taken = None;
+                for factor in APART {
+                    let mut trial = model.clone();
+                    trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
+                    let value = merit(&trial);
+                    if value > best {
+                        best = value;
+                        taken = Some((factor, trial));
+                    }
+                }
+                let Some((factor, trial)) = taken else { break };
+                model = trial;
+                // Only from the edge of what was looked at is it worth looking farther.
+                if factor > APART[0] && factor < APART[APART.len() - 1] {
+                    break;
+                }
+            }
+        }
+        if let Some((value, found)) =
+            joint::search(self, &model, &candidate.noise, &merit).filter(|f| f.0 > best)
+        {
+            (best, model) = (value, found);
+        }
+        for (key, low, high) in movable.iter().copied() {
+            let at = model.effects[last].shape[key];
+            let ends = ((at / 1.6).max(low), (at * 1.6).min(high));
+            let with = |effect: &Effect| {
+                let mut trial = model.clone();
+                trial.effects[last] = effect.clone();
+                trial
+            };
+            let found = along(&model.effects[last], key, ends, 8, &|effect| merit(&with(effect)));
+            if let Some((value, effect)) = found.filter(|(value, _)| *value > best) {
+                best = value;
+                model.effects[last] = effect;
+            }
+        }
+        let found = descend(self, model, &candidate.noise, best, &merit);
+        let (_, model) = joint::settle(self, found, &candidate.noise, &merit);
+        self.fit(model, &candidate.noise, Colour::White)
+    }
+}

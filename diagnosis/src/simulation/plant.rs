@@ -1,0 +1,139 @@
+//! A patched rig run forward: nominal model, friction that sticks, and every effect of the rig.
+
+use crate::effects::{CommandLaw, Law, State};
+use crate::io::rig::Rig;
+
+/// What acts on the plant from outside during a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Surroundings {
+    /// Inclination below the horizontal, rad.
+    pub tilt: f64,
+    /// Generalised force on the coordinate, N·m or N.
+    pub external: f64,
+}
+
+/// The plant of a rig. Steps should be short against its time constants: 0.1 ms or less.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    rig: Rig,
+    commands: Vec<CommandLaw>,
+    laws: Vec<(Law, Vec<f64>)>,
+    scratch: Vec<f64>,
+    position: f64,
+    velocity: f64,
+    time: f64,
+    sensor: f64,
+}
+
+impl Plant {
+    /// A plant at rest at position zero.
+    pub fn new(rig: &Rig) -> Self {
+        let commands = rig.effects.iter().filter_map(CommandLaw::new).collect();
+        let laws: Vec<(Law, Vec<f64>)> = rig
+            .effects
+            .iter()
+            .filter_map(|effect| {
+                let law = Law::new(effect)?;
+                let coefficients = law.names().iter().map(|name| effect.coefficient(name)).collect();
+                Some((law, coefficients))
+            })
+            .collect();
+        let most = laws.iter().map(|(_, c)| c.len()).max().unwrap_or(0);
+        Self {
+            rig: rig.clone(),
+            commands,
+            laws,
+            scratch: vec![0.0; most],
+            position: 0.0,
+            velocity: 0.0,
+            time: 0.0,
+            sensor: 0.0,
+        }
+    }
+
+    /// One step of `dt` s with `command` held.
+    pub fn step(&mut self, command: f64, around: Surroundings, dt: f64) {
+        let limit = self.rig.actuator.limit.unwrap_or(f64::INFINITY);
+        let mut effective = command.clamp(-limit, limit);
+        for law in &mut self.commands {
+            effective = law.step(effective, dt);
+        }
+        let drive = self.rig.actuator.gain * effective;
+        let model = &self.rig.model;
+        let coulomb = model.coulomb.unwrap_or(0.0);
+        // While stuck the laws see the direction in which the drive pushes, so that breakaway is against friction.
+        let push = drive + around.external;
+        let velocity = if self.velocity == 0.0 { push.signum() * f64::MIN_POSITIVE } else { self.velocity };
+        let state = State {
+            position: self.position,
+            velocity,
+            rest: false,
+            drive,
+            command: effective,
+            tilt: around.tilt,
+            external: around.external,
+            bias: model.offset.unwrap_or(0.0) / model.inertia,
+            time: self.time,
+            dt,
+            ..State::default()
+        };
+        let mut dry = coulomb;
+        let mut free = push - model.viscous.unwrap_or(0.0) * self.velocity
+            + model.offset.unwrap_or(0.0)
+            + model.weight.unwrap_or(0.0) * around.tilt.sin();
+        self.sensor = 0.0;
+        for (law, coefficients) in &mut self.laws {
+            let terms = &mut self.scratch[..coefficients.len()];
+            law.terms(&state, terms);
+            let sum: f64 = terms.iter().zip(&*coefficients).map(|(term, c)| term * c).sum();
+            if law.in_sensor() {
+                self.sensor += sum;
+            } else if law.is_dry() {
+                // A force against the motion that can hold the axis at rest.
+                dry -= sum * velocity.signum();
+            } else {
+                free += sum;
+            }
+        }
+        let dry = dry.max(0.0);
+        let inertia = model.inertia;
+        if self.velocity == 0.0 {
+            if free.abs() > dry {
+                self.velocity = (free - free.signum() * dry) / inertia * dt;
+            }
+        } else {
+            let next = self.velocity + (free - self.velocity.signum() * dry) / inertia * dt;
+            // Dry friction stops the axis; it never turns it round within a step.
+            let coasting = self.velocity + free / inertia * dt;
+            self.velocity =
+                if next * self.velocity < 0.0 && (coasting * self.velocity > 0.0 || free.abs() <= dry) {
+                    0.0
+                } else {
+                    next
+                };
+        }
+        self.position += self.velocity * dt;
+        self.time += dt;
+    }
+
+    /// True position, rad or m.
+    pub fn position(&self) -> f64 {
+        self.position
+    }
+
+    /// True velocity, rad/s or m/s.
+    pub fn velocity(&self) -> f64 {
+        self.velocity
+    }
+
+    /// Sets position and velocity, for replay from a measured state.
+    pub fn place(&mut self, position: f64, velocity: f64) {
+        self.position = position;
+        self.velocity = velocity;
+    }
+
+    /// What the encoder reads, whole counts.
+    pub fn counts(&self) -> f64 {
+        ((self.position + self.sensor) * self.rig.encoder.counts_per_unit).floor()
+    }
+}

@@ -1,0 +1,180 @@
+//! Rivals: every effect found is taken out, others are fitted in its place, and how far they stay behind makes its class.
+
+use crate::effects::{Effect, EffectName};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::fit::Fit;
+use crate::estimation::model::Nominal;
+use crate::estimation::noise::Colour;
+use crate::io::rig::Kind;
+use crate::numerics::bootstrap::bootstrap;
+use crate::selection::excitation::Excitation;
+use crate::selection::periodic::is_periodic;
+use crate::selection::search::{FitContext, FittedModel};
+use crate::validation::evidence::{EffectEvidence, Rival, evaluate_all, fit_costs};
+use crate::validation::known_travel::known;
+use crate::validation::parameters;
+use rayon::prelude::*;
+
+/// How many rivals of each effect are fitted in full.
+const RIVALS: usize = 4;
+/// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
+pub(crate) const BEHIND_Z: f64 = 2.0;
+const BEHIND: f64 = 3.0;
+/// The same as a part of what the effect explains: less is the form of a law rather than its name.
+const BEHIND_PART: f64 = 0.015;
+/// A rival this far behind in log-likelihood under a slow disturbance, and by half of what the winner gains there, is
+/// behind, and counts as by this many standard errors.
+const BEHIND_SLOW: f64 = 30.0;
+const BEHIND_SLOW_Z: f64 = 4.0;
+/// Narrowest gap that an encoder sees, counts.
+const SEEN: f64 = 2.0;
+/// Most effects that a class may hold.
+const MOST_IN_CLASS: usize = 3;
+/// Standard errors behind within which a rival's shape is worth polishing.
+const WITHIN_REACH: f64 = 8.0;
+
+/// Costs per segment on fitted and held-out recordings under one noise.
+fn costs(candidate: &FittedModel, nominal: &Nominal, holdout: &[BlockedRecording]) -> Vec<f64> {
+    let mut out = fit_costs(candidate);
+    for evaluated in evaluate_all(candidate, nominal, holdout, &candidate.noise) {
+        out.extend(evaluated.costs);
+    }
+    out
+}
+
+/// Fits the rivals of each effect in its place and says how far behind they are.
+pub(crate) fn fit_rivals(
+    context: &FitContext,
+    last: &FittedModel,
+    slow: &FittedModel,
+    holdout: &[BlockedRecording],
+    found: &mut [EffectEvidence],
+) {
+    let best = context.fit(last.model.clone(), &last.noise, Colour::White);
+    for i in 0..found.len() {
+        let mut less = best.model.clone();
+        less.effects.remove(i);
+        let name = best.model.effects[i].name;
+        let base_fit = Fit::new(&less, context.nominal, context.tracks, &best.noise);
+        let base = FittedModel { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
+        let periodic =
+            is_periodic(name) || matches!(name, EffectName::MassImbalance | EffectName::EncoderEccentricity);
+        let others: Vec<(Effect, f64)> = context
+            .screen(&base, &|other| other != name && (periodic || !is_periodic(other)))
+            .into_iter()
+            .take(RIVALS)
+            .collect();
+        let with = |effect: &Effect| {
+            let mut model = base.model.clone();
+            model.effects.push(effect.clone());
+            model
+        };
+        let mut out: Vec<Rival> = others
+            .par_iter()
+            .map(|(effect, _)| {
+                let model = with(effect);
+                let fit = Fit::new(&model, context.nominal, context.tracks, &best.noise);
+                let rival = FittedModel { model, noise: best.noise, fit, merit: 0.0 };
+                // Both are judged where both know something.
+                let holdout = known(holdout, &best.model, context.span);
+                let holdout = known(&holdout, &rival.model, context.span);
+                let own = costs(&best, context.nominal, &holdout);
+                let lead = |rival: &FittedModel| {
+                    let theirs = costs(rival, context.nominal, &holdout);
+                    bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
+                };
+                let mut gain = lead(&rival);
+                let mut rival = rival;
+                if gain.z < WITHIN_REACH {
+                    // A rival that may be near is fitted as well as the winner was.
+                    let polished = FittedModel { noise: best.noise, ..context.polish_one(&rival) };
+                    let again = lead(&polished);
+                    if again.sum < gain.sum {
+                        (gain, rival) = (again, polished);
+                    }
+                }
+                let last = rival.model.effects.len() - 1;
+                let absence =
+                    (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
+                Rival { name: effect.name, z: gain.z, lead: gain.sum, absence }
+            })
+            .collect();
+        // Needed only where a rival comes near, and the same for all of them.
+        let mut without = None;
+        for (rival, (effect, _)) in out.iter_mut().zip(&others).filter(|(rival, _)| rival.z < BEHIND_Z) {
+            // What only a white noise takes for as good is behind.
+            let theirs = context.fit_slow(with(effect), &[&slow.noise]).merit;
+            let without =
+                *without.get_or_insert_with(|| context.fit_slow(base.model.clone(), &[&slow.noise]).merit);
+            let behind = slow.merit - theirs;
+            if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
+                rival.z = BEHIND_SLOW_Z;
+                rival.lead = rival.lead.max(behind);
+            }
+        }
+        found[i].rivals = out;
+    }
+}
+
+/// What no recording of motion tells from an effect; `count` is one of the encoder's.
+fn twin(effect: &Effect, leaves_much: bool, kind: Kind, count: f64) -> Option<EffectName> {
+    use EffectName as N;
+    match effect.name {
+        // A drive that clips, and a roller that slips at a constant force.
+        N::CommandSaturation => Some(N::RollerSlip),
+        N::RollerSlip => Some(N::CommandSaturation),
+        // A spring that explains little of what it should explain may well have a gap.
+        N::DriveCompliance if leaves_much => Some(N::Backlash),
+        // A gap that the encoder does not see, and the spring that its flanks are.
+        N::Backlash if effect.shape_or("gap", f64::INFINITY) < SEEN * count => Some(N::DriveCompliance),
+        // Waves of once a turn, where nothing that turns need be heavy.
+        N::MassImbalance if kind == Kind::Linear => Some(N::Cogging),
+        _ => None,
+    }
+}
+
+/// Every effect that these recordings cannot tell from the one found, itself first.
+pub(crate) fn class(
+    found: &EffectEvidence,
+    excitation: &Excitation,
+    leaves_much: bool,
+    context: &FitContext,
+) -> Vec<EffectName> {
+    let name = found.effect.name;
+    let mut class = vec![name];
+    class.extend(twin(&found.effect, leaves_much, context.nominal.rig.kind, context.span.count));
+    class.extend(excitation.twin(name).filter(|twin| !class.contains(twin)));
+    let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
+    let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
+    let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
+    near.sort_by(|a, b| a.z.total_cmp(&b.z));
+    for rival in near {
+        if class.len() < MOST_IN_CLASS && !class.contains(&rival.name) {
+            class.push(rival.name);
+        }
+    }
+    class
+}
+
+/// Standard errors that the nearest rival outside an effect's class is behind.
+pub(crate) fn nearest(found: &EffectEvidence, class: &[EffectName]) -> f64 {
+    let outside = found.rivals.iter().filter(|r| !class.contains(&r.name) && r.absence.is_none());
+    outside.map(|r| r.z).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unseen_gap_may_be_a_spring_and_a_wave_of_a_screw_may_be_of_its_motor() {
+        use EffectName as N;
+        let of = |name: N, shape: &[(&str, f64)], kind: Kind| {
+            twin(&Effect::shaped(name, shape), false, kind, 1e-6)
+        };
+        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], Kind::Linear), Some(N::DriveCompliance));
+        assert_eq!(of(N::Backlash, &[("gap", 3e-6)], Kind::Linear), None);
+        assert_eq!(of(N::MassImbalance, &[], Kind::Linear), Some(N::Cogging));
+        assert_eq!(of(N::MassImbalance, &[], Kind::Rotary), None, "there a mass turns");
+    }
+}

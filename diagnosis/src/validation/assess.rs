@@ -1,0 +1,365 @@
+//! How sure each effect found is. What is too unsure goes, and the rest is weighed again without it: a false companion
+//! takes from a true effect what speaks for it.
+
+use crate::effects::EffectName;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::io::schema::Parameter;
+use crate::selection::candidates;
+use crate::selection::excitation::Excitation;
+use crate::selection::search::{FitContext, FittedModel};
+use crate::validation::alternatives;
+use crate::validation::comparison::Shown;
+use crate::validation::confidence::{self, Evidence, Leftover};
+use crate::validation::evidence::EffectEvidence;
+use crate::validation::known_travel::known;
+use crate::validation::out_of_library;
+use crate::validation::parameters;
+use crate::validation::residuals::{Residuals, above};
+use crate::validation::stepwise::{Search, eliminate};
+use crate::validation::tonal::{self, TonalDisturbance};
+use std::collections::BTreeMap;
+
+/// Least probability with which an effect is named: two to one.
+const NAMED: f64 = 2.0 / 3.0;
+/// Probability of a name where more effects are as near than a class may hold.
+const UNDECIDED: f64 = 0.5;
+/// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
+/// two it must leave less than this part of what the refit left.
+pub(crate) const LITTLE_FORCE: f64 = 0.12;
+const MUCH_FORCE: f64 = 0.5;
+const MUCH_OF_REFIT: f64 = 0.65;
+/// Part of the refit's mean square that a spring leaves where it may well be a gap.
+const LEAVES_MUCH: f64 = 0.3;
+
+/// Least part of a residual's mean square that counts as more than chance.
+const LEAST_ABOVE: f64 = 0.02;
+
+/// One effect with what speaks for and against it.
+pub(crate) struct Assessed {
+    pub(crate) found: EffectEvidence,
+    pub(crate) class: Vec<EffectName>,
+    pub(crate) evidence: Evidence,
+    pub(crate) confidence: f64,
+    pub(crate) parameters: BTreeMap<String, Parameter>,
+    pub(crate) is_there: bool,
+    /// Whether more effects than a class may hold explain it as well.
+    pub(crate) undecided: bool,
+    /// Part of the travel over which it bends, where that is more than bristles do.
+    pub(crate) creeps: Option<f64>,
+    /// What it would rather be, where physics without a name explains surely more.
+    pub(crate) rather: Option<String>,
+}
+
+impl Assessed {
+    fn explains_more(&self, than: &Self) -> bool {
+        self.found.holdout.sum > than.found.holdout.sum
+    }
+}
+
+/// The model that stands, its effects weighed, and its residuals.
+pub(crate) struct Assessment {
+    pub(crate) effects: Vec<Assessed>,
+    /// What went because it was unsure.
+    pub(crate) dropped: Vec<Assessed>,
+    pub(crate) shown: Shown,
+    pub(crate) estimator: Estimator,
+    /// What reading whole counts alone puts into the residual, N·m or N.
+    pub(crate) floor: f64,
+    /// Whether the model leaves little enough of the force to have understood it.
+    pub(crate) understood: bool,
+    /// Frequency at which a force may swing whatever the axis does, and that force if it does.
+    hertz: Option<f64>,
+    pub(crate) swing: Option<TonalDisturbance>,
+}
+
+impl Assessment {
+    /// Confidence of the surest effect, if the model has understood the recordings.
+    fn surest(&self) -> f64 {
+        let all = self.effects.iter().map(|e| e.confidence).filter(|_| self.understood);
+        all.fold(0.0, f64::max)
+    }
+
+    /// Whether it is for its evidence, weighed, that an effect is named or not.
+    pub(crate) fn rests_on_evidence(&self, assessed: &Assessed) -> bool {
+        self.contradiction(assessed).is_none()
+    }
+
+    fn same_joint(&self, assessed: &Assessed) -> Option<EffectName> {
+        let gained = |assessed: &Assessed| (assessed.found.effect.name, assessed.found.holdout.sum);
+        same_joint(gained(assessed), self.effects.iter().map(gained))
+    }
+
+    /// Whether it is one of two drifts that are one of the inertia.
+    fn drifts_alike(&self, assessed: &Assessed) -> bool {
+        let change = |name: EffectName| {
+            let drift = self.effects.iter().find(|e| e.found.effect.name == name)?;
+            Some(drift.parameters.get("change")?.value)
+        };
+        let [gain, friction] = [EffectName::GainDrift, EffectName::FrictionDrift];
+        [gain, friction].contains(&assessed.found.effect.name)
+            && change(gain).zip(change(friction)).is_some_and(|(gain, friction)| are_alike(gain, friction))
+    }
+
+    fn stands_for_swing(&self) -> bool {
+        self.swing.is_some_and(|swing| swing.is_mistaken())
+    }
+
+    /// What is there instead of the effect that explains the most, where physics without a name explains more.
+    pub(crate) fn foreign(&self) -> Option<String> {
+        let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
+        let says = most.rather.as_ref()?;
+        Some(format!("it resembles {}, but {says}", most.found.effect.name))
+    }
+
+    /// Places of the effects that are named.
+    pub(crate) fn named(&self) -> Vec<usize> {
+        let is_named = |(i, effect): (usize, &Assessed)| self.doubt(effect).is_none().then_some(i);
+        self.effects.iter().enumerate().filter_map(is_named).collect()
+    }
+
+    /// Why an effect is not named, if it is not.
+    pub(crate) fn doubt(&self, assessed: &Assessed) -> Option<String> {
+        self.contradiction(assessed).or_else(|| {
+            if assessed.undecided {
+                Some("more effects than a class may hold explain it as well".into())
+            } else if assessed.confidence < NAMED {
+                Some(format!("it is right with a probability of only {:.2}", assessed.confidence))
+            } else {
+                None
+            }
+        })
+    }
+
+    /// What rules an effect out however much it explains.
+    fn contradiction(&self, assessed: &Assessed) -> Option<String> {
+        if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
+            Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
+        } else if !self.understood {
+            Some("with it the model still leaves too much of the force to have understood it".into())
+        } else if !assessed.is_there {
+            Some(parameters::NO_SIZE.into())
+        } else if let Some(part) = assessed.creeps {
+            Some(format!(
+                "it would bend over {:.0} % of the travel, as a spring that creeps does",
+                100.0 * part
+            ))
+        } else if let Some(foreign) = &assessed.rather {
+            Some(foreign.clone())
+        } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(assessed)) {
+            Some("what stands beside it and explains more is no effect of the library".into())
+        } else if let Some(joint) = self.same_joint(assessed) {
+            Some(format!("beside {joint} it is the form of the same joint"))
+        } else if self.drifts_alike(assessed) {
+            Some("gain and friction would change alike, as both do where the inertia changes".into())
+        } else {
+            None
+        }
+    }
+}
+
+/// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
+/// next to reversals the other takes. Effects with what they gain.
+fn same_joint(
+    (name, gain): (EffectName, f64),
+    mut all: impl Iterator<Item = (EffectName, f64)>,
+) -> Option<EffectName> {
+    let of_joint =
+        |name| matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip);
+    let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
+    all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
+}
+
+/// Factor within which two drifts are one: what is a step and fitted as a bend gives either a little of the other's.
+const ALIKE: f64 = 1.5;
+
+/// Whether gain and friction change by the same part: over an inertia that changes, both do.
+fn are_alike(gain: f64, friction: f64) -> bool {
+    let ratio = friction / gain;
+    ratio < ALIKE && ratio * ALIKE > 1.0
+}
+
+/// Confidence of an effect beside an unsure one: what is not among those standing without it is no surer than it.
+fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
+    if standing.contains(&name) { own } else { own.min(unsure) }
+}
+
+/// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
+pub(crate) fn weigh(
+    s: &mut Search,
+    context: &FitContext,
+    refit: &FittedModel,
+    holdout: &[BlockedRecording],
+    excitation: &Excitation,
+) -> Assessment {
+    let scales = Scales { context, refit, holdout, excitation };
+    let found = scales.once(s, None);
+    let best = scales.without_unsure(s, found);
+    if !best.stands_for_swing() {
+        return best;
+    }
+    // No model of the axis holds what goes its own way.
+    s.last = context.fit_slow(Model::default(), &[&s.null.noise]);
+    let refitted = scales.once(s, best.hertz);
+    let dropped = best.dropped.into_iter().chain(best.effects).collect();
+    Assessment { dropped, swing: best.swing, ..refitted }
+}
+
+/// What every model is weighed with.
+struct Scales<'a> {
+    context: &'a FitContext<'a>,
+    refit: &'a FittedModel,
+    holdout: &'a [BlockedRecording],
+    excitation: &'a Excitation,
+}
+
+impl Scales<'_> {
+    /// Another model in place of the best so far, if it is surer; otherwise the search stays as it was, and what stands in
+    /// the other model is told.
+    fn instead(
+        &self,
+        s: &mut Search,
+        model: Model,
+        best: &Assessment,
+    ) -> Result<Assessment, Vec<EffectName>> {
+        let other = self.context.fit_slow(model, &[&s.null.noise, &s.last.noise]);
+        let (before, known) = (std::mem::replace(&mut s.last, other), s.rejected.len());
+        eliminate(s, self.context, self.holdout, &best.shown.patched.noise);
+        let next = self.once(s, best.hertz);
+        if next.surest() > best.surest() {
+            return Ok(next);
+        }
+        s.last = before;
+        s.rejected.truncate(known);
+        Err(next.effects.iter().map(|e| e.found.effect.name).collect())
+    }
+
+    fn without_unsure(&self, s: &mut Search, mut best: Assessment) -> Assessment {
+        loop {
+            let least =
+                best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
+            let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
+                return best;
+            };
+            let mut model = s.last.model.clone();
+            model.effects.remove(i);
+            match self.instead(s, model, &best) {
+                Ok(mut next) => {
+                    next.dropped = best.dropped;
+                    next.dropped.push(best.effects.remove(i));
+                    best = next;
+                }
+                Err(standing) => {
+                    let unsure = best.effects[i].confidence;
+                    for one in &mut best.effects {
+                        one.confidence = resting(one.confidence, unsure, one.found.effect.name, &standing);
+                    }
+                    return best;
+                }
+            }
+        }
+    }
+
+    /// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
+    fn once(&self, s: &mut Search, hertz: Option<f64>) -> Assessment {
+        let Self { context, refit, holdout, excitation } = *self;
+        let nominal = context.nominal;
+        let mut found = std::mem::take(&mut s.found);
+        let patched = context.fit(s.last.model.clone(), &s.last.noise, Colour::White);
+        let known: &[BlockedRecording] = &known(holdout, &patched.model, context.span);
+        alternatives::fit_rivals(context, &patched, &s.last, holdout, &mut found);
+        let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
+        let shown = Shown::new(context, holdout, &estimator, refit, patched);
+        let Shown { patched, on_fit, on_holdout, table } = &shown;
+        let (inertia, _, _) = parameters::scale(nominal, patched);
+        let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+        let floor = estimator.counting(context.tracks, &patched.noise, count) * inertia;
+        let (refit_holdout, left_holdout) =
+            (estimator.rms(&on_holdout.refit, known), estimator.rms(&on_holdout.patched, known));
+        let left = s.last.noise.slow * inertia * inertia;
+        // What neither counting nor a white disturbance makes.
+        let random = floor.hypot(estimator.white(&s.last.noise) * inertia);
+        let of_chance = |residual: f64| above(residual, random, LEAST_ABOVE).max(1e-300);
+        let leftover = Leftover {
+            of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
+            unexplained: [(left_holdout, refit_holdout), (table.patched.fit, table.refit.fit)]
+                .map(|(left, refit)| of_chance(left) / of_chance(refit))
+                .into_iter()
+                .fold(1.0, f64::min),
+        };
+        let part_of_force = left_holdout / estimator.rms(&on_holdout.force, known).max(1e-300);
+        let helps_much = left_holdout < MUCH_OF_REFIT * refit_holdout;
+        let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
+        let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
+        let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
+        let swing = hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(holdout, on_holdout)));
+        let effects = found
+            .into_iter()
+            .enumerate()
+            .map(|(i, found)| {
+                let class = alternatives::class(&found, excitation, leaves_much, context);
+                let nearest = alternatives::nearest(&found, &class);
+                let evidence = confidence::evidence(&found, leftover);
+                let parameters = parameters::parameters(context, patched, i);
+                let is_there = parameters::is_there(found.effect.name, &parameters);
+                let undecided = nearest < alternatives::BEHIND_Z;
+                let most = if undecided { UNDECIDED } else { 1.0 };
+                let confidence = confidence::confidence(&evidence).min(most);
+                let creeps = candidates::creeps(&found.effect, context.span)
+                    // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
+                    .filter(|_| !found.fits_everywhere());
+                let rather = out_of_library::rather(context, patched, i, found.fit.sum);
+                Assessed {
+                    found,
+                    class,
+                    evidence,
+                    confidence,
+                    parameters,
+                    is_there,
+                    undecided,
+                    creeps,
+                    rather,
+                }
+            })
+            .collect();
+        Assessment { effects, dropped: Vec::new(), shown, estimator, floor, understood, hertz, swing }
+    }
+}
+
+fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {
+    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_stand_alone_is_no_surer_than_what_it_rests_on() {
+        let drift = EffectName::FrictionDrift;
+        assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
+        assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);
+        assert_eq!(resting(0.5, 0.65, drift, &[]), 0.5);
+    }
+
+    #[test]
+    fn drifts_of_gain_and_friction_by_the_same_part_are_one_of_the_inertia() {
+        assert!(are_alike(-0.137, -0.137) && are_alike(-0.35, -0.5) && are_alike(0.2, 0.16));
+        assert!(!are_alike(-0.1, -0.5) && !are_alike(-0.3, -0.1) && !are_alike(-0.2, 0.2));
+    }
+
+    #[test]
+    fn a_joint_has_one_name() {
+        let all = [
+            (EffectName::DriveCompliance, 40.0),
+            (EffectName::Backlash, 900.0),
+            (EffectName::Cogging, 5000.0),
+        ];
+        let joint = |of: usize| same_joint(all[of], all.into_iter());
+        assert_eq!(joint(0), Some(EffectName::Backlash));
+        assert_eq!(joint(1), None, "the one that explains most keeps its name");
+        assert_eq!(joint(2), None, "cogging is no joint");
+    }
+}

@@ -1,0 +1,102 @@
+//! What held-out recordings may judge: a law of the travel says nothing of travel where no fitted recording has been.
+
+use crate::effects::EffectName as N;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::model::Model;
+use crate::numerics::digits::short_within;
+use crate::selection::candidates::Span;
+use std::borrow::Cow;
+
+/// Part of the fitted travel by which a recording may go beyond it.
+const BEYOND: f64 = 0.03;
+
+/// Recordings with the blocks marked of which a model knows nothing.
+pub(crate) fn known<'a>(
+    tracks: &'a [BlockedRecording],
+    model: &Model,
+    span: &Span,
+) -> Cow<'a, [BlockedRecording]> {
+    let follows = |name| matches!(name, N::PositionDependentFriction | N::PositionDependentDamping);
+    let reach = BEYOND * span.travel();
+    let is_unknown = |x: &f64| *x < span.low - reach || *x > span.high + reach;
+    let goes_beyond = |track: &BlockedRecording| track.x.iter().any(is_unknown);
+    if !model.effects.iter().any(|effect| follows(effect.name)) || !tracks.iter().any(goes_beyond) {
+        return Cow::Borrowed(tracks);
+    }
+    let mut tracks = tracks.to_vec();
+    for track in &mut tracks {
+        track.unknown = track.x.iter().map(is_unknown).collect();
+    }
+    Cow::Owned(tracks)
+}
+
+/// Part of a recording beyond the fitted travel from which on it is told.
+const TOLD: f64 = 0.05;
+
+/// What to record next where held-out recordings go and no fitted one does, if the model asks for travel; `length` is the
+/// unit of the coordinate.
+pub(crate) fn beyond(
+    tracks: &[BlockedRecording],
+    model: &Model,
+    span: &Span,
+    length: &str,
+) -> Option<String> {
+    let known = known(tracks, model, span);
+    let is_told = |track: &BlockedRecording| {
+        let unknown = track.unknown.iter().filter(|unknown| **unknown).count();
+        unknown as f64 > TOLD * track.blocks() as f64
+    };
+    if !known.iter().any(is_told) {
+        return None;
+    }
+    let all = || known.iter().flat_map(|track| track.x.iter().copied());
+    let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
+    let tidy = |x: f64| short_within(x, span.travel());
+    Some(format!(
+        "to fit on, strokes over the travel from {} to {} {length}: held-out recordings go there and fitted ones only from {} to {}, so that the profile beyond is not known",
+        tidy(from),
+        tidy(to),
+        tidy(span.low),
+        tidy(span.high)
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effect;
+    use crate::estimation::model::Nominal;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    fn slide(to: f64) -> BlockedRecording {
+        let time_s: Vec<f64> = (0..401).map(|i| f64::from(i) * 2.5e-3).collect();
+        let recording = Recording {
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.iter().map(|t| (1000.0 * to * t).round()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
+    }
+
+    #[test]
+    fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let span = Span::of(&[slide(10.0)], &nominal);
+        let model = |name| Model { effects: vec![Effect::shaped(name, &[])], ..Model::default() };
+        let unknown = |to: f64, name| {
+            let tracks = [slide(to)];
+            let tracks = known(&tracks, &model(name), &span);
+            tracks[0].unknown.iter().filter(|x| **x).count() as f64 / tracks[0].blocks() as f64
+        };
+        assert_eq!(unknown(10.2, N::PositionDependentFriction), 0.0);
+        assert!((unknown(20.0, N::PositionDependentFriction) - 0.485).abs() < 0.02);
+        assert_eq!(unknown(20.0, N::QuadraticDrag), 0.0);
+        let profile = model(N::PositionDependentFriction);
+        let told = |to: f64| beyond(&[slide(to)], &profile, &span, "rad");
+        assert_eq!(told(10.2), None);
+        assert!(told(20.0).is_some_and(|text| text.contains("from 0 to 19.95 rad")), "{:?}", told(20.0));
+    }
+}
