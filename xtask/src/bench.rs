@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 const EXAMPLES: [(&str, &str); 6] = [
     ("firmware", "tick_host"),
     ("host-sim", "plant_speed"),
-    ("host-sim", "xpbd_speed"),
-    ("host-sim", "ultrasound_speed"),
+    ("tissue", "xpbd_speed"),
+    ("ultrasound", "ultrasound_speed"),
     ("host-sim", "stream_speed"),
     ("diagnosis", "diagnose_speed"),
 ];
