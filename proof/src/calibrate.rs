@@ -36,7 +36,7 @@ pub(crate) fn calibrate(files: &[PathBuf]) -> Result<String, String> {
         let text = std::fs::read_to_string(file).map_err(|e| failed(&e))?;
         let result: Value = serde_json::from_str(&text).map_err(|e| failed(&e))?;
         for case in result["cases"].as_array().ok_or_else(|| failed(&"it has no `cases`"))? {
-            let category = case["category"].as_str().unwrap_or_default().to_string();
+            let category = case["kind"].as_str().unwrap_or_default().to_string();
             *cases.entry(category.clone()).or_default() += 1.0;
             for weighed in case["weighed"].as_array().into_iter().flatten() {
                 let Some(evidence) = weighed["evidence"].as_object() else { continue };

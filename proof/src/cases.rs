@@ -1,14 +1,13 @@
 //! The list of cases of one run: every effect at three strengths, pairs, nulls, wrong values, physics without a name, and
 //! recordings that cannot tell.
 
-use crate::generator::case::{Category, Spec};
+use crate::generator::case::Spec;
 use crate::generator::effects::EFFECTS;
 use crate::generator::excite::Kind;
 use crate::generator::outside::FOREIGN;
+use crate::key::Category;
 use crate::rng::Rng;
-
-/// The strengths of single effects, effect over noise.
-pub(crate) const STRENGTHS: [f64; 3] = [10.0, 3.0, 1.0];
+use crate::sums::STRENGTHS;
 
 /// Pairs that occur together on real machines and ask for different explanations.
 const PAIRS: [[&str; 2]; 16] = [

@@ -1,121 +1,105 @@
-//! Opens the key: every answer against what was hidden, and the sums over all cases.
+//! Opens the key: one answer against what was hidden. The rules stand in `docs/benchmark.md`.
 
-use std::collections::BTreeMap;
-
-use crate::cases::STRENGTHS;
-use crate::generator::case::{Case, Category};
-use crate::generator::effects::Parameter;
+use crate::key::{Category, Key};
+use crate::reported::Left;
 use crate::rivals::Opinion;
-use crate::stats::{Rate, quantile};
 use crate::tool::{Answer, Named, Weighed};
 
 /// From this confidence on a wrong name is confidently wrong.
 pub(crate) const CONFIDENT: f64 = 0.8;
-/// A class of more names than this is no answer.
-const WIDEST_CLASS: usize = 3;
+/// An oracle that gains less than this part of the noise's mean square has nothing to gain on the recording.
+const EXPLAINABLE: f64 = 0.15;
+/// At this strength and below, random bursts may be taken for noise.
+const WEAK: f64 = 1.0;
 
 /// One case after the tool and the rivals have answered; the recordings are gone.
 #[derive(Clone, Debug)]
 pub(crate) struct Record {
-    pub(crate) id: usize,
-    pub(crate) category: Category,
-    pub(crate) hidden: Vec<&'static str>,
-    pub(crate) strength: f64,
-    pub(crate) achieved: Vec<f64>,
-    pub(crate) machine: &'static str,
-    pub(crate) rate: f64,
+    pub(crate) id: String,
+    pub(crate) key: Key,
     pub(crate) answer: Result<Answer, String>,
-    /// Mean square that is left on the held-out recording with the true model in hand, at the tool's bandwidth.
-    pub(crate) oracle: f64,
+    /// What is left on the held-out recording; `None` where it could not be measured.
+    pub(crate) left: Option<Left>,
     pub(crate) opinions: Vec<Opinion>,
-    /// The same at the rivals' bandwidth.
-    pub(crate) oracle_rivals: f64,
     pub(crate) seconds: f64,
-    truths: Vec<(&'static str, Vec<Parameter>)>,
-    true_gain: f64,
-    nominal_gain: f64,
+    /// The drive's gain as the rig has it.
+    pub(crate) nominal_gain: f64,
 }
 
 impl Record {
-    /// Puts a case and the answers to it together.
-    pub(crate) fn new(
-        case: &Case,
-        answer: Result<Answer, String>,
-        opinions: Vec<Opinion>,
-        seconds: f64,
-    ) -> Self {
-        let own = case.machine.residual_bandwidth();
-        let band = match &answer {
-            // Beyond a fifth of the rate the definition's filter has no meaning.
-            Ok(a) if a.bandwidth_hz > 0.0 => a.bandwidth_hz.min(0.2 * case.machine.rate),
-            _ => own,
-        };
-        Self {
-            id: case.spec.id,
-            category: case.spec.category,
-            hidden: case.spec.hidden.clone(),
-            strength: case.spec.strength,
-            achieved: case.alone.clone(),
-            machine: case.machine.name,
-            rate: case.machine.rate,
-            answer,
-            oracle: case.held_out(band).noise.powi(2),
-            opinions,
-            oracle_rivals: case.held_out(own).noise.powi(2),
-            seconds,
-            truths: case.truths.clone(),
-            true_gain: case.plant.gain,
-            nominal_gain: case.nominal.gain,
-        }
-    }
-
-    fn effects(&self) -> &[Named] {
+    pub(crate) fn effects(&self) -> &[Named] {
         self.answer.as_ref().map_or(&[], |a| &a.effects)
     }
 
-    fn is_true(&self, named: &Named) -> bool {
-        self.holds_truth(&named.name, &named.class)
+    pub(crate) fn verdict(&self) -> &str {
+        self.answer.as_ref().map_or("failed", |a| a.verdict.as_str())
     }
 
-    fn holds_truth(&self, name: &str, class: &[String]) -> bool {
-        self.category != Category::Outside
-            && class.len() <= WIDEST_CLASS
-            && (self.hidden.iter().any(|h| *h == name || class.iter().any(|c| c == h)))
+    /// Whether it says that physics is missing, by name or by verdict.
+    pub(crate) fn names_physics(&self) -> bool {
+        !self.effects().is_empty() || self.verdict() == "missing_physics"
+    }
+
+    /// Whether the name or its class is among what is hidden.
+    pub(crate) fn is_true(&self, named: &Named) -> bool {
+        self.key.effects.iter().any(|hidden| named.holds(hidden))
     }
 
     /// What came through the tool's search with its evidence, and whether it was right.
     pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Weighed, bool)> {
         let all = self.answer.as_ref().map_or(&[][..], |a| &a.weighed);
-        all.iter().map(|w| (w, self.holds_truth(&w.name, &w.class)))
-    }
-
-    fn found(&self, hidden: &str) -> bool {
-        self.effects().iter().any(|e| {
-            e.class.len() <= WIDEST_CLASS && (e.name == hidden || e.class.iter().any(|c| c == hidden))
+        all.iter().map(|w| {
+            let named = Named { name: w.name.clone(), class: w.class.clone(), ..Named::default() };
+            (w, self.is_true(&named))
         })
     }
 
-    fn all_found(&self) -> bool {
-        self.hidden.iter().all(|h| self.found(h))
+    /// The first name itself is hidden.
+    pub(crate) fn exact(&self) -> bool {
+        self.effects().first().is_some_and(|e| self.key.effects.contains(&e.name))
     }
 
-    fn none_false(&self) -> bool {
+    /// The first name or its class is hidden.
+    pub(crate) fn classy(&self) -> bool {
+        self.effects().first().is_some_and(|e| self.is_true(e))
+    }
+
+    pub(crate) fn none_false(&self) -> bool {
         self.effects().iter().all(|e| self.is_true(e))
+    }
+
+    /// How many of the hidden effects are found, by name or class; never more than there are names.
+    pub(crate) fn found(&self) -> usize {
+        let found = self.key.effects.iter().filter(|h| self.effects().iter().any(|e| e.holds(h))).count();
+        found.min(self.effects().len())
+    }
+
+    /// Names nothing, and says that something is there which it does not know, or which does not repeat.
+    pub(crate) fn abstains(&self) -> bool {
+        let weak = self.key.random && self.key.strength <= WEAK;
+        let told = match self.verdict() {
+            "unexplained" | "random_disturbance" => true,
+            "no_mismatch" | "parameters_only" => weak,
+            _ => false,
+        };
+        told && self.effects().is_empty()
     }
 
     /// What the case's category calls right.
     pub(crate) fn right(&self) -> bool {
-        let Ok(answer) = &self.answer else { return false };
-        match self.category {
-            Category::Single => self.all_found(),
-            Category::Pair => self.all_found() && self.none_false(),
-            Category::Null | Category::Disturbance | Category::ParametersOnly | Category::Outside => {
-                answer.effects.is_empty()
+        if self.answer.is_err() {
+            return false;
+        }
+        match self.key.category {
+            Category::Single => self.classy(),
+            Category::Pair => self.none_false() && self.found() == 2,
+            Category::Triple => self.none_false() && self.found() >= 2,
+            Category::Null | Category::Disturbance | Category::ParametersOnly => !self.names_physics(),
+            Category::Outside => self.abstains(),
+            Category::CannotTell if self.effects().is_empty() => {
+                matches!(self.verdict(), "insufficient_excitation" | "no_mismatch" | "parameters_only")
             }
-            Category::CannotTell => {
-                let told = answer.effects.iter().any(|e| self.is_true(e));
-                if answer.effects.is_empty() { answer.verdict == "insufficient_excitation" } else { told }
-            }
+            Category::CannotTell => self.classy() && self.none_false(),
         }
     }
 
@@ -123,6 +107,7 @@ impl Record {
     pub(crate) fn answer_text(&self) -> String {
         match &self.answer {
             Err(e) => format!("failed: {e}"),
+            Ok(a) if a.effects.is_empty() && a.refused => format!("{}, refused", a.verdict),
             Ok(a) if a.effects.is_empty() => a.verdict.clone(),
             Ok(a) => {
                 let names = a.effects.iter().map(|e| {
@@ -140,248 +125,84 @@ impl Record {
         }
     }
 
-    /// Share of what an oracle gets on the held-out recording; `None` where there is nothing to get.
-    pub(crate) fn share(&self) -> Option<f64> {
+    /// The held-out improvement as a share of an oracle's, in mean squares; `None` where there is nothing to improve.
+    pub(crate) fn gain(&self) -> Option<Gain> {
+        if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
+            return None;
+        }
+        let oracle = self.key.oracle.as_ref()?;
+        let (floor, refit) = (oracle.floor.powi(2), oracle.refit.powi(2));
+        let room = refit - floor;
+        if room < EXPLAINABLE * floor || room <= 0.0 {
+            return None;
+        }
         // A tool that fails improves nothing.
-        let Ok(answer) = &self.answer else { return Some(0.0) };
-        share_of_oracle(answer.refit_holdout.powi(2), answer.patched_holdout.powi(2), self.oracle)
+        let Some(left) = self.left.filter(|_| self.answer.is_ok()) else { return Some(Gain::default()) };
+        let gain = left.refit.powi(2) - left.patched.powi(2);
+        Some(Gain { of_oracle: gain / room, of_own: gain / (left.refit.powi(2) - floor).max(0.5 * room) })
     }
 
     /// Whether each 95 % interval of a parameter with a known truth holds it. Where the unit has force in it the truth is
     /// taken in the scale of the gain that the tool believes: motor data cannot tell the gain.
-    fn coverage(&self) -> Vec<(String, bool)> {
+    pub(crate) fn coverage(&self) -> Vec<(String, bool)> {
         let Ok(answer) = &self.answer else { return Vec::new() };
         let gain = answer.gain.unwrap_or(self.nominal_gain);
         let mut out = Vec::new();
-        for (name, list) in &self.truths {
-            let Some(named) = answer.effects.iter().find(|e| e.name == *name) else { continue };
-            for truth in list {
-                let Some((_, _, Some([low, high]))) = named.parameters.iter().find(|p| p.0 == truth.name)
-                else {
-                    continue;
-                };
-                let value = if truth.force { truth.value * gain / self.true_gain } else { truth.value };
-                out.push((format!("{name}.{}", truth.name), *low <= value && value <= *high));
-            }
+        for truth in &self.key.parameters {
+            let Some(named) = answer.effects.iter().find(|e| e.name == truth.effect) else { continue };
+            let Some((_, _, Some([low, high]))) = named.parameters.iter().find(|p| p.0 == truth.name) else {
+                continue;
+            };
+            let scale = match (truth.force, self.key.true_gain) {
+                (true, Some(true_gain)) => gain / true_gain,
+                _ => 1.0,
+            };
+            let value = truth.value * scale;
+            out.push((format!("{}.{}", truth.effect, truth.name), *low <= value && value <= *high));
         }
         out
     }
 }
 
-/// Least part of what a refit leaves that must be left to explain for shares of it to mean anything.
-const EXPLAINABLE: f64 = 0.05;
-
-/// Share of the way from what a refit leaves to what an oracle leaves, all of them mean squares on the held-out recording:
-/// the oracle has the true model and leaves the noise.
-fn share_of_oracle(refit: f64, patched: f64, oracle: f64) -> Option<f64> {
-    let all = refit - oracle;
-    let gain = refit - patched;
-    (gain.is_finite() && all > EXPLAINABLE * refit).then(|| (gain / all).clamp(-2.0, 2.0))
-}
-
-/// What one rival reached.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct RivalSums {
-    pub(crate) name: &'static str,
-    /// By strength, as [`STRENGTHS`].
-    pub(crate) right: [Rate; 3],
-    pub(crate) null_alarms: Rate,
-    pub(crate) parameters_called_physics: Rate,
-    pub(crate) false_names: Rate,
-    pub(crate) outside_abstains: Rate,
-    pub(crate) shares: Vec<f64>,
-    pub(crate) names_something: bool,
-}
-
-/// Everything that the report prints.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Sums {
-    pub(crate) right: [Rate; 3],
-    pub(crate) exact: [Rate; 3],
-    pub(crate) by_effect: BTreeMap<&'static str, [Rate; 3]>,
-    pub(crate) null_alarms: Rate,
-    pub(crate) null_verdicts: Rate,
-    pub(crate) disturbance_alarms: Rate,
-    pub(crate) disturbance_verdicts: Rate,
-    pub(crate) parameters_called_physics: Rate,
-    pub(crate) false_names: Rate,
-    pub(crate) outside_abstains: Rate,
-    pub(crate) outside_confident: Rate,
-    pub(crate) by_outside: BTreeMap<&'static str, Rate>,
-    pub(crate) pairs: Rate,
-    pub(crate) pairs_first: Rate,
-    pub(crate) cannot_tell: Rate,
-    pub(crate) cannot_tell_wrong: Rate,
-    /// Of singles and pairs, all of them; and of those answered right.
-    pub(crate) shares: Vec<f64>,
-    pub(crate) shares_right: Vec<f64>,
-    pub(crate) coverage: Rate,
-    pub(crate) by_parameter: BTreeMap<String, Rate>,
-    /// Confidence from, to, and how many of the names were right.
-    pub(crate) confidence: Vec<(f64, f64, Rate)>,
-    /// (what was hidden, what was answered first) → how often; strengths 10 and 3 only.
-    pub(crate) confusion: BTreeMap<(String, String), usize>,
-    pub(crate) failures: usize,
-    pub(crate) seconds: Vec<f64>,
-    pub(crate) rivals: Vec<RivalSums>,
-}
-
-/// Sums over all records.
-pub(crate) fn sum(records: &[Record]) -> Sums {
-    let mut s = Sums {
-        confidence: [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 1.01)]
-            .map(|(a, b)| (a, b, Rate::default()))
-            .to_vec(),
-        ..Sums::default()
-    };
-    for r in records {
-        s.failures += usize::from(r.answer.is_err());
-        s.seconds.push(r.seconds);
-        let verdict = r.answer.as_ref().map_or("failed", |a| a.verdict.as_str());
-        let silent = r.effects().is_empty();
-        for e in r.effects() {
-            let right = r.is_true(e);
-            s.false_names.add(!right);
-            if let Some(bin) = s.confidence.iter_mut().find(|b| b.0 <= e.confidence && e.confidence < b.1) {
-                bin.2.add(right);
-            }
-        }
-        match r.category {
-            Category::Single => {
-                if let Some(level) = STRENGTHS.iter().position(|x| *x == r.strength) {
-                    s.right[level].add(r.right());
-                    s.exact[level].add(r.right() && r.none_false());
-                    s.by_effect.entry(r.hidden[0]).or_default()[level].add(r.right());
-                }
-            }
-            Category::Pair => {
-                s.pairs.add(r.right());
-                s.pairs_first.add(r.hidden.iter().any(|h| r.found(h)));
-            }
-            Category::Null => {
-                s.null_alarms.add(!silent);
-                s.null_verdicts.add(verdict == "no_mismatch");
-            }
-            Category::Disturbance => {
-                s.disturbance_alarms.add(!silent);
-                s.disturbance_verdicts.add(verdict == "random_disturbance");
-            }
-            Category::ParametersOnly => s.parameters_called_physics.add(!silent),
-            Category::Outside => {
-                s.outside_abstains.add(silent && r.answer.is_ok());
-                s.outside_confident.add(r.effects().iter().any(|e| e.confidence >= CONFIDENT));
-                s.by_outside.entry(r.hidden[0]).or_default().add(silent && r.answer.is_ok());
-            }
-            Category::CannotTell => {
-                s.cannot_tell.add(r.right());
-                s.cannot_tell_wrong.add(!r.none_false());
-            }
-        }
-        if matches!(r.category, Category::Single | Category::Pair) {
-            if let Some(share) = r.share() {
-                s.shares.push(share);
-                if r.right() {
-                    s.shares_right.push(share);
-                }
-            }
-            for (name, inside) in r.coverage() {
-                s.coverage.add(inside);
-                s.by_parameter.entry(parameter_family(&name)).or_default().add(inside);
-            }
-        }
-        if r.strength != 1.0 && !(r.category == Category::Single && r.right()) {
-            let hidden =
-                if r.hidden.is_empty() { r.category.word().to_string() } else { r.hidden.join(" + ") };
-            let first = r.effects().first().map_or(verdict.to_string(), |e| e.name.clone());
-            *s.confusion.entry((hidden, first)).or_default() += 1;
-        } else if r.category == Category::Single {
-            *s.confusion.entry((r.hidden[0].to_string(), r.hidden[0].to_string())).or_default() +=
-                usize::from(r.strength != 1.0);
-        }
-    }
-    s.confusion.retain(|_, n| *n > 0);
-    s.rivals =
-        crate::rivals::RIVALS.iter().enumerate().map(|(i, name)| sum_rival(records, i, name)).collect();
-    s
-}
-
-/// `cogging.order_12` and its like are one family.
-fn parameter_family(name: &str) -> String {
-    match name.find(".order_") {
-        Some(at) => format!("{}.order_N", &name[..at]),
-        None => name.to_string(),
-    }
-}
-
-fn sum_rival(records: &[Record], i: usize, name: &'static str) -> RivalSums {
-    let mut s = RivalSums { name, names_something: i == 1 || i == 2, ..RivalSums::default() };
-    for r in records {
-        let Some(o) = r.opinions.get(i) else { continue };
-        let silent = o.names.is_empty();
-        for n in &o.names {
-            s.false_names.add(r.category == Category::Outside || !r.hidden.contains(n));
-        }
-        match r.category {
-            Category::Single => {
-                if let Some(level) = STRENGTHS.iter().position(|x| *x == r.strength) {
-                    s.right[level].add(o.names.contains(&r.hidden[0]));
-                }
-            }
-            Category::Null => s.null_alarms.add(!silent),
-            Category::ParametersOnly => s.parameters_called_physics.add(!silent),
-            Category::Outside => s.outside_abstains.add(silent),
-            _ => {}
-        }
-        if matches!(r.category, Category::Single | Category::Pair) {
-            s.shares.extend(share_of_oracle(o.refit_mean_square, o.mean_square, r.oracle_rivals));
-        }
-    }
-    s
-}
-
-/// Median and tenth percentile as text.
-pub(crate) fn share_text(shares: &[f64]) -> String {
-    match (quantile(shares, 0.5), quantile(shares, 0.1)) {
-        (Some(median), Some(tenth)) => {
-            format!(
-                "median {:.0} %, tenth percentile {:.0} % ({})",
-                100.0 * median,
-                100.0 * tenth,
-                shares.len()
-            )
-        }
-        _ => "no case".into(),
-    }
+/// A held-out improvement.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Gain {
+    /// Over what the oracle gains, whatever noise the tool's own estimator adds.
+    pub(crate) of_oracle: f64,
+    /// Over what the tool's own refit leaves above the noise: what is left counts against it.
+    pub(crate) of_own: f64,
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::key::{Oracle, Parameter};
 
-    pub(crate) fn record(
-        category: Category,
-        hidden: &[&'static str],
-        strength: f64,
-        answer: Answer,
-    ) -> Record {
-        Record {
-            id: 1,
-            category,
-            hidden: hidden.to_vec(),
+    pub(crate) fn key(category: Category, effects: &[&str], strength: f64) -> Key {
+        Key {
+            effects: effects.iter().map(|e| (*e).into()).collect(),
             strength,
-            achieved: vec![strength],
-            machine: "bench",
-            rate: 1000.0,
+            unknown: (category == Category::Outside).then(|| "wells".into()),
+            oracle: Some(Oracle { floor: 1.0, refit: 2.0, filters_hz: [50.0, 50.0], ..Oracle::default() }),
+            parameters: vec![Parameter {
+                effect: "stribeck_friction".into(),
+                name: "peak".into(),
+                value: 1.0,
+                force: true,
+            }],
+            true_gain: Some(1.0),
+            ..Key::of(category)
+        }
+    }
+
+    pub(crate) fn record(key: Key, answer: Answer) -> Record {
+        Record {
+            id: "1".into(),
+            key,
             answer: Ok(answer),
-            oracle: 1.0,
+            left: Some(Left { refit: 2.0, patched: 1.0 }),
             opinions: Vec::new(),
-            oracle_rivals: 1.0,
             seconds: 1.0,
-            truths: vec![(
-                "stribeck_friction",
-                vec![Parameter { name: "peak".into(), value: 1.0, force: true }],
-            )],
-            true_gain: 1.0,
             nominal_gain: 2.0,
         }
     }
@@ -398,72 +219,84 @@ pub(crate) mod tests {
                     parameters: vec![("peak".into(), 2.0, Some([1.9, 2.1]))],
                 })
                 .collect(),
-            weighed: Vec::new(),
-            refit_holdout: 2.0,
-            patched_holdout: 1.0,
-            bandwidth_hz: 100.0,
-            gain: None,
+            ..Answer::default()
         }
     }
 
+    fn right(category: Category, hidden: &[&str], names: &[(&str, f64)], verdict: &str) -> bool {
+        let mut answer = says(names);
+        if !verdict.is_empty() {
+            answer.verdict = verdict.into();
+        }
+        record(key(category, hidden, 10.0), answer).right()
+    }
+
+    const S: &str = "stribeck_friction";
+    const C: &str = "cogging";
+    const B: &str = "backlash";
+
     #[test]
     fn names_are_judged_by_category() {
-        let s = "stribeck_friction";
-        let c = "cogging";
-        assert!(record(Category::Single, &[s], 10.0, says(&[(s, 0.9)])).right());
-        assert!(!record(Category::Single, &[s], 10.0, says(&[(c, 0.9)])).right());
-        assert!(!record(Category::Single, &[s], 10.0, says(&[])).right());
-        assert!(!record(Category::Pair, &[s, c], 10.0, says(&[(s, 0.9)])).right());
-        assert!(record(Category::Pair, &[s, c], 10.0, says(&[(c, 0.9), (s, 0.9)])).right());
-        assert!(
-            !record(Category::Pair, &[s, c], 10.0, says(&[(c, 0.9), (s, 0.9), ("backlash", 0.5)])).right()
-        );
-        assert!(record(Category::Null, &[], 0.0, says(&[])).right());
-        assert!(!record(Category::Outside, &["hum"], 10.0, says(&[(c, 0.3)])).right());
-        // Silence without the reason is no answer where the data cannot tell.
-        assert!(!record(Category::CannotTell, &[s], 5.0, says(&[])).right());
-        let mut answer = says(&[]);
-        answer.verdict = "insufficient_excitation".into();
-        assert!(record(Category::CannotTell, &[s], 5.0, answer).right());
+        assert!(right(Category::Single, &[S], &[(S, 0.9)], ""));
+        assert!(!right(Category::Single, &[S], &[(C, 0.9), (S, 0.9)], ""), "the first name counts");
+        assert!(!right(Category::Single, &[S], &[], ""));
+        assert!(!right(Category::Pair, &[S, C], &[(S, 0.9)], ""));
+        assert!(right(Category::Pair, &[S, C], &[(C, 0.9), (S, 0.9)], ""));
+        assert!(!right(Category::Pair, &[S, C], &[(C, 0.9), (S, 0.9), (B, 0.5)], ""));
+        assert!(right(Category::Triple, &[S, C, "command_delay"], &[(C, 0.9), (S, 0.9)], ""));
+        assert!(!right(Category::Triple, &[S, C, "command_delay"], &[(C, 0.9)], ""));
+        assert!(!right(Category::Triple, &[S, C, "command_delay"], &[(C, 0.9), (S, 0.9), (B, 0.9)], ""));
+        assert!(right(Category::Null, &[], &[], ""));
+        assert!(!right(Category::Null, &[], &[], "missing_physics"), "the verdict names physics too");
+        assert!(!right(Category::Outside, &[], &[(C, 0.3)], ""));
+        assert!(!right(Category::Outside, &[], &[], ""), "silence is no abstention");
+        assert!(right(Category::Outside, &[], &[], "unexplained"));
+        assert!(right(Category::CannotTell, &[S], &[], "insufficient_excitation"));
+        assert!(!right(Category::CannotTell, &[S], &[(C, 0.5)], ""));
     }
 
     #[test]
-    fn a_class_counts_up_to_three_names() {
+    fn weak_bursts_may_be_noise_and_nothing_else_may() {
+        let mut weak = key(Category::Outside, &[], 1.0);
+        assert!(!record(weak.clone(), says(&[])).right());
+        weak.random = true;
+        assert!(record(weak.clone(), says(&[])).right());
+        weak.strength = 3.0;
+        assert!(!record(weak, says(&[])).right());
+    }
+
+    #[test]
+    fn a_class_counts_up_to_three_names_and_one_name_finds_one_effect() {
         let mut answer = says(&[("quadratic_drag", 0.9)]);
-        answer.effects[0].class =
-            ["quadratic_drag", "stribeck_friction", "cogging"].map(String::from).to_vec();
-        let r = record(Category::Single, &["stribeck_friction"], 3.0, answer.clone());
-        assert!(r.right());
-        answer.effects[0].class.push("backlash".into());
-        assert!(!record(Category::Single, &["stribeck_friction"], 3.0, answer).right());
+        answer.effects[0].class = ["quadratic_drag", S, C].map(String::from).to_vec();
+        let r = record(key(Category::Single, &[S], 3.0), answer.clone());
+        assert!(r.right() && !r.exact());
+        assert!(!record(key(Category::Pair, &[S, C], 3.0), answer.clone()).right());
+        answer.effects[0].class.push(B.into());
+        assert!(!record(key(Category::Single, &[S], 3.0), answer.clone()).right());
+        // The name itself still counts.
+        assert!(record(key(Category::Single, &["quadratic_drag"], 3.0), answer).right());
     }
 
     #[test]
-    fn sums_count_alarms_false_names_shares_and_coverage() {
-        let s = "stribeck_friction";
-        let records = [
-            record(Category::Single, &[s], 10.0, says(&[(s, 0.97), ("cogging", 0.6)])),
-            record(Category::Single, &[s], 1.0, says(&[])),
-            record(Category::Null, &[], 0.0, says(&[("cogging", 0.97)])),
-            record(Category::Null, &[], 0.0, says(&[])),
-            record(Category::Outside, &["hum"], 10.0, says(&[("cogging", 0.7)])),
-        ];
-        let sums = sum(&records);
-        assert_eq!(
-            (sums.right[0], sums.right[2]),
-            (Rate { hits: 1, trials: 1 }, Rate { hits: 0, trials: 1 })
-        );
-        assert_eq!(sums.exact[0].hits, 0);
-        assert_eq!(sums.null_alarms, Rate { hits: 1, trials: 2 });
-        assert_eq!(sums.false_names, Rate { hits: 3, trials: 4 });
-        assert_eq!(sums.outside_confident, Rate { hits: 0, trials: 1 });
+    fn a_gain_is_measured_against_the_oracles() {
+        let mut r = record(key(Category::Single, &[S], 3.0), says(&[(S, 0.9)]));
         // From 2² to 1², which is what the oracle leaves.
-        assert_eq!(records[0].share(), Some(1.0));
-        assert_eq!(share_of_oracle(4.0, 2.5, 1.0), Some(0.5));
-        assert_eq!(share_of_oracle(4.0, 3.9, 3.9), None, "nothing to get");
+        assert_eq!(r.gain(), Some(Gain { of_oracle: 1.0, of_own: 1.0 }));
+        // The tool's own noise counts against it in one of the two figures.
+        r.left = Some(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
+        let gain = r.gain().unwrap();
+        assert!((gain.of_oracle - 1.0).abs() < 1e-9 && (gain.of_own - 1.0 / 3.0).abs() < 1e-9, "{gain:?}");
+        r.answer = Err("broken".into());
+        assert_eq!(r.gain(), Some(Gain::default()), "a tool that fails improves nothing");
+        r.key.oracle.as_mut().unwrap().refit = 1.05;
+        assert_eq!(r.gain(), None, "nothing to get");
+    }
+
+    #[test]
+    fn an_interval_holds_the_truth_in_the_scale_of_the_gain() {
         // Truth 1 with the true gain is 2 in the scale of the gain that the tool believes.
-        assert_eq!(sums.coverage, Rate { hits: 1, trials: 1 });
-        assert_eq!(sums.confidence[4].2, Rate { hits: 1, trials: 2 });
-        assert_eq!(sums.confusion[&("null".to_string(), "cogging".to_string())], 1);
+        let r = record(key(Category::Single, &[S], 3.0), says(&[(S, 0.9)]));
+        assert_eq!(r.coverage(), [("stribeck_friction.peak".to_string(), true)]);
     }
 }

@@ -3,27 +3,40 @@
 //! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
 //! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
 
+mod belief;
 mod bench;
+mod brought;
 mod calibrate;
 mod cases;
+mod folder;
 mod generator;
 mod judge;
+mod key;
+mod machines;
 mod options;
 mod pool;
 mod report;
+mod reported;
 mod rivals;
 mod rng;
+mod scratch;
 mod signal;
 mod stats;
+mod sums;
 mod tool;
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 pub use options::{HELP, Options};
 
 use cases::Amounts;
 use generator::case::{Spec, build};
 use generator::files;
+use tool::Tool;
+
+/// The longest that another program may take over a case.
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Does what the options ask for.
 ///
@@ -34,47 +47,104 @@ pub fn run(options: &Options) -> Result<(), String> {
         print!("{}", calibrate::calibrate(&options.calibrate)?);
         return Ok(());
     }
+    let tool: Box<dyn Tool> = match &options.tool {
+        Some(line) => Box::new(tool::Program { line: line.clone(), patience: PATIENCE }),
+        None if options.reports.is_some() => Box::new(tool::Finished),
+        None => Box::new(tool::Diagnosis),
+    };
+    if !options.cases_from.is_empty() {
+        return options.cases_from.iter().try_for_each(|top| judge_folder(options, top, &*tool));
+    }
     let specs = wanted(options);
     if let Some(dir) = &options.write {
         return write_all(options, &specs, dir);
     }
-    prove(options, &specs, &tool::Diagnosis)
+    prove(options, &specs, &*tool)
 }
 
-fn prove(options: &Options, specs: &[Spec], tool: &dyn tool::Tool) -> Result<(), String> {
-    let start = std::time::Instant::now();
+/// What the reports call the tool.
+fn tool_name(options: &Options) -> String {
+    match (&options.tool, &options.reports) {
+        (Some(line), _) => line.clone(),
+        (None, Some(reports)) => format!("the reports in {}", reports.display()),
+        (None, None) => "host-sim diagnose".into(),
+    }
+}
+
+fn judge_folder(options: &Options, top: &Path, tool: &dyn Tool) -> Result<(), String> {
+    let start = Instant::now();
+    let judged = brought::run(options, top, tool)?;
+    let run = report::Run {
+        options: options.clone(),
+        tool: tool_name(options),
+        source: top.display().to_string(),
+        seconds: start.elapsed().as_secs_f64(),
+        speed: None,
+        planned: judged.planned,
+        unbuilt: 0,
+    };
+    let name = top.canonicalize().ok().and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
+    let name = format!("proof-{}", name.unwrap_or_else(|| "cases".into()));
+    let (text, markdown, value) = if judged.machines.is_empty() {
+        let sums = sums::sum(&judged.records);
+        (
+            report::terminal(&judged.records, &sums, &run),
+            report::markdown(&judged.records, &sums, &run),
+            report::json(&judged.records, &sums, &run),
+        )
+    } else {
+        let sums = machines::sum(&judged.machines);
+        (
+            report::machines_terminal(&judged.machines, &sums, &run),
+            report::machines_markdown(&judged.machines, &sums, &run),
+            report::machines_json(&judged.machines, &sums, &run),
+        )
+    };
+    print!("{text}");
+    write_out(options, &format!("{name}.json"), &pretty(&value)?)?;
+    write_out(options, &format!("{name}.md"), &markdown)
+}
+
+fn pretty(value: &serde_json::Value) -> Result<String, String> {
+    Ok(serde_json::to_string_pretty(value).map_err(|e| e.to_string())? + "\n")
+}
+
+fn write_out(options: &Options, name: &str, text: &str) -> Result<(), String> {
+    std::fs::create_dir_all(&options.out)
+        .map_err(|e| format!("cannot create {}: {e}", options.out.display()))?;
+    let path = options.out.join(name);
+    std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))
+}
+
+fn prove(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<(), String> {
+    let start = Instant::now();
     let (records, unbuilt) = bench::run_cases(options, specs, tool)?;
     let speed = if options.quick || options.only.as_deref().is_some_and(|only| only != options::SPEED) {
         None
     } else {
         bench::measure_speed(options.seed, tool).ok()
     };
+    let size = if options.quick { "quick run".into() } else { format!("{} draws a cell", options.cases) };
     let run = report::Run {
         options: options.clone(),
-        tool: "host-sim diagnose".into(),
+        tool: tool_name(options),
+        source: format!("the project's own generator, seed {}, {size}", options.seed),
         seconds: start.elapsed().as_secs_f64(),
         speed,
         planned: specs.len(),
         unbuilt,
     };
-    let sums = judge::sum(&records);
+    let sums = sums::sum(&records);
     print!("{}", report::terminal(&records, &sums, &run));
-    std::fs::create_dir_all(&options.out)
-        .map_err(|e| format!("cannot create {}: {e}", options.out.display()))?;
-    let write = |name: &str, text: String| {
-        let path = options.out.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))
-    };
-    let value = report::json(&records, &sums, &run);
-    write("proof.json", serde_json::to_string_pretty(&value).map_err(|e| e.to_string())? + "\n")?;
-    write("proof.md", report::markdown(&records, &sums, &run))?;
-    write("proof-aggregate.md", report::aggregate(&records, &sums, &run))?;
+    write_out(options, "proof.json", &pretty(&report::json(&records, &sums, &run))?)?;
+    write_out(options, "proof.md", &report::markdown(&records, &sums, &run))?;
+    write_out(options, "proof-aggregate.md", &report::aggregate(&records, &sums, &run))?;
     if options.quick && options.only.is_none() { gate(&sums) } else { Ok(()) }
 }
 
 /// What the small run holds the tool to, so that it can fail in CI: far below what is wanted, above what luck gives.
-fn gate(sums: &judge::Sums) -> Result<(), String> {
-    let right = sums.right[0];
+fn gate(sums: &sums::Sums) -> Result<(), String> {
+    let right = sums.strong;
     if sums.failures > 0 {
         return Err(format!(
             "the tool gave no report in {} cases; the table above lists them",
@@ -100,44 +170,44 @@ fn wanted(options: &Options) -> Vec<Spec> {
     let amounts = if options.quick { Amounts::quick() } else { Amounts::full(options.cases) };
     let mut specs = cases::list(amounts, options.seed);
     if let Some(text) = &options.only {
-        specs.retain(|s| {
-            s.category.word().contains(text) || s.hidden.iter().any(|h| h.contains(text.as_str()))
-        });
+        specs.retain(|s| s.category.matches(text) || s.hidden.iter().any(|h| h.contains(text.as_str())));
     }
     specs
 }
 
 fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String> {
-    let keys = dir.join("keys");
     let failed = |what: &Path, e: std::io::Error| {
         format!("cannot write {}: {e}; choose another --write folder", what.display())
     };
-    std::fs::create_dir_all(&keys).map_err(|e| failed(&keys, e))?;
+    let cases = dir.join("cases");
+    std::fs::create_dir_all(&cases).map_err(|e| failed(&cases, e))?;
     let written = pool::map(options.jobs, None, "writing cases", specs, |spec| {
-        let Some(case) = build(spec, options.seed, options.quick) else { return Ok(0) };
-        let name = format!("case-{:04}", spec.id);
-        let folder = dir.join("cases").join(&name);
+        let Some(case) = build(spec, options.seed, options.quick) else { return Ok(None) };
+        let folder = cases.join(spec.name());
         files::write_case(&case, &folder).map_err(|e| failed(&folder, e))?;
-        let key = keys.join(format!("{name}.json"));
-        let text = serde_json::to_string_pretty(&files::key(&case)).map_err(|e| e.to_string())?;
-        std::fs::write(&key, text + "\n").map_err(|e| failed(&key, e)).map(|()| 1)
+        Ok(Some((spec.name(), files::key(&case).to_json())))
     });
-    let written: usize = written.into_iter().flatten().sum::<Result<usize, String>>()?;
-    println!("{} cases in {}, their keys in {}", written, dir.join("cases").display(), keys.display());
+    let written: Vec<_> = written.into_iter().flatten().collect::<Result<_, String>>()?;
+    let keys: serde_json::Map<String, serde_json::Value> = written.into_iter().flatten().collect();
+    let count = keys.len();
+    let key = dir.join("key.json");
+    std::fs::write(&key, pretty(&serde_json::json!({ "format": 1, "seed": options.seed, "cases": keys }))?)
+        .map_err(|e| failed(&key, e))?;
+    println!("{count} cases in {}, their key in {}", cases.display(), key.display());
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use judge::Sums;
     use stats::Rate;
+    use sums::Sums;
 
     #[test]
     fn the_small_run_can_fail() {
-        let good = Sums { right: [Rate { hits: 20, trials: 25 }; 3], ..Sums::default() };
+        let good = Sums { strong: Rate { hits: 20, trials: 25 }, ..Sums::default() };
         assert_eq!(gate(&good), Ok(()));
-        let poor = Sums { right: [Rate { hits: 17, trials: 25 }; 3], ..Sums::default() };
+        let poor = Sums { strong: Rate { hits: 17, trials: 25 }, ..Sums::default() };
         assert!(gate(&poor).unwrap_err().contains("17 of 25"));
         let alarm = Sums { null_alarms: Rate { hits: 1, trials: 4 }, ..good.clone() };
         assert!(gate(&alarm).unwrap_err().contains("1 nulls"));

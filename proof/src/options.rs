@@ -21,6 +21,14 @@ pub struct Options {
     pub only: Option<String>,
     /// Results of earlier runs: find the weights of the tool's confidence from them, and run nothing.
     pub calibrate: Vec<PathBuf>,
+    /// Folders of cases that somebody else made: judge these and draw none.
+    pub cases_from: Vec<PathBuf>,
+    /// Reports stay here, in a folder for every case.
+    pub keep: Option<PathBuf>,
+    /// Reports that are there already, in a folder for every case: judge these and run no tool.
+    pub reports: Option<PathBuf>,
+    /// Another tool, by its command line.
+    pub tool: Option<String>,
     /// Folder for `proof.json` and `proof.md`.
     pub out: PathBuf,
 }
@@ -36,6 +44,10 @@ impl Default for Options {
             write: None,
             only: None,
             calibrate: Vec::new(),
+            cases_from: Vec::new(),
+            keep: None,
+            reports: None,
+            tool: None,
             out: PathBuf::from("target"),
         }
     }
@@ -43,6 +55,22 @@ impl Default for Options {
 
 /// What `--only` takes for the measurement of the time and no case.
 pub(crate) const SPEED: &str = "speed";
+
+/// The flags that take a value.
+const FLAGS: [&str; 12] = [
+    "--seed",
+    "--cases",
+    "--jobs",
+    "--minutes",
+    "--only",
+    "--write",
+    "--calibrate",
+    "--cases-from",
+    "--keep",
+    "--reports",
+    "--tool",
+    "--out",
+];
 
 /// The flags, for `--help`.
 pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
@@ -52,10 +80,16 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
-  --only TEXT   only cases whose category or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
-  --write DIR   write the recordings to DIR/cases and the keys to DIR/keys, and run nothing
+  --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
+  --cases-from DIR  judge the cases of a folder with its key.json or believed.tsv and draw none; again for more folders.
+                    docs/benchmark.md tells the format
+  --keep DIR    leave the reports in DIR, in a folder for every case
+  --reports DIR judge the reports that --keep, or another program, left in DIR, and run no tool; with --cases-from
+  --tool 'PROGRAM --rig {rig} --fit {fit} --holdout {holdout} --out {out}'  judge another program; a file that there are
+                several of is repeated with the flag before it
+  --write DIR   write the recordings to DIR/cases and the key to DIR/key.json, and run nothing
   --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
-  --out DIR     folder for proof.json and proof.md (target)
+  --out DIR     folder for proof.json and proof.md, of a folder of cases proof-NAME.json and proof-NAME.md (target)
 ";
 
 impl Options {
@@ -79,9 +113,7 @@ impl Options {
                 options.quick = true;
                 continue;
             }
-            let known =
-                ["--seed", "--cases", "--jobs", "--minutes", "--only", "--write", "--calibrate", "--out"];
-            if !known.contains(&flag.as_str()) {
+            if !FLAGS.contains(&flag.as_str()) {
                 return Err(format!("`{flag}` is not a flag of prove; `prove --help` lists them"));
             }
             let value = list.next().ok_or_else(|| format!("{flag} needs a value after it"))?;
@@ -95,10 +127,29 @@ impl Options {
                 "--only" => options.only = Some(value),
                 "--calibrate" => options.calibrate = value.split(',').map(PathBuf::from).collect(),
                 "--write" => options.write = Some(PathBuf::from(value)),
+                "--cases-from" => options.cases_from.push(PathBuf::from(value)),
+                "--keep" => options.keep = Some(PathBuf::from(value)),
+                "--reports" => options.reports = Some(PathBuf::from(value)),
+                "--tool" => options.tool = Some(value),
                 _ => options.out = PathBuf::from(value),
             }
         }
+        options.check()?;
         Ok(Some(options))
+    }
+
+    /// Flags that do not go together.
+    fn check(&self) -> Result<(), String> {
+        if self.reports.is_some() && self.cases_from.len() != 1 {
+            return Err("--reports goes with one --cases-from: the reports are of its cases".into());
+        }
+        if self.reports.is_some() && (self.tool.is_some() || self.keep.is_some()) {
+            return Err("--reports runs no tool, so it goes neither with --tool nor with --keep".into());
+        }
+        if self.write.is_some() && !self.cases_from.is_empty() {
+            return Err("--write draws cases, so it does not go with --cases-from".into());
+        }
+        Ok(())
     }
 }
 
@@ -117,6 +168,11 @@ mod tests {
         assert_eq!(parse("--help"), Ok(None));
         assert!(parse("--sed 7").unwrap_err().contains("--sed"));
         assert!(parse("--seed x").unwrap_err().contains("`x`"));
+        let two = parse("--cases-from a --cases-from b").unwrap().unwrap();
+        assert_eq!(two.cases_from.len(), 2);
+        assert!(parse("--cases-from a --cases-from b --reports r").unwrap_err().contains("one --cases-from"));
+        assert!(parse("--reports r").unwrap_err().contains("one --cases-from"));
+        assert!(parse("--write w --cases-from a").unwrap_err().contains("--write"));
         assert!(parse("--seed").unwrap_err().contains("needs a value"));
     }
 }

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::cases::STRENGTHS;
-use crate::generator::case::Category;
-use crate::judge::{Record, Sums, share_text};
+use crate::judge::Record;
+use crate::machines::{Machine, MachineSums};
 use crate::options::Options;
-use crate::stats::{Rate, quantile, wilson};
+use crate::stats::{Rate, quantile};
+use crate::sums::{Reliability, Sums, share_text};
 use crate::tool::Weighed;
 
 /// How long the tool took for 60 s at 10 kHz of some hidden physics.
@@ -29,46 +29,28 @@ fn times_text(times: &[Timed]) -> String {
 pub(crate) struct Run {
     pub(crate) options: Options,
     pub(crate) tool: String,
+    /// Where the cases came from.
+    pub(crate) source: String,
     pub(crate) seconds: f64,
     /// Times for 60 s at 10 kHz, where they were measured.
     pub(crate) speed: Option<Vec<Timed>>,
     /// Cases that the run would have had with time for all.
     pub(crate) planned: usize,
-    /// Cases that no machine drawn could show at the strength asked for: not run.
+    /// Cases of which no recording could be made: not run.
     pub(crate) unbuilt: usize,
 }
 
 /// (measure, wanted, measured).
 fn rows(s: &Sums, run: &Run) -> Vec<[String; 3]> {
-    let row = |a: &str, b: &str, c: String| [a.to_string(), b.to_string(), c];
-    let mut list = Vec::new();
-    for (i, wanted) in ["≥ 97 %", "≥ 92 %", "≥ 65 %"].iter().enumerate() {
-        let label = format!("right name or class (≤ 3), at {} times the noise", STRENGTHS[i]);
-        list.push([label, (*wanted).into(), s.right[i].text()]);
+    let mut list: Vec<[String; 3]> =
+        s.lines.iter().map(|l| [l.measure.clone(), l.wanted.to_string(), l.figure.text()]).collect();
+    if let Some(times) = &run.speed {
+        list.push(["60 s at 10 kHz, two cores".into(), "≤ 10 s".into(), times_text(times)]);
     }
-    for (i, strength) in STRENGTHS.iter().enumerate() {
-        list.push([format!("… and no other name, at {strength} times"), "–".into(), s.exact[i].text()]);
+    if run.unbuilt > 0 {
+        let what = "cases whose recordings diverged whatever was drawn, not run";
+        list.push([what.into(), "0".into(), run.unbuilt.to_string()]);
     }
-    list.push(row("false alarms on nulls", "≤ 1 %, upper bound ≤ 2.5 %", s.null_alarms.text()));
-    list.push(row("… nulls answered `no_mismatch`", "–", s.null_verdicts.text()));
-    list.push(row("names under a pure disturbance", "–", s.disturbance_alarms.text()));
-    list.push(row("… answered `random_disturbance`", "–", s.disturbance_verdicts.text()));
-    list.push(row("wrong parameter called physics", "≤ 3 %", s.parameters_called_physics.text()));
-    list.push(row("false discoveries among all names", "≤ 5 %", s.false_names.text()));
-    list.push(row("outside the library: abstains", "≥ 90 %", s.outside_abstains.text()));
-    list.push(row("outside the library: confidently wrong (≥ 0.8)", "≤ 2 %", s.outside_confident.text()));
-    list.push(row("pairs: both found, none false", "≥ 80 %", s.pairs.text()));
-    list.push(row("pairs: at least one found", "–", s.pairs_first.text()));
-    list.push(row("cannot tell: class with the truth, or says so", "–", s.cannot_tell.text()));
-    list.push(row("cannot tell: a wrong name", "–", s.cannot_tell_wrong.text()));
-    let wanted = "median ≥ 95 %, tenth percentile ≥ 80 %";
-    list.push(row("held-out improvement, share of an oracle's, all", wanted, share_text(&s.shares)));
-    list.push(row("… where the name is right", "–", share_text(&s.shares_right)));
-    list.push(row("95 % intervals that hold the truth", "92–98 %", s.coverage.text()));
-    let time = run.speed.as_deref().map_or("not measured in this run".into(), times_text);
-    list.push(row("60 s at 10 kHz, two cores", "≤ 10 s", time));
-    list.push(row("cases in which the tool gave no report", "0", s.failures.to_string()));
-    list.push(row("cases that no machine drawn could show, not run", "–", run.unbuilt.to_string()));
     list
 }
 
@@ -81,41 +63,95 @@ fn table(out: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<Str
     out.push('\n');
 }
 
-/// The whole report as markdown.
-pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
-    let mut out = String::new();
-    let o = &run.options;
-    let cut = if records.len() + run.unbuilt < run.planned {
+fn count(r: &Rate) -> String {
+    if r.trials == 0 { "–".into() } else { format!("{}/{}", r.hits, r.trials) }
+}
+
+fn head(records: usize, run: &Run) -> String {
+    let cut = if records + run.unbuilt < run.planned {
         format!(" of {} planned, in an order that says nothing, stopped by --minutes", run.planned)
     } else {
         String::new()
     };
-    let size = if o.quick { "quick run".into() } else { format!("{} draws a cell", o.cases) };
-    let _ = writeln!(
-        out,
-        "Blinded benchmark of {}: {} cases{cut}, seed {}, {size}; {:.0} s. Rates with Wilson's 95 % interval.\n",
-        run.tool,
-        records.len(),
-        o.seed,
-        run.seconds
-    );
-    table(&mut out, &["measure", "wanted", "measured"], rows(s, run).into_iter().map(|r| r.to_vec()));
-    out.push_str("### By effect: right at 10 / 3 / 1 times the noise\n\n");
-    let count = |r: &Rate| if r.trials == 0 { "–".into() } else { format!("{}/{}", r.hits, r.trials) };
-    let line = |name: &str, r: &[Rate; 3]| {
-        std::iter::once(format!("`{name}`")).chain(r.iter().map(count)).collect::<Vec<_>>()
-    };
-    table(&mut out, &["effect", "10", "3", "1"], s.by_effect.iter().map(|(n, r)| line(n, r)));
-    if !s.by_outside.is_empty() {
-        out.push_str("### Outside the library: abstained\n\n");
-        table(
-            &mut out,
-            &["hidden", "abstained"],
-            s.by_outside.iter().map(|(n, r)| vec![format!("{n}"), count(r)]),
-        );
+    format!(
+        "{} on {}: {records} cases{cut}; {:.0} s. Rates with Wilson's 95 % interval.",
+        run.tool, run.source, run.seconds
+    )
+}
+
+/// A section of the report: its title, the names of its columns, its rows.
+struct Section {
+    title: &'static str,
+    columns: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
+/// What stands below the main table, wherever it is shown.
+fn sections(s: &Sums) -> Vec<Section> {
+    let mut list = vec![
+        Section {
+            title: "By effect: right at 10 / 3 / 1 times the noise",
+            columns: vec!["effect", "10", "3", "1"],
+            rows: s
+                .by_effect
+                .iter()
+                .map(|(name, r)| std::iter::once(name.clone()).chain(r.iter().map(count)).collect())
+                .collect(),
+        },
+        Section {
+            title: "Outside the library, by kind",
+            columns: vec!["hidden", "the tool has a detector", "abstained", "confidently wrong"],
+            rows: s
+                .by_unknown
+                .iter()
+                .map(|((detector, name), r)| {
+                    let has = if *detector { "yes, counted apart" } else { "no" };
+                    vec![name.clone(), has.into(), count(&r[0]), count(&r[1])]
+                })
+                .collect(),
+        },
+        Section {
+            title: "Pairs and triples",
+            columns: vec!["hidden", "right", "one found"],
+            rows: s.by_pair.iter().map(|(n, r)| vec![n.clone(), count(&r[0]), count(&r[1])]).collect(),
+        },
+        Section {
+            title: "By machine: single effects right",
+            columns: vec!["machine", "right"],
+            rows: s.by_rig.iter().map(|(n, r)| vec![n.clone(), r.text()]).collect(),
+        },
+        reliability(&s.reliability),
+        Section {
+            title: "Intervals that hold the truth, by parameter",
+            columns: vec!["parameter", "held"],
+            rows: s.by_parameter.iter().map(|(n, r)| vec![n.clone(), count(r)]).collect(),
+        },
+        rivals(s),
+    ];
+    list.retain(|section| !section.rows.is_empty());
+    list
+}
+
+fn reliability(r: &Reliability) -> Section {
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for (i, bin) in r.bins.iter().enumerate() {
+        let Some(mean) = bin.mean() else { continue };
+        let range = format!("{:.1}–{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
+        rows.push(vec![range, format!("{mean:.2}"), bin.right.text()]);
     }
-    out.push_str("### Rivals on the same cases\n\n");
-    let rivals = s.rivals.iter().map(|r| {
+    if let Some((error, brier)) = r.errors {
+        let text = format!("calibration error {error:.3}, Brier score {brier:.3}");
+        rows.push(vec!["all".into(), "–".into(), text]);
+    }
+    Section {
+        title: "Reliability: of the names given with a confidence, right",
+        columns: vec!["confidence", "mean", "right"],
+        rows,
+    }
+}
+
+fn rivals(s: &Sums) -> Section {
+    let rows = s.rivals.iter().map(|r| {
         let or = |text: String| if r.names_something { text } else { "names nothing".into() };
         vec![
             r.name.to_string(),
@@ -127,98 +163,84 @@ pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
             share_text(&r.shares),
         ]
     });
-    let this = vec![
-        "**this tool**".to_string(),
-        s.right.map(|x| count(&x)).join(" · "),
-        s.null_alarms.text(),
-        s.parameters_called_physics.text(),
-        s.false_names.text(),
-        s.outside_abstains.text(),
-        share_text(&s.shares),
-    ];
-    let head = [
-        "method",
-        "right at 10 · 3 · 1",
-        "null alarms",
-        "parameters called physics",
-        "false names",
-        "outside: abstains",
-        "held-out share of an oracle's",
-    ];
-    table(&mut out, &head, std::iter::once(this).chain(rivals));
-    out.push_str("### Confidence: of the names given with it, right\n\n");
-    let bins = s.confidence.iter().map(|(a, b, r)| vec![format!("{a:.2}–{:.2}", b.min(1.0)), r.text()]);
-    table(&mut out, &["confidence", "right"], bins);
-    if !s.by_parameter.is_empty() {
-        out.push_str("### Intervals that hold the truth, by parameter\n\n");
-        table(
-            &mut out,
-            &["parameter", "held"],
-            s.by_parameter.iter().map(|(n, r)| vec![format!("`{n}`"), count(r)]),
-        );
+    Section {
+        title: "Rivals on the same cases",
+        columns: vec![
+            "method",
+            "right at 10 · 3 · 1",
+            "nulls named",
+            "values called physics",
+            "false names",
+            "outside: abstains",
+            "held-out gain over the oracle's",
+        ],
+        rows: rows.collect(),
     }
-    out.push_str("### Confusion: hidden → first answer (singles at 10 and 3 times, and the rest)\n\n");
+}
+
+fn miss(r: &Record) -> Vec<String> {
+    vec![
+        r.id.clone(),
+        r.key.category.word().into(),
+        r.key.hidden(),
+        if r.key.strength > 0.0 { r.key.strength.to_string() } else { "–".into() },
+        r.key.snr.map_or("–".into(), |x| format!("{x:.1}")),
+        r.key.rig.clone(),
+        r.answer_text().replace('|', "/"),
+    ]
+}
+
+const MISS: [&str; 7] = ["case", "kind", "hidden", "strength", "reached", "machine", "answer (confidence)"];
+
+/// The whole report as markdown.
+pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
+    let mut out = head(records.len(), run) + "\n\n";
+    table(&mut out, &["measure", "wanted", "measured"], rows(s, run).into_iter().map(|r| r.to_vec()));
+    for section in sections(s) {
+        let _ = writeln!(out, "### {}\n", section.title);
+        table(&mut out, &section.columns, section.rows);
+    }
+    out.push_str("### Confusion: hidden → first answer (single effects at 10 and 3 times, and the rest)\n\n");
     table(
         &mut out,
         &["hidden", "first answer", "cases"],
         s.confusion.iter().map(|((a, b), n)| vec![a.clone(), b.clone(), n.to_string()]),
     );
-    let _ = writeln!(out, "### Every miss\n");
-    table(
-        &mut out,
-        &["case", "kind", "hidden", "strength", "machine", "answer (confidence)"],
-        records.iter().filter(|r| !r.right()).map(|r| {
-            vec![
-                r.id.to_string(),
-                r.category.word().into(),
-                if r.hidden.is_empty() { "nothing".into() } else { r.hidden.join(" + ") },
-                if r.strength > 0.0 { r.strength.to_string() } else { "–".into() },
-                format!("{}, {:.0} Hz", r.machine, r.rate),
-                r.answer_text().replace('|', "/"),
-            ]
-        }),
-    );
+    out.push_str("### Every miss\n\n");
+    table(&mut out, &MISS, records.iter().filter(|r| !r.right()).map(miss));
     out
 }
 
-/// What the terminal shows: the table, the confusion matrix, the misses.
+fn columns(out: &mut String, rows: &[Vec<String>]) {
+    let count = rows.first().map_or(0, Vec::len);
+    let width: Vec<usize> =
+        (0..count).map(|i| rows.iter().map(|r| r[i].chars().count()).max().unwrap_or(0)).collect();
+    for row in rows {
+        let line: Vec<String> = row
+            .iter()
+            .zip(&width)
+            .map(|(text, width)| {
+                let pad = width - text.chars().count();
+                format!("{text}{}", " ".repeat(pad))
+            })
+            .collect();
+        let _ = writeln!(out, "  {}", line.join("  ").trim_end());
+    }
+}
+
+/// What the terminal shows: the table, the sections, the confusion matrix, the misses.
 pub(crate) fn terminal(records: &[Record], s: &Sums, run: &Run) -> String {
-    let mut out = String::new();
-    let lines = rows(s, run);
-    let width = |i: usize| lines.iter().map(|r| r[i].chars().count()).max().unwrap_or(0);
-    let (a, b) = (width(0), width(1));
-    for [measure, wanted, measured] in &lines {
-        let _ = writeln!(out, "{measure:<a$}  {wanted:<b$}  {measured}");
-    }
-    let _ = writeln!(out, "\nby effect, right at 10 / 3 / 1");
-    for (name, r) in &s.by_effect {
-        let text = r.map(|x| if x.trials == 0 { "–".into() } else { format!("{}/{}", x.hits, x.trials) });
-        let _ = writeln!(out, "  {name:<28} {:>6} {:>6} {:>6}", text[0], text[1], text[2]);
-    }
-    let _ = writeln!(out, "\nrivals: right at 10 · 3 · 1, null alarms, held-out share of an oracle's");
-    for r in &s.rivals {
-        let right = r.right.map(|x| format!("{}/{}", x.hits, x.trials)).join(" · ");
-        let named = if r.names_something {
-            format!("{right}; {}", r.null_alarms.text())
-        } else {
-            "names nothing".into()
-        };
-        let _ = writeln!(out, "  {:<26} {named}; {}", r.name, share_text(&r.shares));
+    let mut out = head(records.len(), run) + "\n\n";
+    columns(&mut out, &rows(s, run).iter().map(|r| r.to_vec()).collect::<Vec<_>>());
+    for section in sections(s) {
+        let _ = writeln!(out, "\n{}", section.title);
+        let head: Vec<String> = section.columns.iter().map(|c| (*c).to_string()).collect();
+        columns(&mut out, &[vec![head], section.rows].concat());
     }
     out.push_str(&matrix(s));
-    let misses: Vec<&Record> = records.iter().filter(|r| !r.right()).collect();
+    let misses: Vec<Vec<String>> = records.iter().filter(|r| !r.right()).map(miss).collect();
     let _ = writeln!(out, "\n{} misses", misses.len());
-    for r in misses {
-        let hidden = if r.hidden.is_empty() { "nothing".into() } else { r.hidden.join(" + ") };
-        let _ = writeln!(
-            out,
-            "  case {:>4} {:<15} {hidden} at {}: {}",
-            r.id,
-            r.category.word(),
-            r.strength,
-            r.answer_text()
-        );
-    }
+    columns(&mut out, &misses);
     out
 }
 
@@ -229,7 +251,7 @@ fn matrix(s: &Sums) -> String {
     let hidden: Vec<&String> =
         s.confusion.keys().map(|k| &k.0).collect::<BTreeSet<_>>().into_iter().collect();
     let mut out =
-        String::from("\nconfusion, hidden against first answer (singles at 10 and 3, and the rest)\n");
+        String::from("\nconfusion, hidden against first answer (single effects at 10 and 3, and the rest)\n");
     let width = hidden.iter().map(|h| h.chars().count()).max().unwrap_or(0);
     let _ = write!(out, "  {:width$}", "");
     for i in 0..answers.len() {
@@ -254,22 +276,39 @@ fn matrix(s: &Sums) -> String {
     out
 }
 
-fn rate_json(r: &Rate) -> Value {
-    let (low, high) = wilson(r.hits, r.trials);
-    json!({ "hits": r.hits, "trials": r.trials, "ci95": [low, high] })
-}
-
 fn weighed_json((weighed, right): (&Weighed, bool)) -> Value {
     json!({ "name": weighed.name, "right": right, "evidence": weighed.evidence })
 }
 
-/// The whole result as JSON: sums, and one line for every case.
-pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
-    let shares = |x: &[f64]| json!({ "median": quantile(x, 0.5), "p10": quantile(x, 0.1), "cases": x.len() });
-    let by_effect: serde_json::Map<String, Value> = s
-        .by_effect
+fn case_json(r: &Record) -> Value {
+    let effects: Vec<Value> = r
+        .effects()
         .iter()
-        .map(|(n, r)| (n.to_string(), json!(r.iter().map(rate_json).collect::<Vec<_>>())))
+        .map(|e| json!({ "name": e.name, "class": e.class, "confidence": e.confidence, "right": r.is_true(e) }))
+        .collect();
+    let gain = r.gain();
+    json!({
+        "id": r.id, "kind": r.key.category.word(), "hidden": r.key.hidden(), "strength": r.key.strength,
+        "snr": r.key.snr, "rig": r.key.rig, "right": r.right(), "verdict": r.verdict(), "effects": effects,
+        "answer": r.answer_text(), "refit": r.left.map(|l| l.refit), "patched": r.left.map(|l| l.patched),
+        "gain_over_oracle": gain.map(|g| g.of_oracle), "gain_over_own": gain.map(|g| g.of_own),
+        "seconds": r.seconds, "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
+    })
+}
+
+/// The whole result as JSON: sums, and one entry for every case.
+pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
+    let lines: serde_json::Map<String, Value> =
+        s.lines.iter().map(|l| (l.key.clone(), l.figure.json())).collect();
+    let by = |rates: &[Rate]| json!(rates.iter().map(Rate::json).collect::<Vec<_>>());
+    let by_effect: serde_json::Map<String, Value> =
+        s.by_effect.iter().map(|(n, r)| (n.clone(), by(r))).collect();
+    let by_unknown: Vec<Value> = s
+        .by_unknown
+        .iter()
+        .map(|((detector, name), r)| {
+            json!({ "kind": name, "detector": detector, "abstained": r[0].json(), "confidently_wrong": r[1].json() })
+        })
         .collect();
     let rivals: Vec<Value> = s
         .rivals
@@ -277,80 +316,109 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
         .map(|r| {
             json!({
                 "name": r.name,
-                "right": r.right.iter().map(rate_json).collect::<Vec<_>>(),
-                "null_alarms": rate_json(&r.null_alarms),
-                "parameters_called_physics": rate_json(&r.parameters_called_physics),
-                "false_names": rate_json(&r.false_names),
-                "outside_abstains": rate_json(&r.outside_abstains),
-                "held_out_share": shares(&r.shares),
+                "right": by(&r.right),
+                "null_alarms": r.null_alarms.json(),
+                "parameters_called_physics": r.parameters_called_physics.json(),
+                "false_names": r.false_names.json(),
+                "outside_abstains": r.outside_abstains.json(),
+                "gain": { "median": quantile(&r.shares, 0.5), "p10": quantile(&r.shares, 0.1), "cases": r.shares.len() },
             })
         })
         .collect();
     let times: Option<serde_json::Map<String, Value>> =
         run.speed.as_ref().map(|times| times.iter().map(|t| (t.hidden.into(), json!(t.seconds))).collect());
-    let cases: Vec<Value> = records
-        .iter()
-        .map(|r| {
-            json!({
-                "id": r.id, "category": r.category.word(), "hidden": r.hidden, "strength": r.strength,
-                "achieved": r.achieved, "machine": r.machine, "rate_hz": r.rate, "right": r.right(),
-                "answer": r.answer_text(), "share": r.share(),
-                "refit": r.answer.as_ref().ok().map(|a| a.refit_holdout), "patched": r.answer.as_ref().ok().map(|a| a.patched_holdout),
-                "oracle": r.oracle.sqrt(), "seconds": r.seconds,
-                "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
-            })
-        })
-        .collect();
     json!({
-        "format": 1,
+        "format": 2,
         "tool": run.tool,
+        "source": run.source,
         "seed": run.options.seed,
         "quick": run.options.quick,
         "draws": run.options.cases,
         "only": run.options.only,
         "planned": run.planned,
         "unbuilt": run.unbuilt,
-        "right": s.right.iter().map(rate_json).collect::<Vec<_>>(),
-        "exactly_right": s.exact.iter().map(rate_json).collect::<Vec<_>>(),
+        "figures": lines,
         "by_effect": by_effect,
-        "null_alarms": rate_json(&s.null_alarms),
-        "disturbance_alarms": rate_json(&s.disturbance_alarms),
-        "parameters_called_physics": rate_json(&s.parameters_called_physics),
-        "false_names": rate_json(&s.false_names),
-        "outside_abstains": rate_json(&s.outside_abstains),
-        "outside_confidently_wrong": rate_json(&s.outside_confident),
-        "pairs": rate_json(&s.pairs),
-        "cannot_tell": rate_json(&s.cannot_tell),
-        "held_out_share": shares(&s.shares),
-        "held_out_share_where_right": shares(&s.shares_right),
-        "coverage": rate_json(&s.coverage),
+        "by_unknown": by_unknown,
+        "reliability": s.reliability.json(),
         "seconds_60s_10khz": times,
-        "failures": s.failures,
         "rivals": rivals,
-        "cases": cases,
+        "cases": records.iter().map(case_json).collect::<Vec<_>>(),
     })
 }
 
-/// What may be told to the tool's author: rates by effect and confusion, nothing of single cases.
+/// What may be told to the tool's author: sums and confusion, nothing of single cases.
 pub(crate) fn aggregate(records: &[Record], s: &Sums, run: &Run) -> String {
     let full = markdown(records, s, run);
     let end = full.find("### Every miss").unwrap_or(full.len());
     let mut out = full[..end].to_string();
-    out.push_str("### Verdicts by category\n\n");
-    let mut counts: std::collections::BTreeMap<(Category, String), usize> = Default::default();
+    out.push_str("### Verdicts by kind\n\n");
+    let mut counts: std::collections::BTreeMap<(crate::key::Category, String), usize> = Default::default();
     for r in records {
-        let verdict = r.answer.as_ref().map_or("failed".to_string(), |a| a.verdict.clone());
-        *counts.entry((r.category, verdict)).or_default() += 1;
+        *counts.entry((r.key.category, r.verdict().to_string())).or_default() += 1;
     }
     table(
         &mut out,
-        &["category", "verdict", "cases"],
+        &["kind", "verdict", "cases"],
         counts.iter().map(|((c, v), n)| vec![c.word().into(), v.clone(), n.to_string()]),
     );
-    let mut seconds = s.seconds.clone();
-    seconds.sort_by(f64::total_cmp);
-    if let (Some(median), Some(most)) = (quantile(&seconds, 0.5), seconds.last()) {
-        let _ = writeln!(out, "Seconds a case with others running: median {median:.1}, longest {most:.1}.");
-    }
     out
+}
+
+fn machine_rows(machines: &[Machine]) -> Vec<Vec<String>> {
+    machines
+        .iter()
+        .map(|m| {
+            vec![
+                m.record.id.clone(),
+                m.outcome().word().into(),
+                m.belief.wanted(),
+                m.record.answer_text().replace('|', "/"),
+                m.belief.source.clone(),
+            ]
+        })
+        .collect()
+}
+
+const MACHINE: [&str; 5] = ["case", "judged", "right would be", "answer (confidence)", "belief and source"];
+
+/// Real machines as markdown.
+pub(crate) fn machines_markdown(machines: &[Machine], s: &MachineSums, run: &Run) -> String {
+    let mut out = head(machines.len(), run) + "\n\n";
+    table(&mut out, &["measure", "wanted", "measured"], s.rows().into_iter().map(|r| r.to_vec()));
+    let section = reliability(&s.reliability);
+    let _ = writeln!(out, "### {}\n", section.title);
+    table(&mut out, &section.columns, section.rows);
+    out.push_str("### Every case\n\n");
+    table(&mut out, &MACHINE, machine_rows(machines));
+    out
+}
+
+/// Real machines for the terminal; the belief's source is left to the file.
+pub(crate) fn machines_terminal(machines: &[Machine], s: &MachineSums, run: &Run) -> String {
+    let mut out = head(machines.len(), run) + "\n\n";
+    columns(&mut out, &s.rows().iter().map(|r| r.to_vec()).collect::<Vec<_>>());
+    let section = reliability(&s.reliability);
+    let _ = writeln!(out, "\n{}", section.title);
+    columns(&mut out, &section.rows);
+    out.push_str("\nevery case\n");
+    let rows: Vec<Vec<String>> = machine_rows(machines).into_iter().map(|r| r[..4].to_vec()).collect();
+    columns(&mut out, &rows);
+    out
+}
+
+/// Real machines as JSON.
+pub(crate) fn machines_json(machines: &[Machine], s: &MachineSums, run: &Run) -> Value {
+    let cases: Vec<Value> = machines
+        .iter()
+        .map(|m| {
+            let mut case = case_json(&m.record);
+            case["outcome"] = json!(m.outcome().word());
+            case["wanted"] = json!(m.belief.wanted());
+            case
+        })
+        .collect();
+    json!({
+        "format": 2, "tool": run.tool, "source": run.source, "machines": s.json(), "cases": cases,
+    })
 }

@@ -7,26 +7,44 @@ pub(crate) fn low_pass(x: &[f64], rate: f64, corner_hz: f64) -> Vec<f64> {
     if x.is_empty() || corner_hz >= 0.45 * rate {
         return x.to_vec();
     }
-    // Bilinear transform with prewarping.
-    let k = (PI * corner_hz / rate).tan();
-    let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
-    let b = k * k * norm;
-    let (a1, a2) = (2.0 * (k * k - 1.0) * norm, (1.0 - std::f64::consts::SQRT_2 * k + k * k) * norm);
     let pass = |input: &mut dyn Iterator<Item = f64>| {
-        let mut out = Vec::with_capacity(x.len());
-        let mut state: Option<[f64; 4]> = None;
-        for value in input {
-            let [x1, x2, y1, y2] = state.unwrap_or([value; 4]);
-            let y = b * (value + 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
-            state = Some([value, x1, y, y1]);
-            out.push(y);
-        }
-        out
+        let mut filter = Butterworth::new(corner_hz, rate);
+        input.map(|value| filter.next(value)).collect::<Vec<f64>>()
     };
     let forward = pass(&mut x.iter().copied());
     let mut backward = pass(&mut forward.iter().rev().copied());
     backward.reverse();
     backward
+}
+
+/// Second-order Butterworth low-pass run forward only (bilinear transform, prewarped), started settled on its first value.
+#[derive(Clone, Debug)]
+pub(crate) struct Butterworth {
+    b: f64,
+    a: [f64; 2],
+    /// Two inputs and two outputs ago.
+    state: Option<[f64; 4]>,
+}
+
+impl Butterworth {
+    /// A corner beyond 0.45 of the rate is put there.
+    pub(crate) fn new(corner_hz: f64, rate: f64) -> Self {
+        let k = (PI * corner_hz.min(0.45 * rate) / rate).tan();
+        let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
+        Self {
+            b: k * k * norm,
+            a: [2.0 * (k * k - 1.0) * norm, (1.0 - std::f64::consts::SQRT_2 * k + k * k) * norm],
+            state: None,
+        }
+    }
+
+    /// The next output.
+    pub(crate) fn next(&mut self, value: f64) -> f64 {
+        let [x1, x2, y1, y2] = self.state.unwrap_or([value; 4]);
+        let y = self.b * (value + 2.0 * x1 + x2) - self.a[0] * y1 - self.a[1] * y2;
+        self.state = Some([value, x1, y, y1]);
+        y
+    }
 }
 
 /// Central difference, one-sided at the ends.

@@ -37,6 +37,11 @@ impl Rate {
         self.trials += 1;
     }
 
+    pub(crate) fn json(&self) -> serde_json::Value {
+        let (low, high) = wilson(self.hits, self.trials);
+        serde_json::json!({ "hits": self.hits, "trials": self.trials, "ci95": [low, high] })
+    }
+
     /// "92.0 % (23/25, 75.0–97.8)".
     pub(crate) fn text(&self) -> String {
         if self.trials == 0 {

@@ -1,11 +1,33 @@
 //! The tool under test as the judge sees it: files in, the contract's report out.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::generator::files::Paths;
+/// Where a case's files lie.
+#[derive(Clone, Debug)]
+pub(crate) struct Paths {
+    pub(crate) rig: PathBuf,
+    pub(crate) fit: Vec<PathBuf>,
+    pub(crate) holdout: Vec<PathBuf>,
+}
+
+impl Paths {
+    /// The same files in the folder `to`, which is created, where no key lies beside them.
+    pub(crate) fn copied(&self, to: &Path) -> Result<Self, String> {
+        std::fs::create_dir_all(to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;
+        let copy = |from: &PathBuf| {
+            let target = to.join(from.file_name().unwrap_or_default());
+            std::fs::copy(from, &target).map_err(|e| format!("cannot copy {}: {e}", from.display()))?;
+            Ok::<_, String>(target)
+        };
+        let all = |list: &[PathBuf]| list.iter().map(copy).collect::<Result<Vec<_>, _>>();
+        Ok(Self { rig: copy(&self.rig)?, fit: all(&self.fit)?, holdout: all(&self.holdout)? })
+    }
+}
 
 /// Whatever turns a rig and recordings into the files of the contract.
 pub(crate) trait Tool: Sync {
@@ -28,6 +50,81 @@ impl Tool for Diagnosis {
     }
 }
 
+/// Another program, by a command line with `{rig}`, `{fit}`, `{holdout}` and `{out}` in it. The word that holds `{fit}` or
+/// `{holdout}` is repeated for every such file, with the flag before it.
+pub(crate) struct Program {
+    pub(crate) line: String,
+    /// It is stopped after this.
+    pub(crate) patience: Duration,
+}
+
+impl Program {
+    fn words(&self, paths: &Paths, out: &Path) -> Vec<String> {
+        let mut words: Vec<String> = Vec::new();
+        for word in self.line.split_whitespace() {
+            let many = match word {
+                "{fit}" => &paths.fit,
+                "{holdout}" => &paths.holdout,
+                _ => {
+                    let word = word.replace("{rig}", &paths.rig.to_string_lossy());
+                    words.push(word.replace("{out}", &out.to_string_lossy()));
+                    continue;
+                }
+            };
+            let flag = words.pop();
+            for path in many {
+                words.extend(flag.clone());
+                words.push(path.to_string_lossy().into_owned());
+            }
+        }
+        words
+    }
+}
+
+impl Tool for Program {
+    fn diagnose(&self, paths: &Paths, out: &Path) -> Result<(), String> {
+        let words = self.words(paths, out);
+        let (program, arguments) = words.split_first().ok_or("--tool needs a command line")?;
+        let log = std::fs::File::create(out.join("log.txt")).map_err(|e| format!("no log: {e}"))?;
+        let mut child = Command::new(program)
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn()
+            .map_err(|e| format!("`{program}` cannot be started: {e}"))?;
+        let start = Instant::now();
+        loop {
+            match child.try_wait().map_err(|e| format!("`{program}` was lost: {e}"))? {
+                Some(status) if status.success() => return Ok(()),
+                Some(status) => {
+                    let said = std::fs::read_to_string(out.join("log.txt")).unwrap_or_default();
+                    return Err(format!("{} ({status})", said.trim()));
+                }
+                None if start.elapsed() > self.patience => {
+                    // It may have ended in this very moment.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                    return Err(format!("no answer within {} s", self.patience.as_secs()));
+                }
+                None => std::thread::sleep(Duration::from_millis(20)),
+            }
+        }
+    }
+}
+
+/// Reports that are there already, in folders named as the cases' own.
+pub(crate) struct Finished;
+
+impl Tool for Finished {
+    fn diagnose(&self, _: &Paths, _: &Path) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// A class of more names than this is no answer.
+const WIDEST_CLASS: usize = 3;
+
 /// An effect that the report names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Named {
@@ -36,6 +133,18 @@ pub(crate) struct Named {
     pub(crate) confidence: f64,
     /// (name, value, 95 % interval).
     pub(crate) parameters: Vec<(String, f64, Option<[f64; 2]>)>,
+}
+
+impl Named {
+    /// The class as it is judged: of too many names, none counts but the effect's own.
+    pub(crate) fn judged_class(&self) -> &[String] {
+        if self.class.len() <= WIDEST_CLASS { &self.class } else { &[] }
+    }
+
+    /// Whether the name or the class holds `effect`.
+    pub(crate) fn holds(&self, effect: &str) -> bool {
+        self.name == effect || self.judged_class().iter().any(|c| c == effect)
+    }
 }
 
 /// An effect that came through the tool's search, with the evidence that its confidence weighs; named or not.
@@ -50,6 +159,8 @@ pub(crate) struct Weighed {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
     pub(crate) verdict: String,
+    /// There was no fit: the recordings were turned away before.
+    pub(crate) refused: bool,
     pub(crate) effects: Vec<Named>,
     /// For calibration only; another tool may have none.
     pub(crate) weighed: Vec<Weighed>,
@@ -99,11 +210,14 @@ pub(crate) fn read(report: &Value) -> Result<Answer, String> {
         effects.push(Named { name, class, confidence, parameters });
     }
     let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
+    let refit_holdout = number(&report["fit"]["refit"]["holdout"]);
     Ok(Answer {
+        // The contract says null; a force error of exactly nothing is no fit either.
+        refused: verdict == "insufficient_excitation" && (refit_holdout.is_nan() || refit_holdout == 0.0),
         verdict,
         effects,
         weighed: weighed(report),
-        refit_holdout: number(&report["fit"]["refit"]["holdout"]),
+        refit_holdout,
         patched_holdout: number(&report["fit"]["patched"]["holdout"]),
         bandwidth_hz: number(&report["residual_bandwidth_hz"]),
         gain: None,
@@ -127,7 +241,7 @@ fn weighed(report: &Value) -> Vec<Weighed> {
 }
 
 /// `gain` of `[actuator]`, read line by line: all that the judge needs of a rig file.
-fn actuator_gain(rig: &str) -> Option<f64> {
+pub(crate) fn actuator_gain(rig: &str) -> Option<f64> {
     let mut inside = false;
     for line in rig.lines().map(str::trim) {
         if line.starts_with('[') {
@@ -170,6 +284,20 @@ mod tests {
         }
         let paths = Paths { rig: "r".into(), fit: vec![], holdout: vec![] };
         assert_eq!(ask(&Broken, &paths, &std::env::temp_dir()), Err("the tool panicked".into()));
+    }
+
+    #[test]
+    fn a_program_is_shown_every_file_and_its_failure_is_told() {
+        let paths = Paths { rig: "r".into(), fit: vec!["a".into(), "b".into()], holdout: vec!["h".into()] };
+        let program = |line: &str| Program { line: line.into(), patience: Duration::from_secs(5) };
+        let words = program("t --fit {fit} --holdout {holdout} --rig {rig}").words(&paths, Path::new("o"));
+        assert_eq!(words.join(" "), "t --fit a --fit b --holdout h --rig r");
+        let out = std::env::temp_dir().join(format!("proof-program-{}", std::process::id()));
+        assert!(ask(&program("false"), &paths, &out).unwrap_err().contains("exit status"));
+        assert!(ask(&program("no-such-tool"), &paths, &out).unwrap_err().contains("cannot be started"));
+        let slow = Program { line: "sleep 20".into(), patience: Duration::from_millis(50) };
+        assert!(ask(&slow, &paths, &out).unwrap_err().contains("no answer"));
+        std::fs::remove_dir_all(&out).unwrap();
     }
 
     #[test]

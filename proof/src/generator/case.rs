@@ -1,48 +1,15 @@
 //! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the key.
 
 use super::draft::{Draft, Plan};
-use super::effects::{self, Parameter};
+use super::effects;
 use super::excite::{self, Kind};
 use super::machine::{Machine, Needs};
 use super::outside;
 use super::plant::Plant;
 use super::simulate::{Believed, Row, STEP, Series};
 use super::strength::{Declared, Measured, measure};
+use crate::key::{Category, Parameter};
 use crate::rng::Rng;
-
-/// What kind of case it is, and so what the right answer is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Category {
-    /// One effect: name it, or a class of three at most that holds it.
-    Single,
-    /// Two effects: both, and none else.
-    Pair,
-    /// The nominal model itself with noise: no name.
-    Null,
-    /// The nominal model itself under a strong disturbance: no name.
-    Disturbance,
-    /// Right structure, wrong values: no name.
-    ParametersOnly,
-    /// Physics that has no name: no name.
-    Outside,
-    /// Recordings that cannot tell: a class with the truth in it, or "insufficient excitation".
-    CannotTell,
-}
-
-impl Category {
-    /// Short word for tables and files.
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Category::Single => "single",
-            Category::Pair => "pair",
-            Category::Null => "null",
-            Category::Disturbance => "disturbance",
-            Category::ParametersOnly => "parameters_only",
-            Category::Outside => "outside",
-            Category::CannotTell => "cannot_tell",
-        }
-    }
-}
 
 /// What to build.
 #[derive(Clone, Debug)]
@@ -60,6 +27,13 @@ pub(crate) struct Spec {
     pub(crate) poor: Option<&'static [Kind]>,
     /// Rate in Hz and duration in s, where they are not drawn.
     pub(crate) recorder: Option<(f64, f64)>,
+}
+
+impl Spec {
+    /// The name of the case's folder.
+    pub(crate) fn name(&self) -> String {
+        format!("case-{:04}", self.id)
+    }
 }
 
 /// Values as the rig file has them; `None`: the key is missing.
@@ -82,7 +56,6 @@ pub(crate) struct Case {
     pub(crate) believed: Believed,
     pub(crate) declared: Declared,
     pub(crate) nominal: Nominal,
-    pub(crate) kinds: [Kind; 3],
     /// Two to fit on, one held out.
     pub(crate) recordings: Vec<Vec<Row>>,
     /// A loop ran, and its reference is recorded.
@@ -91,7 +64,7 @@ pub(crate) struct Case {
     /// Strength of each hidden effect alone, and of all together, as achieved.
     pub(crate) alone: Vec<f64>,
     pub(crate) together: Measured,
-    pub(crate) truths: Vec<(&'static str, Vec<Parameter>)>,
+    pub(crate) truths: Vec<Parameter>,
 }
 
 impl Case {
@@ -250,7 +223,7 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     let truths = if spec.category == Category::Outside {
         Vec::new()
     } else {
-        spec.hidden.iter().map(|&name| (name, effects::truth(name, &plant, &rows[..2]))).collect()
+        spec.hidden.iter().flat_map(|name| effects::truth(name, &plant, &rows[..2])).collect()
     };
     let nominal = draw_nominal(spec, &draft.machine, &plant, &declared, &mut rng.fork("nominal"));
     Some(Case {
@@ -260,7 +233,6 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         believed,
         declared,
         nominal,
-        kinds,
         recordings,
         with_reference,
         with_force,

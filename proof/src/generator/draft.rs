@@ -1,6 +1,6 @@
 //! A case before its strengths are found: a machine with plans for its recordings, played again and again.
 
-use super::case::{Category, Spec};
+use super::case::Spec;
 use super::effects;
 use super::excite::Excitation;
 use super::machine::Machine;
@@ -8,6 +8,7 @@ use super::outside;
 use super::plant::Plant;
 use super::simulate::{Believed, Diverged, Row, Run, Series, simulate};
 use super::strength::{Declared, Measured, measure};
+use crate::key::Category;
 use crate::rng::Rng;
 
 /// What is played and drawn for one recording.

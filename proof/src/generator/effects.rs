@@ -10,6 +10,7 @@ use super::plant::{
     StribeckLaw, Train,
 };
 use super::simulate::Row;
+use crate::key::Parameter;
 use crate::rng::Rng;
 
 /// The 25 names of the contract.
@@ -291,20 +292,12 @@ fn harmonics(m: &Machine, rms: f64, rng: &mut Rng) -> Vec<Harmonic> {
     list
 }
 
-/// A true value of a parameter that the contract names.
-#[derive(Clone, Debug)]
-pub(crate) struct Parameter {
-    pub(crate) name: String,
-    pub(crate) value: f64,
-    /// The unit has force in it: a tool knows it only up to the gain that it believes.
-    pub(crate) force: bool,
-}
-
 /// The contract's parameters of the effect as they truly are, where the form drawn has them. `rows` are the fit recordings.
 pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]]) -> Vec<Parameter> {
     let mut list = Vec::new();
-    let mut put =
-        |name: &str, value: f64, force: bool| list.push(Parameter { name: name.into(), value, force });
+    let mut put = |parameter: &str, value: f64, force: bool| {
+        list.push(Parameter { effect: name.into(), name: parameter.into(), value, force });
+    };
     let places = || rows.iter().flat_map(|r| r.iter()).map(|r| r.q);
     let span = |shape: &Shape| {
         let (low, high) =

@@ -3,20 +3,14 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
-
-use serde_json::{Value, json};
+use std::path::Path;
 
 use super::case::Case;
+use super::outside;
 use super::simulate::Row;
-
-/// Where the case's files lie.
-#[derive(Clone, Debug)]
-pub(crate) struct Paths {
-    pub(crate) rig: PathBuf,
-    pub(crate) fit: Vec<PathBuf>,
-    pub(crate) holdout: Vec<PathBuf>,
-}
+use super::strength::slowest;
+use crate::key::{Category, Key, Oracle};
+use crate::tool::Paths;
 
 /// Writes `rig.toml`, `fit-a.csv`, `fit-b.csv` and `holdout.csv` into `dir`, which is created.
 pub(crate) fn write_case(case: &Case, dir: &Path) -> io::Result<Paths> {
@@ -101,34 +95,46 @@ fn csv(case: &Case, k: usize) -> String {
     out
 }
 
-/// The key as a record of what is hidden: for people who look at examples, never beside the case's files.
-pub(crate) fn key(case: &Case) -> Value {
-    let truths: Vec<Value> = case
-        .truths
-        .iter()
-        .map(|(name, list)| {
-            let values: serde_json::Map<String, Value> =
-                list.iter().map(|p| (p.name.clone(), json!(p.value))).collect();
-            json!({ "name": name, "parameters": values })
-        })
-        .collect();
-    json!({
-        "id": case.spec.id,
-        "category": case.spec.category.word(),
-        "hidden": case.spec.hidden,
-        "strength_wanted": case.spec.strength,
-        "strength_alone": case.alone,
-        "effect_rms": case.together.effect,
-        "noise_rms": case.together.noise,
-        "force_rms": case.together.force,
-        "moving_share": case.together.moving,
-        "machine": case.machine.name,
-        "rate_hz": case.machine.rate,
-        "recordings": case.kinds.iter().map(|k| format!("{k:?}")).collect::<Vec<_>>(),
-        "truth": truths,
-        "true_model": {
-            "inertia": case.plant.inertia, "viscous": case.plant.viscous, "coulomb": case.plant.dry.coulomb,
-            "offset": case.plant.offset, "weight": case.plant.weight, "gain": case.plant.gain,
-        },
-    })
+/// The key of the case, as every folder of cases has it.
+pub(crate) fn key(case: &Case) -> Key {
+    let outside = case.spec.category == Category::Outside;
+    let hidden = case.spec.hidden.first();
+    let band = case.machine.residual_bandwidth();
+    let held = case.held_out(band);
+    Key {
+        effects: if outside { Vec::new() } else { case.spec.hidden.iter().map(|h| (*h).into()).collect() },
+        unknown: hidden.filter(|_| outside).map(|h| (*h).into()),
+        detector: outside && hidden.is_some_and(|h| outside::has_detector(h)),
+        strength: case.spec.strength,
+        snr: (case.spec.strength > 0.0).then_some(case.together.effect / case.together.noise),
+        poverty: (case.spec.category == Category::CannotTell).then(|| "twin".into()),
+        rig: format!("{}, {:.0} Hz", case.machine.name, case.machine.rate),
+        oracle: Some(Oracle {
+            floor: held.noise,
+            refit: held.noise.hypot(held.effect),
+            filters_hz: [band; 2],
+            skip_s: 2.0 / band,
+            still_s: still(&case.recordings[2]),
+        }),
+        parameters: case.truths.clone(),
+        true_gain: Some(case.plant.gain),
+        true_inertia: Some(case.plant.inertia),
+        ..Key::of(case.spec.category)
+    }
+}
+
+/// Times in which the rows do not move.
+fn still(rows: &[Row]) -> Vec<[f64; 2]> {
+    let slowest = slowest(rows);
+    let mut list: Vec<[f64; 2]> = Vec::new();
+    for pair in rows.windows(2) {
+        if pair[0].moving && pair[0].v.abs() > slowest {
+            continue;
+        }
+        match list.last_mut().filter(|last| last[1] == pair[0].time) {
+            Some(last) => last[1] = pair[1].time,
+            None => list.push([pair[0].time, pair[1].time]),
+        }
+    }
+    list
 }

@@ -17,6 +17,14 @@ pub(crate) const FOREIGN: [&str; 8] = [
     "speed_window_friction",
 ];
 
+/// Kinds that the tool tells for what they are, without a name: no longer outside.
+const DETECTED: [&str; 5] = ["creep_spring", "hum", "payload_change", "linkage_inertia", "gear_loss"];
+
+/// Whether the tool has a detector for it.
+pub(crate) fn has_detector(name: &str) -> bool {
+    DETECTED.contains(&name)
+}
+
 /// What it asks of the machine.
 pub(crate) fn needs(name: &str) -> Needs {
     let mut needs = Needs::default();

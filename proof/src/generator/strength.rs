@@ -36,8 +36,6 @@ pub(crate) struct Declared {
 pub(crate) struct Measured {
     pub(crate) effect: f64,
     pub(crate) noise: f64,
-    /// Rms of the whole force below B, to see the two in proportion.
-    pub(crate) force: f64,
     /// Share of the rows that move.
     pub(crate) moving: f64,
 }
@@ -45,13 +43,17 @@ pub(crate) struct Measured {
 struct Columns {
     effect: Vec<f64>,
     noise: Vec<f64>,
-    force: Vec<f64>,
     acceleration: Vec<f64>,
     speed: Vec<f64>,
     direction: Vec<f64>,
     tilt: Vec<f64>,
     moving: Vec<bool>,
     seconds: f64,
+}
+
+/// Rows slower than this count as at rest: 1 % of the recording's rms speed.
+pub(crate) fn slowest(rows: &[Row]) -> f64 {
+    0.01 * (rows.iter().map(|r| r.v * r.v).sum::<f64>() / rows.len().max(1) as f64).sqrt()
 }
 
 fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
@@ -71,7 +73,7 @@ fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
         noise[i] += believed.inertia * rounding_acceleration[i];
     }
     let speed = of(&|r| r.v);
-    let slowest = 0.01 * rms(&speed);
+    let slowest = slowest(rows);
     // The ends carry the filter's transient.
     let edge = ((2.0 * rate / band) as usize).min(rows.len() / 10);
     let moving = rows
@@ -82,7 +84,6 @@ fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
     Columns {
         effect,
         noise,
-        force: below(of(&|r| believed.gain * r.command)),
         acceleration: below(derivative(&below(of(&|r| r.v)), rate)),
         // Through the same filter as the effect: a step of friction at a reversal is smeared alike on both sides.
         direction: below(of(&|r| if r.moving { sign(r.v) } else { 0.0 })),
@@ -108,13 +109,11 @@ pub(crate) fn measure(
     let judged = if fitted < sets.len() { fitted..sets.len() } else { 0..sets.len() };
     // Noise first: the refit's prior needs it.
     let mut noise = Vec::new();
-    let mut force = Vec::new();
     let (mut moving, mut all) = (0.0, 0.0);
     for set in &sets[judged.clone()] {
         let kept: Vec<f64> = picks(set, stride).map(|i| set.noise[i]).collect();
         let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
         noise.extend(kept.iter().map(|x| x - mean));
-        force.extend(picks(set, stride).map(|i| set.force[i]));
         moving += set.moving.iter().filter(|&&m| m).count() as f64;
         all += set.moving.len() as f64;
     }
@@ -161,7 +160,7 @@ pub(crate) fn measure(
             if declared.offset_allowed { left.iter().sum::<f64>() / left.len().max(1) as f64 } else { 0.0 };
         effect.extend(left.iter().map(|x| x - mean));
     }
-    Measured { effect: rms(&effect), noise, force: rms(&force), moving: moving / f64::max(all, 1.0) }
+    Measured { effect: rms(&effect), noise, moving: moving / f64::max(all, 1.0) }
 }
 
 fn picks(set: &Columns, stride: usize) -> impl Iterator<Item = usize> + '_ {

@@ -18,11 +18,25 @@ pub(crate) struct Opinion {
     /// Held-out mean square of the force residual, and the refit's.
     pub(crate) mean_square: f64,
     pub(crate) refit_mean_square: f64,
+    /// Held-out gain over an oracle's at the rivals' bandwidth; `None` where there is nothing to gain.
+    pub(crate) share: Option<f64>,
+}
+
+/// A method that the tool is compared with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rival {
+    pub(crate) name: &'static str,
+    /// It gives effects names.
+    pub(crate) names: bool,
 }
 
 /// The rivals, in the order of [`judge`]'s result.
-pub(crate) const RIVALS: [&str; 4] =
-    ["refit only", "forward selection by BIC", "sparse regression", "unstructured"];
+pub(crate) const RIVALS: [Rival; 4] = [
+    Rival { name: "refit only", names: false },
+    Rival { name: "forward selection by BIC", names: true },
+    Rival { name: "sparse regression", names: true },
+    Rival { name: "unstructured", names: false },
+];
 
 /// Every rival on the case.
 pub(crate) fn judge(case: &Case) -> [Opinion; 4] {
@@ -52,13 +66,32 @@ pub(crate) fn judge(case: &Case) -> [Opinion; 4] {
         names,
         mean_square: judged(coefficients, None),
         refit_mean_square,
+        share: None,
     };
     let (forward, forward_names) = forward_bic(&features, &normal, &nominal, tables[0].independent);
     let (sparse, sparse_names) = thresholding(&features, &normal, &nominal, tables[0].independent);
     let field = unstructured(case, &columns, &tables, &refit);
     let mut flexible = opinion(Vec::new(), &refit);
     flexible.mean_square = judged(&refit, Some(&field));
-    [opinion(Vec::new(), &refit), opinion(forward_names, &forward), opinion(sparse_names, &sparse), flexible]
+    let mut all = [
+        opinion(Vec::new(), &refit),
+        opinion(forward_names, &forward),
+        opinion(sparse_names, &sparse),
+        flexible,
+    ];
+    let oracle = case.held_out(case.machine.residual_bandwidth()).noise.powi(2);
+    all.iter_mut().for_each(|o| o.share = share_of_oracle(o.refit_mean_square, o.mean_square, oracle));
+    all
+}
+
+/// Less than this part of the refit's mean square left to an oracle, and there is nothing to gain.
+const EXPLAINABLE: f64 = 0.05;
+
+/// Share of what an oracle, which has the true model and leaves the noise, takes off the held-out mean square.
+fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {
+    let all = refit - oracle;
+    let gain = refit - left;
+    (gain.is_finite() && all > EXPLAINABLE * refit).then(|| (gain / all).clamp(-2.0, 2.0))
 }
 
 /// What the coefficients leave at the kept rows, and the rows' numbers.

@@ -1,0 +1,93 @@
+//! A run over a folder of cases that somebody else made.
+
+use std::path::Path;
+use std::time::Instant;
+
+use crate::folder::{self, Brought, Truth};
+use crate::judge::Record;
+use crate::key::{Category, Key};
+use crate::machines::Machine;
+use crate::options::Options;
+use crate::pool;
+use crate::reported;
+use crate::scratch::Scratch;
+use crate::tool::{self, Tool, ask};
+
+/// What a folder held, with the answers.
+#[derive(Debug, Default)]
+pub(crate) struct Judged {
+    pub(crate) records: Vec<Record>,
+    pub(crate) machines: Vec<Machine>,
+    /// Cases of the folder that were asked for, with or without time for them.
+    pub(crate) planned: usize,
+}
+
+/// Shows every case of `top` to the tool; reports stay in `options.keep` where that is given.
+///
+/// # Errors
+/// One sentence: what could not be read, written or run.
+pub(crate) fn run(options: &Options, top: &Path, tool: &dyn Tool) -> Result<Judged, String> {
+    let mut cases = folder::find(top)?;
+    if let Some(text) = &options.only {
+        cases.retain(|case| asked_for(case, text));
+    }
+    let scratch = Scratch::new()?;
+    let label = format!("judging {}", top.display());
+    let done = pool::map(options.jobs, options.budget(), &label, &cases, |case| {
+        run_case(case, options, tool, &scratch.0)
+    });
+    let planned = cases.len();
+    let mut judged = Judged { planned, ..Judged::default() };
+    for (case, record) in cases.into_iter().zip(done) {
+        let Some(record) = record.transpose()? else { continue };
+        match case.truth {
+            Truth::Known(_) => judged.records.push(record),
+            Truth::Believed(belief) => judged.machines.push(Machine { record, belief }),
+        }
+    }
+    Ok(judged)
+}
+
+fn asked_for(case: &Brought, text: &str) -> bool {
+    let hidden = match &case.truth {
+        Truth::Known(key) => {
+            key.category.matches(text)
+                || key.unknown.iter().chain(&key.effects).any(|name| name.contains(text))
+        }
+        Truth::Believed(_) => false,
+    };
+    hidden || case.id.contains(text)
+}
+
+fn run_case(case: &Brought, options: &Options, tool: &dyn Tool, scratch: &Path) -> Result<Record, String> {
+    let dir = scratch.join(&case.id);
+    let out = match options.reports.as_ref().or(options.keep.as_ref()) {
+        Some(reports) => reports.join(&case.id),
+        None => dir.join("out"),
+    };
+    // The tool sees the files in a folder of their own, so that no key lies beside them.
+    let paths = case.paths.copied(&dir)?;
+    let start = Instant::now();
+    let answer = ask(tool, &paths, &out);
+    let seconds = start.elapsed().as_secs_f64();
+    let rig = std::fs::read_to_string(&paths.rig).unwrap_or_default();
+    let key = match &case.truth {
+        Truth::Known(key) => key.clone(),
+        Truth::Believed(_) => Key::of(Category::Null),
+    };
+    let holdout = case.paths.holdout.first().and_then(|p| p.file_name()).unwrap_or_default();
+    let left = key.oracle.as_ref().and_then(|oracle| {
+        reported::measure(&out.join("residuals.csv"), &holdout.to_string_lossy(), oracle).ok()
+    });
+    let record = Record {
+        id: case.id.clone(),
+        key,
+        answer,
+        left,
+        opinions: Vec::new(),
+        seconds,
+        nominal_gain: tool::actuator_gain(&rig).unwrap_or(f64::NAN),
+    };
+    std::fs::remove_dir_all(&dir).map_err(|e| format!("cannot remove {}: {e}", dir.display()))?;
+    Ok(record)
+}

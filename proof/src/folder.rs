@@ -1,0 +1,131 @@
+//! Folders of cases that somebody else made: what lies where (`docs/benchmark.md`).
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::belief::{self, Belief};
+use crate::key::Key;
+use crate::tool::Paths;
+
+/// What is known of a case: a generator's key, or what is believed of a machine.
+#[derive(Clone, Debug)]
+pub(crate) enum Truth {
+    Known(Key),
+    Believed(Belief),
+}
+
+/// One case of a folder.
+#[derive(Clone, Debug)]
+pub(crate) struct Brought {
+    pub(crate) id: String,
+    pub(crate) paths: Paths,
+    pub(crate) truth: Truth,
+}
+
+/// Finds the cases of `top`, in the order of their names.
+///
+/// # Errors
+/// One sentence: what is missing or cannot be read, and where.
+pub(crate) fn find(top: &Path) -> Result<Vec<Brought>, String> {
+    let inner = top.join("cases");
+    let cases = if inner.is_dir() { inner } else { top.to_path_buf() };
+    let keys = keys(top)?;
+    let mut found = BTreeMap::new();
+    let entries =
+        std::fs::read_dir(&cases).map_err(|e| format!("cannot read the folder {}: {e}", cases.display()))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        if path.join("rig.toml").is_file() {
+            found.insert(entry.file_name().to_string_lossy().into_owned(), path);
+        }
+    }
+    if found.is_empty() {
+        return Err(format!(
+            "{} holds no case: a case is a folder with rig.toml, fit*.csv and holdout*.csv",
+            cases.display()
+        ));
+    }
+    if let Some(id) = keys.keys().find(|id| !found.contains_key(*id)) {
+        return Err(format!("the key tells of `{id}`, and {} has no such case", cases.display()));
+    }
+    found.into_iter().map(|(id, path)| case(&id, &path, &keys)).collect()
+}
+
+fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought, String> {
+    let truth = keys
+        .get(id)
+        .cloned()
+        .ok_or_else(|| format!("the key tells nothing of the case {}", path.display()))?;
+    let (mut fit, mut holdout) = (Vec::new(), Vec::new());
+    let entries = std::fs::read_dir(path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        match name.ends_with(".csv") {
+            true if name.starts_with("fit") => fit.push(entry.path()),
+            true if name.starts_with("holdout") => holdout.push(entry.path()),
+            _ => {}
+        }
+    }
+    fit.sort();
+    holdout.sort();
+    if fit.is_empty() || holdout.is_empty() {
+        return Err(format!("{} needs fit*.csv and holdout*.csv, at least one of each", path.display()));
+    }
+    Ok(Brought { id: id.into(), paths: Paths { rig: path.join("rig.toml"), fit, holdout }, truth })
+}
+
+fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
+    let read = |path: &PathBuf| {
+        std::fs::read_to_string(path).map_err(|e| format!("cannot read {}: {e}", path.display()))
+    };
+    let (key, believed) = (top.join("key.json"), top.join("believed.tsv"));
+    if key.is_file() {
+        let value: Value =
+            serde_json::from_str(&read(&key)?).map_err(|e| format!("{}: {e}", key.display()))?;
+        let cases = value["cases"].as_object().ok_or_else(|| format!("{} has no `cases`", key.display()))?;
+        let one = |(id, value): (&String, &Value)| {
+            let known = Key::read(value).map_err(|e| format!("{}, case {id}: {e}", key.display()))?;
+            Ok((id.clone(), Truth::Known(known)))
+        };
+        return cases.iter().map(one).collect();
+    }
+    if believed.is_file() {
+        let list = belief::parse(&read(&believed)?).map_err(|e| format!("{}, {e}", believed.display()))?;
+        return Ok(list.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
+    }
+    Err(format!(
+        "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/benchmark.md tells the format",
+        top.display()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_folder_lacks_is_said() {
+        let top = std::env::temp_dir().join(format!("proof-folder-{}", std::process::id()));
+        let case = top.join("cases/a");
+        std::fs::create_dir_all(&case).unwrap();
+        let says = |what: &str| {
+            let error = find(&top).unwrap_err();
+            assert!(error.contains(what), "{error}");
+        };
+        says("neither key.json");
+        std::fs::write(top.join("key.json"), r#"{"cases": {"a": {"kind": "null"}}}"#).unwrap();
+        says("holds no case");
+        std::fs::write(case.join("rig.toml"), "").unwrap();
+        says("needs fit*.csv");
+        for name in ["fit.csv", "fit2.csv", "holdout.csv", "notes.csv"] {
+            std::fs::write(case.join(name), "").unwrap();
+        }
+        let found = find(&top).unwrap();
+        assert_eq!((found.len(), found[0].paths.fit.len(), found[0].paths.holdout.len()), (1, 2, 1));
+        std::fs::write(top.join("key.json"), r#"{"cases": {"b": {"kind": "null"}}}"#).unwrap();
+        says("`b`");
+        std::fs::remove_dir_all(&top).unwrap();
+    }
+}
