@@ -7,6 +7,7 @@ pub mod characterise;
 pub mod device;
 pub mod driver;
 pub mod failure;
+pub mod import;
 pub mod library;
 pub mod pace;
 pub mod plant;

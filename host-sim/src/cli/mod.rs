@@ -2,6 +2,7 @@
 
 mod characterise;
 mod diagnose;
+mod import;
 mod progress;
 mod recordings;
 mod run;
@@ -27,6 +28,7 @@ enum Command {
     Score(recordings::Score),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
+    Import(import::Import),
 }
 
 impl Cli {
@@ -40,6 +42,7 @@ impl Cli {
             Some(Command::Score(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
+            Some(Command::Import(command)) => command.run(),
         }
     }
 }

@@ -1,0 +1,132 @@
+//! `host-sim import`: recordings as people have them, made into what `diagnose` reads.
+
+use clap::Args;
+use host_sim::failure::Failure;
+use host_sim::import::{self, Keep, Known, Request, RigValues};
+use std::path::PathBuf;
+
+/// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.
+///
+/// Reads tables as text (any separator, decimal commas, comments, a row of units, no header), NumPy's .npz, JSON, MCAP with
+/// messages in JSON and, where built with `--features parquet`, Parquet. Says what it took for what, what it changed and what
+/// it left out. Values that no recording tells stand as nan in rig.toml, to be filled in.
+#[derive(Args)]
+#[command(after_help = examples!("Examples:
+  host-sim import run1.csv run2.csv --out imported
+  host-sim import log.csv --column position=theta:deg --column command=-tau:mNm --out imported
+  host-sim import log.npz --rate 1000 --split 0.6 --inertia 0.17 --gain 1 --out imported"))]
+pub(crate) struct Import {
+    /// Recordings; several files of one run in the order of their time, or with different columns of it
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Folder to write to; made where there is none
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Which column is the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
+    /// turns the sign
+    #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
+    column: Vec<String>,
+    /// Rows a second, where no column tells the time
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Nothing drives the axis: the command is zero
+    #[arg(long)]
+    undriven: bool,
+    /// Encoder counts a turn of the coordinate
+    #[arg(long, value_name = "N")]
+    counts_per_turn: Option<f64>,
+    /// Encoder counts per rad or m
+    #[arg(long, value_name = "N", conflicts_with = "counts_per_turn")]
+    counts_per_unit: Option<f64>,
+    /// A rig file that exists already: its resolution is used, and no other is written
+    #[arg(long, value_name = "RIG.toml")]
+    rig: Option<PathBuf>,
+    /// Inertia for rig.toml, kg·m² or kg
+    #[arg(long, value_name = "J")]
+    inertia: Option<f64>,
+    /// Force for one unit of command, for rig.toml, N·m or N
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    gain: Option<f64>,
+    /// Cut every run at this part of its length: fit.csv and holdout.csv
+    #[arg(long, value_name = "PART")]
+    split: Option<f64>,
+    /// Keep what is recorded at rest
+    #[arg(long)]
+    keep_idle: bool,
+    /// Keep positions that jump by a turn
+    #[arg(long)]
+    keep_wraps: bool,
+}
+
+impl Import {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let positive = [
+            ("--rate", self.rate),
+            ("--counts-per-turn", self.counts_per_turn),
+            ("--counts-per-unit", self.counts_per_unit),
+            ("--inertia", self.inertia),
+        ];
+        for (option, value) in positive {
+            if value.is_some_and(|x| !(x.is_finite() && x > 0.0)) {
+                return Err(Failure::input(format_args!("{option} must be a number above zero; correct it")));
+            }
+        }
+        if self.gain.is_some_and(|x| !x.is_finite() || x == 0.0) {
+            return Err(Failure::input("--gain must be a number other than zero; correct it"));
+        }
+        if self.split.is_some_and(|x| !(0.1..=0.9).contains(&x)) {
+            return Err(Failure::input("--split must lie between 0.1 and 0.9; 0.6 is usual"));
+        }
+        let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
+        let done = import::import(&Request {
+            files: self.files,
+            columns,
+            known: Known { rate_hz: self.rate, undriven: self.undriven },
+            counts_per_turn: self.counts_per_turn,
+            counts_per_unit: self.counts_per_unit,
+            values: RigValues { inertia: self.inertia, gain: self.gain },
+            rig: self.rig,
+            keep: Keep { idle: self.keep_idle, wraps: self.keep_wraps },
+            split: self.split,
+            out: self.out.clone(),
+        })?;
+        for note in &done.notes {
+            say!("{note}");
+        }
+        for file in &done.recordings {
+            let rate = (file.rows - 1) as f64 / file.seconds;
+            say!("{} rows={} seconds={:.3} rate_hz={rate:.1}", file.path.display(), file.rows, file.seconds);
+        }
+        if done.to_fill_in {
+            say!("{}: fill in the values that stand as nan", done.rig.display());
+        }
+        next(&done, &self.out);
+        Ok(())
+    }
+}
+
+/// The command that comes next.
+fn next(done: &import::Imported, out: &std::path::Path) {
+    let paths: Vec<String> = done.recordings.iter().map(|r| r.path.display().to_string()).collect();
+    let holds_out = |path: &&String| path.rsplit('/').next().is_some_and(|name| name.starts_with("holdout"));
+    let (mut held, mut fit): (Vec<&String>, Vec<&String>) = paths.iter().partition(holds_out);
+    if held.is_empty()
+        && fit.len() > 1
+        && let Some(last) = fit.pop()
+    {
+        held.push(last);
+    }
+    if held.is_empty() {
+        say!("next: another recording, to hold out, or import this one again with --split 0.6");
+        return;
+    }
+    let list =
+        |option: &str, files: &[&String]| files.iter().map(|f| format!(" {option} {f}")).collect::<String>();
+    say!(
+        "next: host-sim diagnose --rig {}{}{} --out {}",
+        done.rig.display(),
+        list("--fit", &fit),
+        list("--holdout", &held),
+        out.join("report").display()
+    );
+}

@@ -1,0 +1,79 @@
+"""Writes the same short recording as other programs write it, into the folder given.
+
+pip install numpy==2.4.6 pandas==3.1.1 pyarrow==26.0.1 mcap==1.6.0; python make.py DIR
+
+The motion is one that tests/import.rs knows: 2.5 s at 200 rows a second, an angle of 0.8·sin(2π·0.9·t) + 0.3·sin(2π·2.3·t) rad
+under a torque of 0.4·cos(2π·0.9·t) N·m.
+"""
+
+import io
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from mcap.writer import CompressionType, Writer
+
+out = Path(sys.argv[1])
+t = np.arange(500) / 200.0
+q = 0.8 * np.sin(2 * np.pi * 0.9 * t) + 0.3 * np.sin(2 * np.pi * 2.3 * t)
+v = 0.8 * 2 * np.pi * 0.9 * np.cos(2 * np.pi * 0.9 * t) + 0.3 * 2 * np.pi * 2.3 * np.cos(2 * np.pi * 2.3 * t)
+u = 0.4 * np.cos(2 * np.pi * 0.9 * t)
+
+# pandas, with its index, dates and degrees.
+stamps = pd.Timestamp("2024-03-01 10:00:00") + pd.to_timedelta(t, unit="s")
+pd.DataFrame({"timestamp": stamps, "theta_deg": np.degrees(q), "tau [Nm]": u, "note": "ok"}).to_csv(out / "pandas.csv")
+
+# pandas, as Germans set it up: semicolons, decimal commas, millinewtonmetres, milliseconds.
+frame = pd.DataFrame({"Zeit (ms)": 1000 * t, "Winkel (deg)": np.degrees(q), "Moment (mNm)": 1000 * u})
+frame.to_csv(out / "semicolons.csv", sep=";", decimal=",", index=False, float_format="%.6f")
+
+# As MATLAB's fprintf and dlmwrite leave it: a percent sign, tabs, five digits, a row of units.
+lines = ["% Bench 3, exported from MATLAB", "time\tposition\tcurrent", "s\trad\tmA"]
+lines += [f"{a:.5f}\t{b:.7e}\t{c:.7e}" for a, b, c in zip(t, q, 2000 * u)]
+(out / "matlab.csv").write_text("\n".join(lines) + "\n")
+
+# NumPy, compressed, with what is no column beside.
+np.savez_compressed(out / "arrays.npz", t=t, q=q.astype(np.float32), tau=u, mass=np.array(0.4), name=np.array("bench"))
+
+# JSON in three of pandas' ways, and lines.
+frame = pd.DataFrame({"time": t, "angle_rad": q, "torque_nm": u})
+for orient in ["columns", "records", "split"]:
+    (out / f"{orient}.json").write_text(frame.round(9).to_json(orient=orient, double_precision=9))
+(out / "lines.jsonl").write_text(frame.to_json(orient="records", lines=True, double_precision=9))
+
+# MCAP by the Python package, in its usual compression: two topics of different rates, JSON.
+for name, compression in [("zstd", CompressionType.ZSTD), ("lz4", CompressionType.LZ4)]:
+    buffer = io.BytesIO()
+    writer = Writer(buffer, compression=compression)
+    writer.start()
+    schema = writer.register_schema(name="any", encoding="jsonschema", data=b'{"type": "object"}')
+    joint = writer.register_channel(topic="/joint", message_encoding="json", schema_id=schema)
+    drive = writer.register_channel(topic="/drive", message_encoding="json", schema_id=schema)
+    for i, (a, b, c) in enumerate(zip(t, q, u)):
+        stamp = 1_700_000_000_000_000_000 + round(a * 1e9)
+        if i % 2 == 0:
+            message = json.dumps({"torque_nm": c}).encode()
+            writer.add_message(drive, log_time=stamp, publish_time=stamp, data=message)
+        message = json.dumps({"state": {"position_rad": b}, "ok": True}).encode()
+        writer.add_message(joint, log_time=stamp, publish_time=stamp, data=message)
+    writer.finish()
+    (out / f"{name}.mcap").write_bytes(buffer.getvalue())
+
+# Arrow's Parquet, snappy as it does by itself.
+pd.DataFrame({"time": t, "angle_rad": q, "torque_nm": u}).to_parquet(out / "arrow.parquet", index=False)
+
+# Degrees that wrap, speed alone, counts of a converter, stamps of a coarse clock, one stretch missing, rest at both ends.
+pd.DataFrame({"t": t, "theta_deg": np.degrees(np.mod(9 * q, 2 * np.pi)), "tau_nm": u}).to_csv(out / "wrapped.csv", index=False)
+pd.DataFrame({"t": t, "speed_rpm": v * 60 / (2 * np.pi), "tau_nm": u}).to_csv(out / "speed.csv", index=False)
+counts = np.round(q * 4096 / (2 * np.pi)).astype(int)
+pd.DataFrame({"t": np.arange(500) // 4 * 20.0, "enc": counts, "u_v": u}).to_csv(out / "coarse.csv", index=False)
+gap = (t < 1.1) | (t > 1.4)
+pd.DataFrame({"t": t[gap], "enc": counts[gap], "u_v": u[gap]}).to_csv(out / "gap.csv", index=False)
+rest = np.concatenate([np.arange(600) / 200.0, 3 + t, 5.5 + np.arange(600) / 200.0])
+pad = lambda x: np.concatenate([np.full(600, x[0]), x, np.full(600, x[-1])])
+pd.DataFrame({"t": rest, "enc": pad(counts), "u_v": pad(u)}).to_csv(out / "rest.csv", index=False)
+half = len(t) // 2
+for name, part in [("first", slice(0, half)), ("second", slice(half, None))]:
+    pd.DataFrame({"t": t[part], "enc": counts[part], "u_v": u[part]}).to_csv(out / f"{name}.csv", index=False)
