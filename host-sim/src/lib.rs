@@ -18,5 +18,6 @@ pub mod replay;
 pub mod score;
 pub mod session;
 pub mod station;
+pub mod streams;
 pub mod tally;
 pub mod visualizer;

@@ -6,6 +6,7 @@ mod import;
 mod progress;
 mod recordings;
 mod run;
+mod streams;
 
 use clap::{Parser, Subcommand};
 use host_sim::failure::Failure;

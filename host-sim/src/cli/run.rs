@@ -1,6 +1,7 @@
 //! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
 
 use super::progress::Progress;
+use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
 use control_core::TICK_HZ;
 use host_sim::device::serial::SerialPort;
@@ -58,6 +59,8 @@ pub(crate) struct Run {
     /// Port of the page on this computer; 0 takes any free one
     #[arg(long, default_value_t = 8710, value_name = "N")]
     port: u16,
+    #[command(flatten)]
+    streams: StreamFlags,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -82,6 +85,7 @@ impl Run {
         let shown_procedure = is_virtual.then(|| procedure.name.clone());
         let (session, publisher) = session::open(profile.scene(source, shown_procedure.clone()));
         // The port is taken before the file is made: a page that cannot be served must not cost a recording.
+        let _streams = self.streams.serve(&session)?;
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
             program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
@@ -124,6 +128,7 @@ impl Run {
 
     /// What clap cannot check.
     fn check(&self) -> Result<Option<f64>, Failure> {
+        self.streams.check()?;
         let not_yet = |name: &str| {
             Err(Failure::input(format_args!(
                 "--model {name} is not built yet: only the jog effect and the friction cone are; use --model jog"

@@ -1,0 +1,37 @@
+//! The flags of the live streams.
+
+use clap::Args;
+use host_sim::failure::Failure;
+use host_sim::session::Session;
+use host_sim::streams::{self, Spec, Streams, Token};
+
+#[derive(Args)]
+pub(crate) struct StreamFlags {
+    /// Stream poses live, as often as wanted: openigtlink (3D Slicer, port 18944), websocket (JSON, 8711), udp (JSON for
+    /// PlotJuggler, 9870), foxglove (8765); on this computer unless an address says otherwise
+    #[arg(long = "stream", value_name = "KIND[=ADDRESS:PORT]")]
+    streams: Vec<Spec>,
+    /// What a client on another computer has to give first; at least 12 characters
+    #[arg(long = "stream-token", value_name = "TOKEN")]
+    token: Option<Token>,
+}
+
+impl StreamFlags {
+    /// What clap cannot check.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        self.streams.iter().try_for_each(|spec| spec.check(self.token.as_ref())).map_err(Failure::input)
+    }
+
+    /// Serves what was asked for and says where.
+    pub(crate) fn serve(&self, session: &Session) -> Result<Option<Streams>, Failure> {
+        if self.streams.is_empty() {
+            return Ok(None);
+        }
+        let served =
+            streams::serve(session.clone(), &self.streams, self.token.as_ref()).map_err(Failure::failed)?;
+        for (kind, address) in served.addresses() {
+            say!("{kind} stream at {address}");
+        }
+        Ok(Some(served))
+    }
+}

@@ -1,0 +1,121 @@
+//! The newest pose of a session, for whoever asks.
+
+use crate::session::{Happening, Session};
+use crate::visualizer::condense::Condenser;
+use crate::visualizer::messages;
+use serde::Serialize;
+use std::time::Duration;
+use tokio::sync::watch;
+use tokio::time::{MissedTickBehavior, interval};
+
+/// Between two looks at the session: 4 ms, 250 poses a second at the most.
+const PERIOD: Duration = Duration::from_millis(4);
+
+/// What is known now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// The newest pose; none before the first.
+    pub pose: Option<NeedlePose>,
+    /// Whether the device answers.
+    pub connected: bool,
+    /// The fault that has latched, in words.
+    pub fault: Option<String>,
+    /// Events so far, and the last of them.
+    pub events: (u64, Option<messages::Event>),
+}
+
+/// Where the needle is and what it feels, as it goes out in JSON; units stand in the names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NeedlePose {
+    /// Seconds of the device's own clock.
+    pub t_s: f64,
+    /// Depth of the tip along the needle past the zero.
+    pub depth_mm: f64,
+    /// Speed, positive inwards.
+    pub speed_mm_s: f64,
+    /// Force that the control core asked for, positive where it resists insertion.
+    pub force_n: f64,
+    /// Force that the motor gives at the needle after all limits, the same sign.
+    pub motor_n: f64,
+    /// Inclination of the needle below the horizontal.
+    pub tilt_rad: f64,
+    /// Tip from the point of entry: along the skin, across, and out of the skin (negative inside).
+    pub tip_mm: [f64; 3],
+    /// Unit vector of the needle in the direction of insertion, the same axes.
+    pub direction: [f64; 3],
+    /// The state of the control law, as [`messages::Pose::state`] names it.
+    pub state: &'static str,
+}
+
+impl From<&messages::Pose> for NeedlePose {
+    fn from(pose: &messages::Pose) -> Self {
+        let (sine, cosine) = pose.tilt_rad.sin_cos();
+        let direction = [cosine, 0.0, -sine];
+        Self {
+            t_s: pose.t_s,
+            depth_mm: pose.depth_mm,
+            speed_mm_s: pose.speed_mm_s,
+            force_n: pose.force_n,
+            motor_n: pose.motor_n,
+            tilt_rad: pose.tilt_rad,
+            tip_mm: direction.map(|part| part * pose.depth_mm),
+            direction,
+            state: pose.state,
+        }
+    }
+}
+
+/// Keeps `publish` at the newest of `session` for ever.
+pub(super) async fn run(session: Session, publish: watch::Sender<Snapshot>) {
+    let mut subscription = session.subscribe();
+    let mut condenser = Condenser::default();
+    let mut due = interval(PERIOD);
+    due.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        due.tick().await;
+        let batch = subscription.drain();
+        let happened = batch.events.len() as u64;
+        let faults = batch.events.iter().filter_map(fault).next_back();
+        let connected = batch.link.connected;
+        let (_, frame) = condenser.take(batch);
+        publish.send_if_modified(|snapshot| {
+            let before = snapshot.clone();
+            snapshot.connected = connected;
+            if let Some(fault) = faults {
+                snapshot.fault = fault;
+            }
+            if let Some(pose) = &frame.pose {
+                snapshot.pose = Some(pose.into());
+            }
+            snapshot.events.0 += happened;
+            if let Some(event) = frame.events.into_iter().next_back() {
+                snapshot.events.1 = Some(event);
+            }
+            *snapshot != before
+        });
+    }
+}
+
+/// What an event says of the latched fault: one latches, a start clears it, others say nothing.
+fn fault(happening: &Happening) -> Option<Option<String>> {
+    match happening.event.kind {
+        link::frames::EventKind::Fault { cause } => Some(Some(cause.to_string())),
+        link::frames::EventKind::Started => Some(None),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tip_goes_down_along_the_needle() {
+        let pose =
+            messages::Pose { depth_mm: 9.6, tilt_rad: 30_f64.to_radians(), ..messages::Pose::default() };
+        let needle = NeedlePose::from(&pose);
+        assert!((needle.tip_mm[2] + 4.8).abs() < 1e-9, "{:?}", needle.tip_mm);
+        assert!((needle.tip_mm[0] - 9.6 * 30_f64.to_radians().cos()).abs() < 1e-9);
+        assert!((needle.direction.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

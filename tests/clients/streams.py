@@ -1,0 +1,104 @@
+"""The live streams as other people's programs read them: pyigtl (3D Slicer's protocol), websockets, plain UDP.
+
+Run by `cargo xtask test clients` with host-sim's path; everything is on loopback.
+"""
+
+import asyncio
+import json
+import math
+import re
+import socket
+import subprocess
+import sys
+import time
+
+import pyigtl
+import websockets
+
+PATIENCE_S = 20
+
+
+def start(program, *flags):
+    """A virtual device with `flags`, and the ports that it says it serves."""
+    command = [program, "run", "--headless", *flags]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    ports = {}
+    while len(ports) < flags.count("--stream"):
+        line = child.stdout.readline()
+        found = re.match(r"(\w+) stream at [\d.]+:(\d+)", line)
+        if not found:
+            child.kill()
+            raise SystemExit(f"host-sim said {line!r} instead of where a stream is")
+        ports[found[1]] = int(found[2])
+    return child, ports
+
+
+def check_openigtlink(port):
+    client = pyigtl.OpenIGTLinkClient("127.0.0.1", port)
+    seen, tips = {}, []
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end and not ({"TRANSFORM", "STATUS"} <= set(seen) and len(tips) > 20):
+        for message in client.get_latest_messages():
+            seen[message.message_type] = message
+            if message.message_type == "TRANSFORM":
+                tips.append(message.matrix[:3, 3])
+        time.sleep(0.02)
+    client.stop()
+    assert {"TRANSFORM", "STATUS"} <= set(seen), f"got {sorted(seen)}"
+    matrix = seen["TRANSFORM"].matrix
+    for row in range(3):
+        length = math.sqrt(sum(matrix[row, column] ** 2 for column in range(3)))
+        assert abs(length - 1) < 1e-5, f"row {row} of the rotation is {length} long"
+    assert seen["TRANSFORM"].device_name == "Needle"
+    assert any(abs(a - b).max() > 0.01 for a, b in zip(tips, tips[1:])), "the needle does not move"
+    print(f"openigtlink: pass ({len(tips)} transforms, status {seen['STATUS'].code})")
+
+
+async def read_websocket(port, count):
+    async with websockets.connect(f"ws://127.0.0.1:{port}/pose") as client:
+        return [json.loads(await asyncio.wait_for(client.recv(), PATIENCE_S)) for _ in range(count)]
+
+
+def check_poses(name, poses):
+    times = [pose["t_s"] for pose in poses]
+    assert times == sorted(times) and times[-1] > times[0], f"times {times[:3]}…{times[-3:]}"
+    for pose in poses:
+        tip = math.sqrt(sum(part * part for part in pose["tip_mm"]))
+        assert abs(tip - abs(pose["depth_mm"])) < 1e-6, pose
+        assert {"force_n", "motor_n", "speed_mm_s", "tilt_rad", "state"} <= set(pose)
+    print(f"{name}: pass ({len(poses)} poses)")
+
+
+def check_udp(receiver, count):
+    poses = [json.loads(receiver.recv(4096)) for _ in range(count)]
+    assert all(pose["timestamp"] == pose["t_s"] for pose in poses)
+    check_poses("udp", poses)
+
+
+def check_token(program):
+    """Beyond this computer nothing is served without a token."""
+    done = subprocess.run([program, "run", "--headless", "--stream", "websocket=0.0.0.0:0"], capture_output=True, text=True)
+    assert done.returncode == 2 and "--stream-token" in done.stderr, done
+    print("token: pass")
+
+
+def main(program):
+    check_token(program)
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", 0))
+    receiver.settimeout(PATIENCE_S)
+    udp = f"udp=127.0.0.1:{receiver.getsockname()[1]}"
+    child, ports = start(
+        program, "--stream", udp, "--stream", "openigtlink=127.0.0.1:0", "--stream", "websocket=127.0.0.1:0"
+    )
+    try:
+        check_udp(receiver, 100)
+        check_poses("websocket", asyncio.run(read_websocket(ports["websocket"], 100)))
+        check_openigtlink(ports["openigtlink"])
+    finally:
+        child.terminate()
+        child.wait(PATIENCE_S)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
