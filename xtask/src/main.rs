@@ -21,7 +21,7 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt clippy doc unit firmware board browser fuzz prove
+                                fmt clippy doc unit firmware board browser clients fuzz prove
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask bench             measures, prints the table and writes target/bench.json

@@ -2,7 +2,7 @@
 
 use crate::shell::{self, Failure};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Whether we may install packages of the system.
@@ -42,6 +42,34 @@ pub(crate) fn browser() -> Result<(), Failure> {
         return Ok(());
     }
     install(&["chromium"], "the browser test")
+}
+
+/// A Python of our own in `target/`, with exactly these packages (`name==version`) beside what it already has; its interpreter.
+pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Failure> {
+    let folder = shell::target().join("python");
+    let interpreter = folder.join("bin/python");
+    if !interpreter.exists() {
+        if !shell::is_on_path("python3") {
+            install(&["python3", "python3-venv"], "the test of other programs' formats")?;
+        }
+        let made = shell::run(Command::new("python3").args(["-m", "venv"]).arg(&folder));
+        if made.is_err() {
+            // Debian's python3 comes without the module.
+            install(&["python3-venv"], "the test of other programs' formats")?;
+            shell::run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder))?;
+        }
+    }
+    let mut listed = Command::new(&interpreter);
+    let listed = shell::output(listed.args(["-m", "pip", "list", "--format=freeze"]))?;
+    let missing: Vec<&&str> =
+        packages.iter().filter(|name| !listed.lines().any(|line| line == **name)).collect();
+    if !missing.is_empty() {
+        let mut pip = Command::new(&interpreter);
+        shell::run(
+            pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(missing),
+        )?;
+    }
+    Ok(interpreter)
 }
 
 /// How the image for the board is built on this machine.

@@ -28,7 +28,7 @@ enum Ended {
 }
 
 /// In the order that finds the most for the least time.
-const STEPS: [Step; 9] = [
+const STEPS: [Step; 10] = [
     Step { name: "fmt", shows: "the sources are formatted", run: fmt },
     Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
     Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
@@ -36,6 +36,7 @@ const STEPS: [Step; 9] = [
     Step { name: "unit", shows: "the crates' tests", run: unit },
     Step { name: "board", shows: "the flash image on the emulated board", run: board },
     Step { name: "browser", shows: "the page in a real browser", run: browser },
+    Step { name: "clients", shows: "the live streams as other people's programs read them", run: clients },
     Step { name: "fuzz", shows: "the frame parser, a minute of damaged frames", run: fuzz },
     Step { name: "prove", shows: "the small proof of the diagnosis", run: prove },
 ];
@@ -185,6 +186,17 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
     }
     setup::browser()?;
     passed(clock.run(tests().args(["-p", "tests"]).args(each(names.into_iter()))))
+}
+
+/// Libraries of other people, each at the version that the check was written against.
+const CLIENTS: [&str; 2] = ["pyigtl==0.3.4", "websockets==17.4"];
+
+fn clients(clock: &Clock) -> Result<Ended, Failure> {
+    let python = setup::python(&CLIENTS)?;
+    clock.run(cargo().args(["build", "--release", "--quiet", "-p", "host-sim", ANY_RUST]))?;
+    let top = shell::top();
+    let program = shell::target().join("release/host-sim");
+    passed(clock.run(Command::new(python).arg(top.join("tests/clients/streams.py")).arg(program)))
 }
 
 fn fuzz(clock: &Clock) -> Result<Ended, Failure> {
