@@ -1,5 +1,6 @@
 // Puts the parts together: messages in, one picture per screen refresh out.
 
+import { BodyView } from "./body.js";
 import { colours } from "./canvas.js";
 import { EventList } from "./events.js";
 import { Hand } from "./hand.js";
@@ -21,6 +22,7 @@ const timePlot = new TimePlot(byId("time-plot"), palette);
 const phasePlot = new PhasePlot(byId("phase-plot"), palette);
 const events = new EventList(byId("events"));
 const panel = new Panel();
+const body = new BodyView(palette);
 
 let scene = { layers: [] };
 let tissue = new Tissue([]);
@@ -43,6 +45,7 @@ const receive = {
     events.clear();
     hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm);
     panel.scene(scene);
+    body.setScene(scene);
   },
   device(message) {
     panel.device(message);
@@ -62,6 +65,8 @@ const receive = {
     view.speed = pose.speed_mm_s;
     view.torque = pose.torque_mnm;
     view.tilt = pose.tilt_rad;
+    view.angle = pose.angle_rad;
+    view.vessel = pose.vessel;
     view.state = pose.state;
     panel.limits(pose.limits, performance.now());
     hand.follow(message.hand, pose.depth_mm, pose.tilt_rad);
@@ -70,6 +75,7 @@ const receive = {
 
 function happen(event) {
   tissue.happen(event);
+  body.happen(event);
   events.add(event, scene.layers);
   if (event.limits) panel.limits(event.limits, performance.now());
   if (event.kind === "puncture") {
@@ -97,7 +103,8 @@ function draw(nowMs) {
   const condition = link.condition;
   const now = clock.now(performance.now());
   tissue.move(view.depth, view.force, view.seconds);
-  section.draw(view, tissue);
+  if (!body.open) section.draw(view, tissue);
+  body.draw(view);
   timePlot.draw(trace, now);
   phasePlot.draw(trace, now);
   if (nowMs - lastPanel >= PANEL_MS) {

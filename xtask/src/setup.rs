@@ -91,35 +91,45 @@ const DEBIAN_LINKER: &str = "/usr/bin/rust-lld";
 
 /// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's compiler.
 pub(crate) fn toolchain() -> Result<Toolchain, Failure> {
-    if has_target() {
+    toolchain_for(TARGET, "the image for the board")
+}
+
+/// The same for any `target`; `what_for` says who needs it.
+pub(crate) fn toolchain_for(target: &str, what_for: &str) -> Result<Toolchain, Failure> {
+    if has_target(target) {
         return Ok(Toolchain::Installed);
     }
     if shell::is_on_path("rustup") {
-        eprintln!("the image for the board needs the Rust target {TARGET}: installing");
+        eprintln!("{what_for} needs the Rust target {target}: installing");
         let added =
-            shell::run(Command::new("rustup").current_dir(shell::top()).args(["target", "add", TARGET]));
-        if added.is_ok() && has_target() {
+            shell::run(Command::new("rustup").current_dir(shell::top()).args(["target", "add", target]));
+        if added.is_ok() && has_target(target) {
             return Ok(Toolchain::Installed);
         }
         eprintln!("rustup could not add it; trying Debian's compiler, which builds the core library itself");
     }
     if !has_debian_compiler() {
-        install(&DEBIAN_PACKAGES, "the image for the board")?;
+        install(&DEBIAN_PACKAGES, what_for)?;
     }
     if let Some(package) = missing_debian_linker() {
-        install(&[&package], "the image for the board")?;
+        install(&[&package], what_for)?;
     }
     if has_debian_compiler() {
         Ok(Toolchain::Debian)
     } else {
         Err(Failure::new(format!(
-            "there is no way to build for the board on this machine; install the target with `rustup target add {TARGET}`"
+            "there is no way to build {what_for} on this machine; install the target with `rustup target add {target}`"
         )))
     }
 }
 
 /// Cargo as `toolchain` wants it, for a command such as `build`.
 pub(crate) fn cargo_for_board(toolchain: Toolchain, subcommand: &str) -> Command {
+    cargo_with(toolchain, subcommand, "core")
+}
+
+/// The same where the crates of the standard library in `library` are needed.
+pub(crate) fn cargo_with(toolchain: Toolchain, subcommand: &str, library: &str) -> Command {
     match toolchain {
         Toolchain::Installed => {
             let mut cargo = shell::cargo();
@@ -129,17 +139,18 @@ pub(crate) fn cargo_for_board(toolchain: Toolchain, subcommand: &str) -> Command
         Toolchain::Debian => {
             let mut cargo = Command::new("/usr/bin/cargo");
             cargo.current_dir(shell::top());
-            // `-Z` on a stable compiler: only the core library is built with it, from the compiler's own sources.
+            // `-Z` on a stable compiler: only the library is built with it, from the compiler's own sources.
             cargo.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
-            cargo.args([subcommand, "-Zbuild-std=core"]);
+            cargo.arg(subcommand).arg(format!("-Zbuild-std={library}"));
             cargo
         }
     }
 }
 
-fn has_target() -> bool {
+/// Whether the compiler at hand has the core library of `target`.
+pub(crate) fn has_target(target: &str) -> bool {
     let mut rustc = Command::new("rustc");
-    rustc.current_dir(shell::top()).args(["--print", "target-libdir", "--target", TARGET]);
+    rustc.current_dir(shell::top()).args(["--print", "target-libdir", "--target", target]);
     shell::output(&mut rustc).is_ok_and(|folder| {
         fs::read_dir(folder.trim()).is_ok_and(|entries| {
             entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))

@@ -2,7 +2,7 @@
 
 use crate::setup::{self, TARGET};
 use crate::shell::{self, Failure, cargo};
-use crate::{firmware, setup::Toolchain};
+use crate::{firmware, setup::Toolchain, wasm};
 use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -28,12 +28,13 @@ enum Ended {
 }
 
 /// In the order that finds the most for the least time.
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 11] = [
     Step { name: "fmt", shows: "the sources are formatted", run: fmt },
     Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
     Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
     Step { name: "doc", shows: "the documentation builds without warnings, its examples run", run: doc },
     Step { name: "unit", shows: "the crates' tests", run: unit },
+    Step { name: "wasm", shows: "what the page computes is built from its sources", run: page_wasm },
     Step { name: "board", shows: "the flash image on the emulated board", run: board },
     Step { name: "browser", shows: "the page in a real browser", run: browser },
     Step { name: "clients", shows: "the live streams as other people's programs read them", run: clients },
@@ -171,6 +172,11 @@ fn image(clock: &Clock) -> Result<Ended, Failure> {
         "-D",
         "warnings",
     ])))
+}
+
+fn page_wasm(_: &Clock) -> Result<Ended, Failure> {
+    eprintln!("checked {}", wasm::check()?);
+    Ok(Ended::Passed)
 }
 
 fn board(clock: &Clock) -> Result<Ended, Failure> {

@@ -4,14 +4,14 @@
 pub(super) struct Asset {
     pub(super) path: &'static str,
     pub(super) content_type: &'static str,
-    pub(super) body: &'static str,
+    pub(super) body: &'static [u8],
 }
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 macro_rules! asset {
     ($path:literal, $file:literal, $content_type:expr) => {
-        Asset { path: $path, content_type: $content_type, body: include_str!(concat!("../../page/", $file)) }
+        Asset { path: $path, content_type: $content_type, body: include_bytes!(concat!("../../page/", $file)) }
     };
 }
 
@@ -30,4 +30,11 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/trace.js", "trace.js", SCRIPT),
     asset!("/events.js", "events.js", SCRIPT),
     asset!("/hand.js", "hand.js", SCRIPT),
+    asset!("/body.js", "body.js", SCRIPT),
+    asset!("/bytes.js", "bytes.js", SCRIPT),
+    asset!("/picture.js", "picture.js", SCRIPT),
+    asset!("/tissue3d.js", "tissue3d.js", SCRIPT),
+    asset!("/ultrasound.js", "ultrasound.js", SCRIPT),
+    // A build product: `cargo xtask wasm`.
+    asset!("/picture.wasm", "picture.wasm", "application/wasm"),
 ];

@@ -145,7 +145,8 @@ fn file(asset: &'static Asset) -> Response {
         (header::CONTENT_TYPE, asset.content_type),
         // A newer program at the same address must not meet the older one's page.
         (header::CACHE_CONTROL, "no-cache"),
-        (header::CONTENT_SECURITY_POLICY, "default-src 'self'"),
+        // Tissue and ultrasound are WebAssembly.
+        (header::CONTENT_SECURITY_POLICY, "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'"),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     ];
     (headers, asset.body).into_response()

@@ -1,0 +1,80 @@
+// The second view of the picture: limb in three dimensions and ultrasound, started only when somebody looks at it.
+
+import { Picture } from "./picture.js";
+import { Tissue3d } from "./tissue3d.js";
+import { Ultrasound } from "./ultrasound.js";
+
+const byId = (id) => document.getElementById(id);
+
+export class BodyView {
+  constructor(colours) {
+    this.colours = colours;
+    this.open = false;
+    this.picture = null;
+    this.waiting = null;
+    this.scene = null;
+    this.stats = { frames: 0, stepMs: NaN, imageMs: NaN };
+    window.__body = this.stats;
+    byId("view-section").addEventListener("click", () => this.show(false));
+    byId("view-body").addEventListener("click", () => this.show(true));
+  }
+
+  /** Goes to this view or back to the section. */
+  show(open) {
+    this.open = open;
+    document.body.dataset.view = open ? "body" : "section";
+    byId("view-section").setAttribute("aria-pressed", String(!open));
+    byId("view-body").setAttribute("aria-pressed", String(open));
+    if (open && !this.waiting) this.waiting = this.start();
+  }
+
+  async start() {
+    try {
+      this.picture = await Picture.load();
+      this.limb = new Tissue3d(byId("limb"), this.colours);
+      this.ultrasound = new Ultrasound(byId("ultrasound"), this.colours);
+      if (this.scene) this.build();
+    } catch (error) {
+      this.picture = null;
+      byId("body-note").textContent = `Not to be drawn here: ${error.message}`;
+    }
+  }
+
+  /** Another anatomy. */
+  setScene(scene) {
+    this.scene = scene;
+    if (this.picture) this.build();
+  }
+
+  build() {
+    const angle = this.scene.tilt_rad - (this.scene.skin_tilt_rad ?? 0);
+    if (!this.picture.build(this.scene, angle)) {
+      byId("body-note").textContent = "This anatomy cannot be drawn";
+      return;
+    }
+    byId("body-note").textContent = "";
+    this.limb.build(this.picture, this.scene);
+  }
+
+  happen(event) {
+    if (this.picture?.built) this.picture.happen(event);
+  }
+
+  /** One picture; `view` as main.js keeps it. */
+  draw(view) {
+    if (!this.open || !this.picture?.built) return;
+    const angle = view.angle ?? view.tilt - (this.scene.skin_tilt_rad ?? 0);
+    const begin = performance.now();
+    // A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up.
+    this.picture.step(Math.min(Math.max(view.seconds, 1 / 120), 1 / 20), view.depth, angle);
+    const stepped = performance.now();
+    this.limb.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
+    const drawn = performance.now();
+    this.ultrasound.draw(this.picture, view.seconds);
+    this.stats.stepMs = stepped - begin;
+    this.stats.drawMs = drawn - stepped;
+    this.stats.imageMs = performance.now() - drawn;
+    this.stats.share = this.ultrasound.seen?.share ?? NaN;
+    this.stats.frames++;
+  }
+}

@@ -1,0 +1,82 @@
+// Tissue and ultrasound as page-wasm computes them; page-wasm/src/lib.rs is the other side and documents each function.
+
+import { bytes } from "./bytes.js";
+
+const TISSUES = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+const VESSEL = 7;
+const FAR_WALL = 8;
+export const KINDS = { skinBehind: 0, skinBefore: 1, section: 2, vesselBehind: 3, vesselBefore: 4 };
+export const LINES = 256;
+export const SAMPLES = 1024;
+export const SLICES = 64;
+/** What is drawn of the limb along the insertion, as tissue/src/configuration.rs has it. */
+export const ALONG_MM = [-9.1, 26];
+export const HALF_WIDTH_MM = 10.4;
+export const LIMB_RADIUS_MM = 42;
+export const IMAGE_MM = { width: 30, depth: 16 };
+
+export class Picture {
+  /** Fetches and starts it; fails where the browser cannot. */
+  static async load() {
+    const { instance } = await WebAssembly.instantiate(await bytes("picture.wasm"), {});
+    return new Picture(instance.exports);
+  }
+
+  constructor(core) {
+    this.core = core;
+    this.built = false;
+  }
+
+  /** Builds the tissue of a scene at an angle to the skin (rad); false where it cannot be drawn. */
+  build(scene, angle) {
+    const numbers = [scene.layers.length];
+    for (const layer of scene.layers) {
+      const tissue = layer.is_vessel ? VESSEL : layer.is_far_wall ? FAR_WALL : Math.max(0, TISSUES.indexOf(layer.name));
+      numbers.push(tissue, layer.depth_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
+    }
+    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle);
+    new Float32Array(this.core.memory.buffer, this.core.input(), numbers.length).set(numbers);
+    this.built = this.core.build(numbers.length) === 1;
+    return this.built;
+  }
+
+  /** Follows an event of the device. */
+  happen(event) {
+    if (event.layer === null || event.layer === undefined) return;
+    if (["puncture", "vessel", "far_wall", "flashback"].includes(event.kind)) this.core.tell(event.layer, 1);
+    if (event.kind === "exit") this.core.tell(event.layer, 0);
+  }
+
+  step(seconds, depth, angle) {
+    this.core.step(seconds, depth, angle);
+  }
+
+  floats(pointer, count) {
+    return new Float32Array(this.core.memory.buffer, pointer, count);
+  }
+
+  get points() { return this.floats(this.core.points(), 4 * this.core.particles()); }
+  get normals() { return this.floats(this.core.normals(), 4 * this.core.particles()); }
+  get lumen() { return this.floats(this.core.lumen(), 2 * SLICES); }
+
+  /** What is drawn: `{ kind, layer, triangles }`; the triangles are copies. */
+  surfaces() {
+    return Array.from({ length: this.core.surfaces() }, (_, i) => ({
+      kind: this.core.surface_kind(i),
+      layer: this.core.surface_layer(i),
+      triangles: new Uint32Array(this.core.memory.buffer, this.core.surface_triangles(i), 3 * this.core.surface_triangle_count(i)).slice(),
+    }));
+  }
+
+  /** An ultrasound image: brightness, line after line. */
+  image(probe, seconds, gain) {
+    this.core.probe(probe.along, probe.across, probe.azimuth, probe.lean);
+    return new Uint8Array(this.core.memory.buffer, this.core.image(seconds, gain), LINES * SAMPLES);
+  }
+
+  /** How much of the needle the last image shows, and did so far. */
+  get seen() {
+    const seen = (what) => this.core.seen(what);
+    return { share: seen(0), tip: seen(1) === 1, beside: seen(2), tipShare: seen(3), meanShare: seen(4), inserted: seen(5) };
+  }
+}

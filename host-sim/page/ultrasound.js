@@ -1,0 +1,137 @@
+// The ultrasound image beside the limb, and the probe that a person moves over the skin.
+
+import { IMAGE_MM, LINES, SAMPLES } from "./picture.js";
+import { surface } from "./canvas.js";
+
+/** How far the probe may be moved, mm and rad. */
+const REACH = { along: [-4, 20], across: [-8, 8], azimuth: [-Math.PI / 2, Math.PI / 2], lean: [-0.6, 0.6] };
+const ALONG_VIEW = { along: 8, across: 0, azimuth: 0, lean: 0 };
+/** Between two images: 30 a second look smooth, and leave time for the rest. */
+const EVERY_S = 1 / 31;
+
+export class Ultrasound {
+  /** @param {HTMLCanvasElement} canvas
+   *  @param {Record<string, string>} colours of style.css, by name */
+  constructor(canvas, colours) {
+    this.surface = surface(canvas);
+    this.colours = colours;
+    this.probe = { ...ALONG_VIEW };
+    this.since = Infinity;
+    this.image = document.createElement("canvas");
+    this.image.width = SAMPLES;
+    this.image.height = LINES;
+    this.context = this.image.getContext("2d");
+    this.pixels = this.context.createImageData(SAMPLES, LINES);
+    this.words = new Uint32Array(this.pixels.data.buffer);
+    this.greys = Uint32Array.from({ length: 256 }, (_, grey) => 0xff000000 | (grey * 0x010101));
+    this.seen = null;
+    this.sliders = ["along", "across", "azimuth"].map((name) => document.getElementById(`probe-${name}`));
+    this.movable(canvas);
+  }
+
+  movable(canvas) {
+    let last = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      last = event;
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (last?.pointerId !== event.pointerId) return;
+      const mm = IMAGE_MM.width / this.shown.width;
+      const [dx, dy] = [event.clientX - last.clientX, event.clientY - last.clientY];
+      if (event.shiftKey) this.move("azimuth", dx * 0.006);
+      else {
+        // The image follows the hand; up and down moves the probe out of its plane.
+        const [s, c] = [Math.sin(this.probe.azimuth), Math.cos(this.probe.azimuth)];
+        this.move("along", -dx * mm * c - dy * 0.03 * -s);
+        this.move("across", -dx * mm * s - dy * 0.03 * c);
+      }
+      last = event;
+    });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { last = null; });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.move("azimuth", event.deltaY * 0.0005);
+    }, { passive: false });
+    for (const slider of this.sliders) {
+      const name = slider.id.slice("probe-".length);
+      slider.addEventListener("input", () => {
+        const value = Number(slider.value);
+        this.probe[name] = name === "azimuth" ? (value * Math.PI) / 180 : value;
+      });
+    }
+    document.getElementById("probe-home").addEventListener("click", () => {
+      Object.assign(this.probe, ALONG_VIEW);
+      this.tell();
+    });
+  }
+
+  move(name, by) {
+    const [low, high] = REACH[name];
+    this.probe[name] = Math.min(high, Math.max(low, this.probe[name] + by));
+    this.tell();
+  }
+
+  tell() {
+    for (const slider of this.sliders) {
+      const name = slider.id.slice("probe-".length);
+      slider.value = name === "azimuth" ? ((this.probe[name] * 180) / Math.PI).toFixed(0) : this.probe[name].toFixed(1);
+    }
+  }
+
+  /** One picture, `seconds` after the last. */
+  draw(picture, seconds) {
+    this.since += seconds;
+    if (this.since >= EVERY_S) {
+      const grey = picture.image(this.probe, Math.min(this.since, 0.5), 0);
+      for (let i = 0; i < grey.length; i++) this.words[i] = this.greys[grey[i]];
+      this.context.putImageData(this.pixels, 0, 0);
+      this.seen = picture.seen;
+      this.since = 0;
+    }
+    const { context: g, width, height } = this.surface;
+    g.fillStyle = "#000";
+    g.fillRect(0, 0, width, height);
+    const scale = Math.min((width - 44) / IMAGE_MM.width, (height - 34) / IMAGE_MM.depth);
+    this.shown = { width: IMAGE_MM.width * scale, height: IMAGE_MM.depth * scale };
+    const left = (width - this.shown.width + 30) / 2;
+    const top = 10;
+    g.save();
+    // The image holds lines as rows; on the screen they run down.
+    g.transform(0, this.shown.height / SAMPLES, this.shown.width / LINES, 0, left, top);
+    g.drawImage(this.image, 0, 0);
+    g.restore();
+    this.ruler(g, left, top, scale);
+    this.words_(g, left, top);
+  }
+
+  ruler(g, left, top, scale) {
+    g.strokeStyle = g.fillStyle = "#c8d4dc";
+    g.lineWidth = 1;
+    g.font = `11px ${this.colours.font}`;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    g.beginPath();
+    for (let mm = 0; mm <= IMAGE_MM.depth; mm++) {
+      g.moveTo(left - 4, top + mm * scale);
+      g.lineTo(left - (mm % 5 ? 7 : 11), top + mm * scale);
+    }
+    g.stroke();
+    for (let mm = 0; mm <= IMAGE_MM.depth; mm += 5) g.fillText(`${mm}`, left - 14, top + mm * scale);
+  }
+
+  words_(g, left, top) {
+    if (!this.seen) return;
+    const { share, tip, beside, tipShare, inserted } = this.seen;
+    let text = "Needle outside";
+    if (inserted > 0) {
+      const where = tip ? "tip in view" : Math.abs(beside) > 0.3 ? `tip ${Math.abs(beside).toFixed(1)} mm beside the plane` : "tip out of view";
+      text = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}; tip seen ${(100 * tipShare).toFixed(0)} % of the time`;
+    }
+    g.fillStyle = "#e8eff4";
+    g.font = `12px ${this.colours.font}`;
+    g.textAlign = "left";
+    g.textBaseline = "top";
+    g.fillText(text, left, top + this.shown.height + 6, this.shown.width);
+  }
+}

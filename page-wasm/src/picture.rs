@@ -1,0 +1,397 @@
+//! Tissue, needle, probe and image together, from the anatomy that the page was told of.
+
+use tissue::body::Part;
+use tissue::needle::WallName;
+use tissue::{Configuration, Layer, Needle, PunctureState, Punctures, Tissue, Vessel};
+use ultrasound::{Imager, InPlaneScore, Look, Medium, Mesh, Probe, Scene, Shaft};
+
+/// Tissues by the number that the page calls them by.
+const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+/// Numbers for each layer in the input.
+const PER_LAYER: usize = 4;
+/// Deepest that is drawn, mm.
+const DEEPEST_MM: f32 = 40.0;
+/// Thinner layers are drawn as part of the next, mm.
+const THINNEST_MM: f32 = 0.3;
+/// Places along the insertion where the vessel's walls in the needle's plane are known.
+pub const SLICES: usize = 64;
+/// Outer radius of a 21-gauge needle, mm.
+const NEEDLE_RADIUS_MM: f32 = 0.41;
+/// Width and depth of the ultrasound image, mm.
+const IMAGE_MM: [f32; 2] = [30.0, 16.0];
+
+/// What the page is to draw a surface as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Skin behind the needle's plane.
+    SkinBehind = 0,
+    /// Skin before it.
+    SkinBefore = 1,
+    /// A layer cut along the plane.
+    Section = 2,
+    /// The vessel's wall behind the plane.
+    VesselBehind = 3,
+    /// The vessel's wall before it.
+    VesselBefore = 4,
+}
+
+/// A surface as the page draws it.
+#[derive(Clone, Debug)]
+pub struct SurfaceView {
+    /// As what.
+    pub kind: Kind,
+    /// Number of its layer in the scene.
+    pub layer: usize,
+    /// Three particles each.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Everything that is drawn of the body.
+pub struct Picture {
+    tissue: Tissue,
+    surfaces: Vec<SurfaceView>,
+    /// The wall of each layer of the scene, where the picture has one.
+    walls: Vec<Option<WallName>>,
+    /// What lies under each layer's top, outermost first.
+    media: Vec<Medium>,
+    along_mm: [f32; 2],
+    limb_radius_mm: f32,
+    lumen: [[f32; 2]; SLICES],
+    imager: Imager,
+    probe: Probe,
+    score: InPlaneScore,
+    shaft: Shaft,
+}
+
+/// A layer as the page hands it over.
+struct Given {
+    kind: u32,
+    depth_mm: f32,
+    /// How far its wall is pushed in, mm; negative where it has none.
+    travel_mm: f32,
+    is_vessel: bool,
+    is_far: bool,
+}
+
+impl Picture {
+    /// From numbers: how many layers there are; for each its tissue ([`TISSUES`], 7 the vessel, 8 its far wall), its depth
+    /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
+    /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
+    /// the skin in rad.
+    pub fn new(numbers: &[f32]) -> Result<Self, String> {
+        let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
+        let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();
+        let [width, offset, angle] =
+            rest.get(..3).and_then(|n| n.try_into().ok()).ok_or("too few numbers")?;
+        let given: Vec<Given> = numbers[1..=PER_LAYER * count]
+            .chunks_exact(PER_LAYER)
+            .map(|n| Given {
+                kind: n[0] as u32,
+                depth_mm: n[1],
+                travel_mm: n[2],
+                is_vessel: n[0] == 7.0,
+                is_far: n[0] == 8.0,
+            })
+            .collect();
+        let angle: f32 = angle;
+        let angle = if angle.is_finite() { angle.clamp(0.1, 1.57) } else { 0.5 };
+        let (configuration, walls) = configure(&given, [width, offset], angle);
+        let mut tissue = Tissue::new(&configuration).map_err(|refusal| refusal.to_string())?;
+        tissue.set_punctures(Punctures::Told);
+        let surfaces = views(&tissue, &walls);
+        let media = configuration.layers.iter().map(|layer| Medium::named(&layer.name)).collect();
+        let radius = configuration.limb_radius_mm.unwrap_or(1e4);
+        let mut picture = Self {
+            tissue,
+            surfaces,
+            walls,
+            media,
+            along_mm: configuration.along_mm,
+            limb_radius_mm: radius,
+            lumen: [[0.0; 2]; SLICES],
+            imager: Imager::default(),
+            probe: Probe { width_mm: IMAGE_MM[0], depth_mm: IMAGE_MM[1], ..Probe::default() },
+            score: InPlaneScore::default(),
+            shaft: Shaft {
+                tip_mm: [0.0; 3],
+                direction: [1.0, 0.0, 0.0],
+                radius_mm: NEEDLE_RADIUS_MM,
+                inserted_mm: 0.0,
+            },
+        };
+        picture.cut_vessel();
+        Ok(picture)
+    }
+
+    /// The device says that the wall of a layer of the scene gave way, or that the needle has left it.
+    pub fn tell(&mut self, layer: usize, state: PunctureState) {
+        if let Some(Some(wall)) = self.walls.get(layer) {
+            self.tissue.tell(*wall, state);
+        }
+    }
+
+    /// Moves time on with the tip `depth_mm` along a needle at `angle` rad to the skin.
+    pub fn step(&mut self, seconds: f32, depth_mm: f32, angle: f32) {
+        let needle = Needle::entering(depth_mm, angle, 0.0);
+        self.tissue.step(&needle, seconds);
+        self.cut_vessel();
+        let is_in = self.tissue.states().next().is_some_and(|(_, state, _)| state == PunctureState::Inserted);
+        let inserted_mm = if is_in && depth_mm > 0.0 { depth_mm } else { 0.0 };
+        self.shaft = Shaft { tip_mm: needle.tip, direction: needle.direction, inserted_mm, ..self.shaft };
+    }
+
+    /// How the wall of a layer of the scene stands to the needle.
+    pub fn wall_state(&self, layer: usize) -> PunctureState {
+        let Some(Some(wall)) = self.walls.get(layer) else { return PunctureState::Away };
+        let state = self.tissue.states().find(|(name, ..)| name == wall);
+        state.map_or(PunctureState::Away, |(_, state, _)| state)
+    }
+
+    /// Places of the particles.
+    pub fn points(&self) -> &[[f32; 4]] {
+        self.tissue.points()
+    }
+
+    /// Their normals.
+    pub fn normals(&mut self) -> &[[f32; 4]] {
+        self.tissue.normals()
+    }
+
+    /// What is drawn.
+    pub fn surfaces(&self) -> &[SurfaceView] {
+        &self.surfaces
+    }
+
+    /// Upper and lower wall of the vessel in the needle's plane, mm, at [`SLICES`] places along the block; equal where there is
+    /// none.
+    pub fn lumen(&self) -> &[[f32; 2]] {
+        &self.lumen
+    }
+
+    /// Holds the probe.
+    pub fn hold_probe(&mut self, along_mm: f32, across_mm: f32, azimuth: f32, lean: f32) {
+        let radius = self.limb_radius_mm;
+        let sag = radius - (radius * radius - across_mm * across_mm).max(0.0).sqrt();
+        self.probe = Probe { centre_mm: [along_mm, across_mm, sag], azimuth, lean, ..self.probe }.checked();
+    }
+
+    /// Makes an image, `seconds` after the last.
+    pub fn image(&mut self, seconds: f32, gain_db: f32) -> &[u8] {
+        let mut meshes: Vec<Mesh<'_>> = vec![];
+        for surface in self.tissue.surfaces() {
+            let (behind, wall_mm) = match surface.part {
+                Part::Top(layer) if layer > 0 => (self.media[layer], None),
+                Part::Vessel => (ultrasound::medium::BLOOD, Some(0.4)),
+                _ => continue,
+            };
+            meshes.push(Mesh {
+                points: self.tissue.points(),
+                triangles: &surface.triangles,
+                behind,
+                wall_mm,
+            });
+        }
+        let first = self.media.first().copied().unwrap_or(ultrasound::medium::SKIN);
+        let scene = Scene { first, meshes: &meshes, shaft: Some(self.shaft) };
+        let standard = Look::default();
+        let look = Look { gain_db: standard.gain_db + gain_db.clamp(-40.0, 40.0), ..standard };
+        self.imager.frame(&self.probe, &scene, &look);
+        self.score.take(self.imager.visible(), &self.shaft, seconds.min(0.5));
+        self.imager.image()
+    }
+
+    /// What the crate's function `seen` lists.
+    pub fn seen(&self, what: u32) -> f32 {
+        let now = self.imager.visible();
+        match what {
+            0 => now.share,
+            1 => f32::from(u8::from(now.tip)),
+            2 => now.tip_beside_mm,
+            3 => self.score.tip_share(),
+            4 => self.score.mean_share(),
+            5 => self.score.inserted_s,
+            _ => 0.0,
+        }
+    }
+
+    fn cut_vessel(&mut self) {
+        self.lumen = [[0.0; 2]; SLICES];
+        let [low, high] = self.along_mm;
+        let points = self.tissue.points();
+        let vessel = self.tissue.surfaces().iter().find(|surface| surface.part == Part::Vessel);
+        for triangle in vessel.into_iter().flat_map(|surface| &surface.triangles) {
+            let corners = triangle.map(|index| points[index as usize]);
+            let mut ends = vec![];
+            for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(a, b): (usize, usize)| (corners[a], corners[b])) {
+                if (a[1] < 0.0) != (b[1] < 0.0) {
+                    let share = a[1] / (a[1] - b[1]);
+                    ends.push([a[0] + share * (b[0] - a[0]), a[2] + share * (b[2] - a[2])]);
+                }
+            }
+            let [from, to] = ends[..] else { continue };
+            let (from, to) = if from[0] <= to[0] { (from, to) } else { (to, from) };
+            let slot = |x: f32| (x - low) / (high - low) * (SLICES - 1) as f32;
+            let mut number = slot(from[0]).ceil().max(0.0);
+            while number <= slot(to[0]).min((SLICES - 1) as f32) {
+                let x = low + number / (SLICES - 1) as f32 * (high - low);
+                let share = if to[0] > from[0] { (x - from[0]) / (to[0] - from[0]) } else { 0.0 };
+                let z = from[1] + share * (to[1] - from[1]);
+                let pair = &mut self.lumen[number as usize];
+                *pair = if pair[1] == 0.0 { [z, z] } else { [pair[0].min(z), pair[1].max(z)] };
+                number += 1.0;
+            }
+        }
+    }
+}
+
+/// Layers and vessel for the tissue picture, and which of its walls belongs to which layer of the scene.
+fn configure(
+    given: &[Given],
+    [width, offset]: [f32; 2],
+    angle: f32,
+) -> (Configuration, Vec<Option<WallName>>) {
+    let standard = Configuration::default();
+    let depth =
+        |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
+    let near = depth(|layer| layer.is_vessel);
+    let far = depth(|layer| layer.is_far);
+    let bottom = far.or(near.map(|near| near + 3.0)).unwrap_or(6.0) + 8.0;
+    let bottom = if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 };
+    let mut layers: Vec<Layer> = vec![];
+    let mut walls = vec![None; given.len()];
+    let bands: Vec<(usize, &Given)> =
+        given.iter().enumerate().filter(|(_, layer)| !layer.is_vessel && !layer.is_far).collect();
+    for (place, (number, band)) in bands.iter().enumerate() {
+        let top = if layers.is_empty() { 0.0 } else { band.depth_mm };
+        let end =
+            bands[place + 1..].iter().map(|(_, next)| next.depth_mm).find(|next| *next > top + THINNEST_MM);
+        let end = end.unwrap_or(bottom).min(bottom);
+        let drawn_to = layers.last().map_or(0.0, |layer: &Layer| layer.top_mm + layer.thickness_mm);
+        if (top - drawn_to).abs() > 1e-3 || end - top < THINNEST_MM {
+            continue;
+        }
+        let kind = TISSUES.get(band.kind as usize).copied().unwrap_or("other");
+        let mut layer = Layer::of(kind, top, end - top);
+        layer.gives_mm = band.travel_mm.clamp(0.0, 30.0);
+        walls[*number] = Some(WallName::Layer(layers.len()));
+        layers.push(layer);
+    }
+    let travel = |wanted: fn(&Given) -> bool| {
+        given.iter().find(|layer| wanted(layer)).map_or(0.0, |layer| layer.travel_mm.clamp(0.0, 30.0))
+    };
+    let vessel = near.map(|near| {
+        let height = far.map_or(3.0, |far| (far - near).clamp(0.5, 20.0));
+        let number = |value: f32, or: f32, low: f32, high: f32| {
+            if value.is_finite() { value.clamp(low, high) } else { or }
+        };
+        Vessel {
+            top_mm: near,
+            vertical_mm: height,
+            horizontal_mm: number(width, height, 0.5, 14.0),
+            // In the middle of what is drawn, so that the path to it is.
+            centre_mm: [near / angle.tan(), number(offset, 0.0, -8.0, 8.0)].map(|c| c.clamp(-8.0, 20.0)),
+            near_gives_mm: travel(|layer| layer.is_vessel),
+            far_gives_mm: travel(|layer| layer.is_far),
+            ..Vessel::default()
+        }
+    });
+    for (slot, layer) in walls.iter_mut().zip(given) {
+        if layer.is_vessel {
+            *slot = Some(WallName::Near);
+        } else if layer.is_far {
+            *slot = Some(WallName::Far);
+        }
+    }
+    (Configuration { layers, vessel, ..standard }, walls)
+}
+
+/// The surfaces as the page draws them.
+fn views(tissue: &Tissue, walls: &[Option<WallName>]) -> Vec<SurfaceView> {
+    let scene_layer =
+        |layer: usize| walls.iter().position(|wall| *wall == Some(WallName::Layer(layer))).unwrap_or(0);
+    let mut views = vec![];
+    for surface in tissue.surfaces() {
+        let view = |kind, layer| SurfaceView { kind, layer, triangles: surface.triangles.clone() };
+        match surface.part {
+            Part::SkinBehind => views.push(view(Kind::SkinBehind, 0)),
+            Part::SkinBefore => views.push(view(Kind::SkinBefore, 0)),
+            Part::Section(layer) => views.push(view(Kind::Section, scene_layer(layer))),
+            Part::Vessel => {
+                let is_behind = |triangle: &&[u32; 3]| {
+                    triangle.iter().map(|index| tissue.rest()[*index as usize][1]).sum::<f32>() > 0.0
+                };
+                let (behind, before) = surface.triangles.iter().partition(is_behind);
+                let layer = walls.iter().position(|wall| *wall == Some(WallName::Near)).unwrap_or(0);
+                views.push(SurfaceView { kind: Kind::VesselBehind, layer, triangles: behind });
+                views.push(SurfaceView { kind: Kind::VesselBefore, layer, triangles: before });
+            }
+            Part::Top(_) | Part::End(_) => {}
+        }
+    }
+    views
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The adult profile: skin, muscle, vein from 4.8 to 7.8 mm.
+    const ADULT: [f32; 20] = [
+        4.0, 0.0, 0.0, 3.0, 0.02, 2.0, 2.0, -1.0, 0.02, 7.0, 4.8, 1.41, 0.02, 8.0, 7.8, 1.41, 0.02, 4.46,
+        0.0, 0.52,
+    ];
+
+    #[test]
+    fn the_picture_follows_the_device_s_punctures_and_shows_the_needle_in_its_plane() {
+        let mut picture = Picture::new(&ADULT).expect("it can be built");
+        let drive = |picture: &mut Picture, from: f32, to: f32| {
+            for step in 0..=60 {
+                picture.step(1.0 / 60.0, from + (to - from) * step as f32 / 60.0, 0.52);
+            }
+        };
+        drive(&mut picture, -2.0, 3.5);
+        assert_eq!(picture.wall_state(0), PunctureState::Touching);
+        picture.tell(0, PunctureState::Inserted);
+        drive(&mut picture, 3.5, 11.0);
+        assert_eq!(picture.wall_state(0), PunctureState::Inserted);
+        assert_eq!(picture.wall_state(2), PunctureState::Touching);
+        picture.tell(2, PunctureState::Inserted);
+        drive(&mut picture, 11.0, 12.0);
+        assert_eq!(picture.wall_state(2), PunctureState::Inserted);
+        assert_eq!(picture.wall_state(3), PunctureState::Away);
+        picture.hold_probe(8.0, 0.0, 0.0, 0.0);
+        picture.image(0.1, 0.0);
+        assert!(picture.seen(0) > 0.9 && picture.seen(1) == 1.0);
+        picture.hold_probe(8.0, 5.0, 0.0, 0.0);
+        picture.image(0.1, 0.0);
+        assert!(picture.seen(0) == 0.0 && (picture.seen(3) - 0.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_vessel_s_walls_in_the_needle_s_plane_are_those_of_the_profile() {
+        let picture = Picture::new(&ADULT).expect("it can be built");
+        for [upper, lower] in &picture.lumen()[4..SLICES - 4] {
+            assert!((upper - 4.8).abs() < 0.15 && (lower - 7.8).abs() < 0.15, "{upper} to {lower} mm");
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused_or_drawn_as_something() {
+        assert!(Picture::new(&[]).is_err());
+        assert!(Picture::new(&[f32::NAN, 1.0]).is_err());
+        assert!(Picture::new(&ADULT[..10]).is_err());
+        for slot in 1..ADULT.len() {
+            for wrong in [f32::NAN, f32::INFINITY, -1e9, 1e9] {
+                let mut numbers = ADULT;
+                numbers[slot] = wrong;
+                if let Ok(mut picture) = Picture::new(&numbers) {
+                    picture.step(0.016, 1.0, 0.5);
+                    assert!(
+                        picture.points().iter().flatten().all(|number| number.is_finite()),
+                        "slot {slot}"
+                    );
+                }
+            }
+        }
+    }
+}
