@@ -17,6 +17,7 @@ export class BodyView {
     window.__body = this.stats;
     byId("view-section").addEventListener("click", () => this.show(false));
     byId("view-body").addEventListener("click", () => this.show(true));
+    if (location.hash === "#body") this.show(true);
   }
 
   /** Goes to this view or back to the section. */

@@ -13,7 +13,7 @@ export const SLICES = 64;
 export const ALONG_MM = [-9.1, 26];
 export const HALF_WIDTH_MM = 10.4;
 export const LIMB_RADIUS_MM = 42;
-export const IMAGE_MM = { width: 30, depth: 16 };
+export const IMAGE_MM = { width: 24, depth: 16 };
 
 export class Picture {
   /** Fetches and starts it; fails where the browser cannot. */
@@ -32,10 +32,10 @@ export class Picture {
     const numbers = [scene.layers.length];
     for (const layer of scene.layers) {
       const tissue = layer.is_vessel ? VESSEL : layer.is_far_wall ? FAR_WALL : Math.max(0, TISSUES.indexOf(layer.name));
-      numbers.push(tissue, layer.depth_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
+      numbers.push(tissue, layer.depth_mm ?? layer.top_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
     }
     numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle);
-    new Float32Array(this.core.memory.buffer, this.core.input(), numbers.length).set(numbers);
+    this.floats(this.core.input(), numbers.length).set(numbers);
     this.built = this.core.build(numbers.length) === 1;
     return this.built;
   }
@@ -51,27 +51,32 @@ export class Picture {
     this.core.step(seconds, depth, angle);
   }
 
+  // The memory moves when it grows: a pointer is asked for first, then the memory is looked at.
+
   floats(pointer, count) {
     return new Float32Array(this.core.memory.buffer, pointer, count);
   }
 
   get points() { return this.floats(this.core.points(), 4 * this.core.particles()); }
+
   get normals() { return this.floats(this.core.normals(), 4 * this.core.particles()); }
+
   get lumen() { return this.floats(this.core.lumen(), 2 * SLICES); }
 
   /** What is drawn: `{ kind, layer, triangles }`; the triangles are copies. */
   surfaces() {
-    return Array.from({ length: this.core.surfaces() }, (_, i) => ({
-      kind: this.core.surface_kind(i),
-      layer: this.core.surface_layer(i),
-      triangles: new Uint32Array(this.core.memory.buffer, this.core.surface_triangles(i), 3 * this.core.surface_triangle_count(i)).slice(),
-    }));
+    return Array.from({ length: this.core.surfaces() }, (_, i) => {
+      const [pointer, count] = [this.core.surface_triangles(i), 3 * this.core.surface_triangle_count(i)];
+      const triangles = new Uint32Array(this.core.memory.buffer, pointer, count).slice();
+      return { kind: this.core.surface_kind(i), layer: this.core.surface_layer(i), triangles };
+    });
   }
 
   /** An ultrasound image: brightness, line after line. */
   image(probe, seconds, gain) {
     this.core.probe(probe.along, probe.across, probe.azimuth, probe.lean);
-    return new Uint8Array(this.core.memory.buffer, this.core.image(seconds, gain), LINES * SAMPLES);
+    const pointer = this.core.image(seconds, gain);
+    return new Uint8Array(this.core.memory.buffer, pointer, LINES * SAMPLES);
   }
 
   /** How much of the needle the last image shows, and did so far. */

@@ -36,6 +36,7 @@ uniform bool cut;
 uniform vec2 lumen[${SLICES}];
 uniform vec2 along;
 uniform vec3 wall;
+uniform vec3 blood;
 uniform float edge;
 out vec4 result;
 void main() {
@@ -46,15 +47,18 @@ void main() {
     int low = min(int(slot), ${SLICES - 2});
     vec2 walls = mix(lumen[low], lumen[low + 1], slot - float(low));
     if (lumen[low].y > lumen[low].x && lumen[low + 1].y > lumen[low + 1].x) {
-      if (at.z > walls.x && at.z < walls.y) discard;
-      if (at.z > walls.x - edge && at.z < walls.y + edge) base = wall;
+      bool open = at.z > walls.x && at.z < walls.y;
+      // Within the block one sees the hollow vessel, beyond it its blood.
+      if (open && at.x > along.x + 0.8 && at.x < along.y - 0.8) discard;
+      if (open) base = blood;
+      else if (at.z > walls.x - edge && at.z < walls.y + edge) base = wall;
     }
     // Fibres, so that one sees the tissue move only where it does.
     base *= 0.96 + 0.04 * sin(at.z * 9.0 + sin(at.x * 1.3));
   }
   vec3 toEye = normalize(eye - at);
   if (dot(n, toEye) < 0.0) n = -n;
-  vec3 light = normalize(vec3(-0.35, -0.6, -0.9));
+  vec3 light = normalize(vec3(-0.35, 0.6, -0.9));
   float lit = 0.5 + 0.5 * max(dot(n, light), 0.0);
   float gloss = shine * pow(max(dot(normalize(light + toEye), n), 0.0), 40.0);
   result = vec4(base * lit + gloss, colour.a);
@@ -126,9 +130,13 @@ export class Tissue3d {
       return { ...surface, array, index, count: surface.triangles.length, name: scene.layers[surface.layer]?.name };
     });
     const bands = scene.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
-    this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm, bottom: bands[i + 1]?.depth_mm ?? DEEP_MM }));
-    const z = picture.points.filter((_, i) => i % 4 === 2);
-    this.blockBottom = z.reduce((most, value) => Math.max(most, value), 0);
+    this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm ?? layer.top_mm, bottom: bands[i + 1]?.depth_mm ?? bands[i + 1]?.top_mm ?? DEEP_MM }));
+    // In the needle's plane; beside it the limb curves down.
+    const points = picture.points;
+    this.blockBottom = 0;
+    for (let i = 0; i < points.length; i += 4) {
+      if (Math.abs(points[i + 1]) < 0.1) this.blockBottom = Math.max(this.blockBottom, points[i + 2]);
+    }
   }
 
   /** One picture; `needle` is { depth, angle, flashback }, `probe` as ultrasound.js has it, or null. */
@@ -149,7 +157,7 @@ export class Tissue3d {
     const far = distance * Math.max(1, 1.35 / (width / height));
     const eye = [
       target[0] - far * Math.sin(yaw) * Math.cos(pitch),
-      target[1] - far * Math.cos(yaw) * Math.cos(pitch),
+      target[1] + far * Math.cos(yaw) * Math.cos(pitch),
       target[2] - far * Math.sin(pitch),
     ];
     this.set("view", multiply(perspective(0.6, width / height, 1, 400), look(eye, target)));
@@ -157,6 +165,7 @@ export class Tissue3d {
     this.set("along", ALONG_MM);
     this.set("lumen", picture.lumen);
     this.set("wall", rgb(this.colours["vessel-wall"]));
+    this.set("blood", rgb(this.colours.lumen));
     this.set("edge", 0.35);
     this.opaque(needle);
     this.clear(needle, probe);
@@ -178,7 +187,7 @@ export class Tissue3d {
 
   /** The layers cut along the needle's plane: simulated in the block, at rest beside and under it. */
   section() {
-    const facing = [0, -1, 0];
+    const facing = [0, 1, 0];
     for (const surface of this.layers) {
       if (surface.kind !== KINDS.section) continue;
       this.mesh(surface, { colour: [...this.tissue(surface.name), 1], normal: facing, cut: true });
@@ -222,9 +231,14 @@ export class Tissue3d {
     const model = (at, a, b, d) => [...a, 0, ...b, 0, ...d, 0, ...at, 1];
     const wide = lateral.map((x) => x * IMAGE_MM.width);
     const deep = axial.map((x) => x * IMAGE_MM.depth);
+    // In the needle's plane it would lie in the section.
+    const { gl } = this;
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(-4, -8);
     this.mesh(this.static.square, { colour: [...colour, 0.14], normal: side, model: model(place(-IMAGE_MM.width / 2, 0, 0), wide, side, deep) });
-    const box = [lateral.map((x) => x * (IMAGE_MM.width + 4)), side.map((x) => x * 5), axial.map((x) => -x * 7)];
-    this.mesh(this.static.box, { colour: [...colour, 0.4], shine: 0.2, model: model(place(0, -0.1, 0), ...box) });
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    const box = [lateral.map((x) => x * (IMAGE_MM.width + 1)), side.map((x) => x * 4), axial.map((x) => -x * 5)];
+    this.mesh(this.static.box, { colour: [...colour, 0.3], shine: 0.2, model: model(place(0, -0.1, 0), ...box) });
   }
 
   tissue(name) {
@@ -318,8 +332,8 @@ function staticParts(gl) {
   };
   const square = { places: [0, 0, 0, 1, 1, 0, 0, 1, 1, 0, 1, 1, 0, 0, 1, 1], normals: new Array(16).fill(0), triangles: [0, 1, 2, 0, 2, 3] };
   return {
-    limbBehind: make(limb(1)),
-    limbBefore: make(limb(-1)),
+    limbBehind: make(limb(-1)),
+    limbBefore: make(limb(1)),
     needle: make(turned([[-NEEDLE.length, NEEDLE.radius], [-NEEDLE.bevel, NEEDLE.radius], [0, 0.02]])),
     hub: make(turned([[-NEEDLE.length - NEEDLE.hubLength, NEEDLE.hub], [-NEEDLE.length - 2, NEEDLE.hub], [-NEEDLE.length, NEEDLE.radius]])),
     square: make(square),

@@ -18,7 +18,7 @@ pub const SLICES: usize = 64;
 /// Outer radius of a 21-gauge needle, mm.
 const NEEDLE_RADIUS_MM: f32 = 0.41;
 /// Width and depth of the ultrasound image, mm.
-const IMAGE_MM: [f32; 2] = [30.0, 16.0];
+const IMAGE_MM: [f32; 2] = [24.0, 16.0];
 
 /// What the page is to draw a surface as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -318,7 +318,7 @@ fn views(tissue: &Tissue, walls: &[Option<WallName>]) -> Vec<SurfaceView> {
             Part::Section(layer) => views.push(view(Kind::Section, scene_layer(layer))),
             Part::Vessel => {
                 let is_behind = |triangle: &&[u32; 3]| {
-                    triangle.iter().map(|index| tissue.rest()[*index as usize][1]).sum::<f32>() > 0.0
+                    triangle.iter().map(|index| tissue.rest()[*index as usize][1]).sum::<f32>() < 0.0
                 };
                 let (behind, before) = surface.triangles.iter().partition(is_behind);
                 let layer = walls.iter().position(|wall| *wall == Some(WallName::Near)).unwrap_or(0);

@@ -14,7 +14,7 @@ const TIE: f32 = 1e-6;
 /// What a surface shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The skin on the far side of the needle's plane (y > 0).
+    /// The skin on the far side of the needle's plane (y < 0), as one sees it with the insertion to the right.
     SkinBehind,
     /// The skin on the near side.
     SkinBefore,
@@ -193,7 +193,7 @@ fn surfaces(lattices: &[Lattice], tube: Option<&Tube>, rest: &[Point]) -> Vec<Su
                 let sum = triangle.iter().fold([0.0; 3], |sum, i| add(sum, place(&rest[*i as usize])));
                 scale(sum, 1.0 / 3.0)[1]
             };
-            let (behind, before) = top.iter().partition(|triangle| middle(triangle) > 0.0);
+            let (behind, before) = top.iter().partition(|triangle| middle(triangle) < 0.0);
             surfaces.push(Surface { part: Part::SkinBehind, triangles: behind });
             surfaces.push(Surface { part: Part::SkinBefore, triangles: before });
         }

@@ -26,8 +26,8 @@ const INTERFACE_GAIN: f32 = 0.5;
 /// Pressure of the needle's echo against its reflection: most of it goes elsewhere.
 const NEEDLE_GAIN: f32 = 0.35;
 /// Reverberations in the needle: how many are drawn, and what each leaves.
-const REVERBERATIONS: usize = 4;
-const REVERBERATION: f32 = 0.38;
+const REVERBERATIONS: usize = 3;
+const REVERBERATION: f32 = 0.2;
 /// Depth of the shadow under a needle in the middle of the beam.
 const SHADOW: f32 = 0.85;
 /// Scatterers that columns are cut from.
@@ -61,7 +61,7 @@ pub struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Self { gain_db: 22.0, tgc_db_per_cm: 16.0, range_db: 70.0 }
+        Self { gain_db: 18.0, tgc_db_per_cm: 16.0, range_db: 70.0 }
     }
 }
 

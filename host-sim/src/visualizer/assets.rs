@@ -11,7 +11,11 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 macro_rules! asset {
     ($path:literal, $file:literal, $content_type:expr) => {
-        Asset { path: $path, content_type: $content_type, body: include_bytes!(concat!("../../page/", $file)) }
+        Asset {
+            path: $path,
+            content_type: $content_type,
+            body: include_bytes!(concat!("../../page/", $file)),
+        }
     };
 }
 
