@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use crate::dynamics::Bench;
 use crate::generator::case::{Spec, build};
 use crate::generator::files;
 use crate::judge::Record;
@@ -46,16 +47,16 @@ fn run_case(
     let answer = ask(tool, &paths, &out);
     let seconds = start.elapsed().as_secs_f64();
     let key = files::key(&case);
-    let left = key
-        .oracle
-        .as_ref()
-        .and_then(|oracle| reported::measure(&out.join("residuals.csv"), "holdout.csv", oracle).ok());
+    let bench = Bench::new(&paths, &key);
+    let left = reported::judged(&bench, &out);
+    let reported = reported::reported(&paths, &out, &key);
     let record = Record {
         id: spec.name(),
+        opinions: rivals::known_structure(&bench, &key).into_iter().chain(rivals::judge(&case)).collect(),
         key,
         answer,
         left,
-        opinions: rivals::judge(&case).to_vec(),
+        reported,
         seconds,
         nominal_gain: case.nominal.gain,
     };

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use crate::dynamics::Bench;
 use crate::folder::{self, Brought, Truth};
 use crate::judge::Record;
 use crate::key::{Category, Key};
@@ -10,6 +11,7 @@ use crate::machines::Machine;
 use crate::options::Options;
 use crate::pool;
 use crate::reported;
+use crate::rivals;
 use crate::scratch::Scratch;
 use crate::tool::{self, Tool, ask};
 
@@ -75,16 +77,16 @@ fn run_case(case: &Brought, options: &Options, tool: &dyn Tool, scratch: &Path) 
         Truth::Known(key) => key.clone(),
         Truth::Believed(_) => Key::of(Category::Null),
     };
-    let holdout = case.paths.holdout.first().and_then(|p| p.file_name()).unwrap_or_default();
-    let left = key.oracle.as_ref().and_then(|oracle| {
-        reported::measure(&out.join("residuals.csv"), &holdout.to_string_lossy(), oracle).ok()
-    });
+    let bench = Bench::new(&paths, &key);
+    let left = reported::judged(&bench, &out);
+    let reported = reported::reported(&paths, &out, &key);
     let record = Record {
         id: case.id.clone(),
+        opinions: rivals::known_structure(&bench, &key).into_iter().collect(),
         key,
         answer,
         left,
-        opinions: Vec::new(),
+        reported,
         seconds,
         nominal_gain: tool::actuator_gain(&rig).unwrap_or(f64::NAN),
     };

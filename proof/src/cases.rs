@@ -2,32 +2,24 @@
 //! recordings that cannot tell.
 
 use crate::generator::case::Spec;
-use crate::generator::effects::EFFECTS;
+use crate::generator::effects::{EFFECTS, go_together};
 use crate::generator::excite::Kind;
 use crate::generator::outside::FOREIGN;
 use crate::key::Category;
 use crate::rng::Rng;
 use crate::sums::STRENGTHS;
 
-/// Pairs that occur together on real machines and ask for different explanations.
-const PAIRS: [[&str; 2]; 16] = [
-    ["stribeck_friction", "cogging"],
-    ["coulomb_friction", "cogging"],
-    ["coulomb_friction", "asymmetric_friction"],
-    ["viscous_friction", "coulomb_friction"],
-    ["cogging", "torque_ripple"],
-    ["command_deadband", "quadratic_drag"],
-    ["electrical_lag", "stribeck_friction"],
-    ["command_delay", "cogging"],
-    ["friction_drift", "cogging"],
-    ["position_spring", "stribeck_friction"],
-    ["backlash", "cogging"],
-    ["drive_compliance", "quadratic_drag"],
-    ["mass_imbalance", "stribeck_friction"],
-    ["tilt_gravity", "cogging"],
-    ["position_dependent_friction", "quadratic_drag"],
-    ["command_saturation", "position_spring"],
-];
+/// So many effects by chance that may be hidden together.
+fn draw_together(count: usize, rng: &mut Rng) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    while names.len() < count {
+        let name = *rng.pick(&EFFECTS);
+        if names.iter().all(|other| go_together(other, name)) {
+            names.push(name);
+        }
+    }
+    names
+}
 
 /// Near twins with recordings that do not tell them apart.
 const POOR: [(&str, &[Kind]); 10] = [
@@ -50,6 +42,7 @@ pub(crate) struct Amounts {
     pub(crate) singles: usize,
     pub(crate) strengths: usize,
     pub(crate) pairs: usize,
+    pub(crate) triples: usize,
     pub(crate) nulls: usize,
     pub(crate) disturbances: usize,
     pub(crate) parameters_only: usize,
@@ -64,10 +57,11 @@ impl Amounts {
             singles: k,
             strengths: 3,
             pairs: 12 * k,
+            triples: 8 * k,
             nulls: 30 * k,
             disturbances: 6 * k,
             parameters_only: 15 * k,
-            outside: 16 * k,
+            outside: 22 * k,
             cannot_tell: 10 * k,
         }
     }
@@ -78,6 +72,7 @@ impl Amounts {
             singles: 1,
             strengths: 1,
             pairs: 2,
+            triples: 1,
             nulls: 4,
             disturbances: 1,
             parameters_only: 2,
@@ -90,6 +85,7 @@ impl Amounts {
 /// The specifications, in an order that says nothing of what they hold.
 pub(crate) fn list(amounts: Amounts, seed: u64) -> Vec<Spec> {
     let mut specs = Vec::new();
+    let drawn = Rng::new(seed).fork("together");
     let mut put = |category, hidden: Vec<&'static str>, strength, repeat, poor| {
         specs.push(Spec { id: 0, category, hidden, strength, repeat, poor, recorder: None });
     };
@@ -101,7 +97,12 @@ pub(crate) fn list(amounts: Amounts, seed: u64) -> Vec<Spec> {
         }
     }
     for i in 0..amounts.pairs {
-        put(Category::Pair, PAIRS[i % PAIRS.len()].to_vec(), 10.0, i / PAIRS.len(), None);
+        let names = draw_together(2, &mut drawn.fork(&format!("pair/{i}")));
+        put(Category::Pair, names, 10.0, i, None);
+    }
+    for i in 0..amounts.triples {
+        let names = draw_together(3, &mut drawn.fork(&format!("triple/{i}")));
+        put(Category::Triple, names, 10.0, i, None);
     }
     for i in 0..amounts.nulls {
         put(Category::Null, Vec::new(), 0.0, i, None);
@@ -129,4 +130,26 @@ pub(crate) fn list(amounts: Amounts, seed: u64) -> Vec<Spec> {
         spec.id = i + 1;
     }
     specs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hidden_together_may_be_and_depends_on_the_seed() {
+        let pairs = |seed: u64| -> Vec<Vec<&'static str>> {
+            let specs = list(Amounts::full(1), seed);
+            specs.into_iter().filter(|s| s.category == Category::Pair).map(|s| s.hidden).collect()
+        };
+        assert_eq!(pairs(3).len(), 12);
+        assert!(pairs(3).iter().all(|p| go_together(p[0], p[1])));
+        let sorted = |seed: u64| {
+            let mut list = pairs(seed);
+            list.sort();
+            list
+        };
+        assert_eq!(sorted(3), sorted(3));
+        assert_ne!(sorted(3), sorted(4));
+    }
 }

@@ -11,6 +11,8 @@ pub(crate) const CONFIDENT: f64 = 0.8;
 const EXPLAINABLE: f64 = 0.15;
 /// At this strength and below, random bursts may be taken for noise.
 const WEAK: f64 = 1.0;
+/// Effect over noise below which anything may be taken for noise.
+const INVISIBLE: f64 = 0.7;
 
 /// One case after the tool and the rivals have answered; the recordings are gone.
 #[derive(Clone, Debug)]
@@ -18,8 +20,10 @@ pub(crate) struct Record {
     pub(crate) id: String,
     pub(crate) key: Key,
     pub(crate) answer: Result<Answer, String>,
-    /// What is left on the held-out recording; `None` where it could not be measured.
-    pub(crate) left: Option<Left>,
+    /// What is left on the held-out recording, by the judge's own inverse dynamics; else why that could not be had.
+    pub(crate) left: Result<Left, String>,
+    /// The same by the report's own residuals.
+    pub(crate) reported: Option<Left>,
     pub(crate) opinions: Vec<Opinion>,
     pub(crate) seconds: f64,
     /// The drive's gain as the rig has it.
@@ -76,7 +80,8 @@ impl Record {
 
     /// Names nothing, and says that something is there which it does not know, or which does not repeat.
     pub(crate) fn abstains(&self) -> bool {
-        let weak = self.key.random && self.key.strength <= WEAK;
+        let invisible = self.key.snr.is_some_and(|snr| snr < INVISIBLE);
+        let weak = invisible || self.key.random && self.key.strength <= WEAK;
         let told = match self.verdict() {
             "unexplained" | "random_disturbance" => true,
             "no_mismatch" | "parameters_only" => weak,
@@ -125,8 +130,19 @@ impl Record {
         }
     }
 
-    /// The held-out improvement as a share of an oracle's, in mean squares; `None` where there is nothing to improve.
+    /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own inverse dynamics; `None`
+    /// where there is nothing to improve or the judge cannot run the patched rig.
     pub(crate) fn gain(&self) -> Option<Gain> {
+        self.share(self.left.as_ref().ok().copied())
+    }
+
+    /// The same by the residuals that the report gives.
+    pub(crate) fn reported_gain(&self) -> Option<Gain> {
+        // A report without residuals improves nothing.
+        self.share(self.reported.or(Some(Left { refit: 0.0, patched: 0.0 })))
+    }
+
+    fn share(&self, left: Option<Left>) -> Option<Gain> {
         if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
             return None;
         }
@@ -137,7 +153,10 @@ impl Record {
             return None;
         }
         // A tool that fails improves nothing.
-        let Some(left) = self.left.filter(|_| self.answer.is_ok()) else { return Some(Gain::default()) };
+        if self.answer.is_err() {
+            return Some(Gain::default());
+        }
+        let left = left?;
         let gain = left.refit.powi(2) - left.patched.powi(2);
         Some(Gain { of_oracle: gain / room, of_own: gain / (left.refit.powi(2) - floor).max(0.5 * room) })
     }
@@ -200,7 +219,8 @@ pub(crate) mod tests {
             id: "1".into(),
             key,
             answer: Ok(answer),
-            left: Some(Left { refit: 2.0, patched: 1.0 }),
+            left: Ok(Left { refit: 2.0, patched: 1.0 }),
+            reported: None,
             opinions: Vec::new(),
             seconds: 1.0,
             nominal_gain: 2.0,
@@ -284,9 +304,13 @@ pub(crate) mod tests {
         // From 2² to 1², which is what the oracle leaves.
         assert_eq!(r.gain(), Some(Gain { of_oracle: 1.0, of_own: 1.0 }));
         // The tool's own noise counts against it in one of the two figures.
-        r.left = Some(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
+        r.left = Ok(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
         let gain = r.gain().unwrap();
         assert!((gain.of_oracle - 1.0).abs() < 1e-9 && (gain.of_own - 1.0 / 3.0).abs() < 1e-9, "{gain:?}");
+        assert_eq!(r.reported_gain(), Some(Gain::default()), "it reports no residuals");
+        let judged = std::mem::replace(&mut r.left, Err("a law that the judge does not know".into()));
+        assert_eq!(r.gain(), None);
+        r.left = judged;
         r.answer = Err("broken".into());
         assert_eq!(r.gain(), Some(Gain::default()), "a tool that fails improves nothing");
         r.key.oracle.as_mut().unwrap().refit = 1.05;

@@ -8,6 +8,7 @@ mod bench;
 mod brought;
 mod calibrate;
 mod cases;
+mod dynamics;
 mod folder;
 mod generator;
 mod judge;

@@ -286,11 +286,12 @@ fn case_json(r: &Record) -> Value {
         .iter()
         .map(|e| json!({ "name": e.name, "class": e.class, "confidence": e.confidence, "right": r.is_true(e) }))
         .collect();
-    let gain = r.gain();
+    let (gain, left) = (r.gain(), r.left.as_ref().ok());
     json!({
         "id": r.id, "kind": r.key.category.word(), "hidden": r.key.hidden(), "strength": r.key.strength,
         "snr": r.key.snr, "rig": r.key.rig, "right": r.right(), "verdict": r.verdict(), "effects": effects,
-        "answer": r.answer_text(), "refit": r.left.map(|l| l.refit), "patched": r.left.map(|l| l.patched),
+        "answer": r.answer_text(), "refit": left.map(|l| l.refit), "patched": left.map(|l| l.patched), "unjudged": r.left.as_ref().err(),
+        "reported_gain_over_oracle": r.reported_gain().map(|g| g.of_oracle),
         "gain_over_oracle": gain.map(|g| g.of_oracle), "gain_over_own": gain.map(|g| g.of_own),
         "seconds": r.seconds, "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
     })

@@ -1,9 +1,12 @@
-//! The residuals that a report gives, measured as a key's oracle is.
+//! What is left on the held-out recording, measured as a key's oracle is: by the judge's own inverse dynamics, and by the
+//! residuals that the report gives.
 
 use std::path::Path;
 
-use crate::key::Oracle;
+use crate::dynamics::Bench;
+use crate::key::{Key, Oracle};
 use crate::signal::{Butterworth, rms};
+use crate::tool::Paths;
 
 /// Rms on the held-out recordings, in the oracle's band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +17,18 @@ pub(crate) struct Left {
 
 /// Fewer held-out rows than this say nothing.
 const FEWEST_ROWS: usize = 200;
+
+/// By the judge's `bench`.
+pub(crate) fn judged(bench: &Result<Bench, String>, out: &Path) -> Result<Left, String> {
+    let bench = bench.as_ref().map_err(Clone::clone)?;
+    Ok(Left { patched: bench.patched(&out.join("patched-rig.toml"))?, refit: bench.refit() })
+}
+
+/// By the report in `out`; nothing where the key has no oracle.
+pub(crate) fn reported(paths: &Paths, out: &Path, key: &Key) -> Option<Left> {
+    let holdout = paths.holdout.first()?.file_name()?;
+    measure(&out.join("residuals.csv"), &holdout.to_string_lossy(), key.oracle.as_ref()?).ok()
+}
 
 /// Measures `residuals.csv` on the recording `holdout`.
 ///

@@ -154,6 +154,25 @@ impl Normal {
         out
     }
 
+    /// The inverse of the columns' second moments on a vector over `active`.
+    pub(crate) fn weigh(&self, active: &[usize], right: &[f64]) -> Vec<f64> {
+        let mut other = self.clone();
+        other.right = right.to_vec();
+        other.solve(active, &[])
+    }
+
+    /// Least squares of column `target` over the columns in `active`.
+    pub(crate) fn regress(&self, active: &[usize], target: usize) -> Vec<f64> {
+        let mut other = self.clone();
+        other.right = (0..self.n)
+            .map(|i| {
+                let (high, low) = (i.max(target), i.min(target));
+                self.gram[high * self.n + low]
+            })
+            .collect();
+        other.solve(active, &[])
+    }
+
     /// Residual sum of squares for the coefficients.
     pub(crate) fn residual(&self, coefficients: &[f64]) -> f64 {
         let mut total = self.energy;

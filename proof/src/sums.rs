@@ -218,7 +218,7 @@ pub(crate) fn sum(records: &[Record]) -> Sums {
     s.rivals = crate::rivals::RIVALS
         .iter()
         .enumerate()
-        .filter(|(i, _)| records.iter().any(|r| r.opinions.len() > *i))
+        .filter(|(i, _)| records.iter().any(|r| r.opinions.iter().any(|o| o.rival == *i)))
         .map(|(i, rival)| sum_rival(records, i, rival))
         .collect();
     s
@@ -385,6 +385,10 @@ fn lines(records: &[Record]) -> Vec<Line> {
         "–",
         Figure::Shares(gains.iter().map(|g| g.1.of_own).collect()),
     );
+    let reported: Vec<f64> = records.iter().filter_map(|r| Some(r.reported_gain()?.of_oracle)).collect();
+    put("gain_reported", "… as the report's residuals have it", "–", Figure::Shares(reported));
+    let unjudged = records.iter().filter(|r| r.answer.is_ok() && r.key.oracle.is_some() && r.left.is_err());
+    put("unjudged", "patched rigs that the judge cannot run", "–", Figure::Count(unjudged.count()));
     let mut coverage = Rate::default();
     records.iter().flat_map(Record::coverage).for_each(|(_, inside)| coverage.add(inside));
     put("coverage", "95 % intervals that hold the truth", "92–98 %", Figure::Rate(coverage));
@@ -404,7 +408,7 @@ fn parameter_family(name: &str) -> String {
 fn sum_rival(records: &[Record], i: usize, rival: &crate::rivals::Rival) -> RivalSums {
     let mut s = RivalSums { name: rival.name, names_something: rival.names, ..RivalSums::default() };
     for r in records {
-        let Some(o) = r.opinions.get(i) else { continue };
+        let Some(o) = r.opinions.iter().find(|o| o.rival == i) else { continue };
         let silent = o.names.is_empty();
         let hides = |n: &str| r.key.effects.iter().any(|h| h == n);
         o.names.iter().for_each(|n| s.false_names.add(!hides(n)));

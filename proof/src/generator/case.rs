@@ -23,7 +23,7 @@ pub(crate) struct Spec {
     pub(crate) strength: f64,
     /// Which draw of the same kind this is.
     pub(crate) repeat: usize,
-    /// Plays these instead of what shows the effect.
+    /// Plays one of these alone: recordings that cannot tell.
     pub(crate) poor: Option<&'static [Kind]>,
     /// Rate in Hz and duration in s, where they are not drawn.
     pub(crate) recorder: Option<(f64, f64)>,
@@ -61,8 +61,11 @@ pub(crate) struct Case {
     /// A loop ran, and its reference is recorded.
     pub(crate) with_reference: [bool; 3],
     pub(crate) with_force: bool,
-    /// Strength of each hidden effect alone, and of all together, as achieved.
-    pub(crate) alone: Vec<f64>,
+    /// What the case turned out to be: what does not show in the recordings drawn cannot be asked for.
+    pub(crate) category: Category,
+    /// The level nearest to what was reached.
+    pub(crate) level: f64,
+    /// Strength of all that is hidden together, as reached.
     pub(crate) together: Measured,
     pub(crate) truths: Vec<Parameter>,
 }
@@ -75,34 +78,47 @@ impl Case {
     }
 }
 
-/// Builds the case; tries other machines until one runs and comes within a quarter of the strength asked for, or after
-/// some trials within half of it. `None`: none of the machines showed it.
+/// Machines drawn until one can be recorded.
+const ATTEMPTS: usize = 12;
+/// Effect over noise from which a level counts as reached: 10, 3, 1.
+const LEVELS: [(f64, f64); 3] = [(10.0, 7.0), (3.0, 2.1), (1.0, 0.7)];
+/// From here on an effect of a pair or triple has to be found.
+const SHOWS: f64 = 2.1;
+
+/// Builds the case. Another machine is drawn only where nobody would keep the recordings: the motion diverged, the loop
+/// lost its reference, or hardly anything moved. What does not show in them stays as it is. `None`: no machine could be
+/// recorded.
 pub(crate) fn build(spec: &Spec, seed: u64, quick: bool) -> Option<Case> {
     let label =
         format!("{}/{}/{}/{}", spec.category.word(), spec.hidden.join("+"), spec.strength, spec.repeat);
-    let mut closest: Option<(f64, Case)> = None;
-    for attempt in 0..24 {
+    (0..ATTEMPTS).find_map(|attempt| {
         let rng = Rng::new(seed).fork(&label).fork(&attempt.to_string());
-        let Some(case) = attempt_case(spec, &rng, quick) else { continue };
-        let miss = if spec.strength > 0.0 && spec.category != Category::CannotTell {
-            let off = case.alone.iter().map(|a| (a / spec.strength).max(1e-9).ln().abs()).fold(0.0, f64::max);
-            // What does not show in the held-out recording cannot be judged there.
-            let held = case.held_out(case.machine.residual_bandwidth());
-            off + if held.effect > 0.45 * spec.strength * held.noise { 0.0 } else { 1.0 }
-        } else {
-            0.0
-        };
-        if miss < 0.22 {
-            return Some(case);
+        attempt_case(spec, &rng, quick)
+    })
+}
+
+/// The level that a strength reaches, if any.
+fn level(reached: f64) -> Option<f64> {
+    LEVELS.iter().find(|(_, least)| reached >= *least).map(|(level, _)| *level)
+}
+
+/// What a case asks for, by what shows in it: one effect of a pair that does not show makes it a case of one.
+fn settle(spec: &Spec, alone: &[f64]) -> (Category, f64) {
+    let strongest = alone.iter().copied().fold(0.0, f64::max);
+    match spec.category {
+        Category::Single | Category::Pair | Category::Triple => {
+            match alone.iter().filter(|a| **a >= SHOWS).count() {
+                3 => (Category::Triple, spec.strength),
+                2 => (Category::Pair, spec.strength),
+                _ => match level(strongest) {
+                    Some(level) => (Category::Single, level),
+                    None => (Category::CannotTell, spec.strength),
+                },
+            }
         }
-        if miss < 0.4 && closest.as_ref().is_none_or(|(m, _)| miss < *m) {
-            closest = Some((miss, case));
-        }
-        if attempt >= 7 && closest.is_some() {
-            break;
-        }
+        Category::Outside => (Category::Outside, level(strongest).unwrap_or(0.0)),
+        other => (other, spec.strength),
     }
-    closest.map(|(_, case)| case)
 }
 
 fn merged_needs(spec: &Spec) -> Needs {
@@ -112,9 +128,9 @@ fn merged_needs(spec: &Spec) -> Needs {
         all.rotary = all.rotary.or(n.rotary);
         all.tilt = all.tilt.or(n.tilt);
         all.place |= n.place;
-        all.turns |= n.turns;
         all.no_offset |= n.no_offset;
         all.fast |= n.fast;
+        all.direct |= n.direct;
     }
     if spec.category == Category::CannotTell {
         // Asymmetry with an offset allowed, imbalance on part of a turn.
@@ -137,7 +153,6 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
             machine.start_spread = Some(0.01 * machine.travel);
         }
     }
-    let kinds = draw_kinds(spec, &mut pick);
     let with_force = spec.hidden.contains(&"load_dependent_friction") || pick.chance(0.04);
     let declared = Declared {
         inertia: pick.range(0.05, 0.2),
@@ -155,8 +170,11 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     let plans = (0..3)
         .map(|k| {
             let mut own = rng.fork(&format!("recording/{k}"));
-            let excitation = excite::build(kinds[k], &machine, &mut own);
-            with_reference[k] = excitation.control.is_some() && own.chance(0.85);
+            let kinds = draw_kinds(spec, quick, &mut own);
+            let segments = excite::programme(&kinds, &machine, &mut own);
+            with_reference[k] = segments.iter().any(|s| s.control.is_some()) && own.chance(0.85);
+            // A machine that has run before is warm already.
+            let warm = if own.chance(0.4) { 0.0 } else { machine.duration * own.range(0.0, 0.5) };
             let start = match machine.start_spread {
                 Some(spread) => place + 0.5 * spread * own.range(-1.0, 1.0),
                 None => machine.plant.turn * own.range(0.0, 3.0),
@@ -171,7 +189,8 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
                 rough.values.iter_mut().for_each(|x| *x *= size);
             }
             Plan {
-                excitation,
+                segments,
+                warm,
                 times: machine.stamps(&mut own),
                 tilt: if machine.tilt { excite::tilt_sweep(&machine, &mut own) } else { Series::default() },
                 force: if with_force { excite::pushes(&machine, load, &mut own) } else { Series::default() },
@@ -185,7 +204,7 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         })
         .collect();
     let clips = spec.hidden.contains(&"command_saturation");
-    let mut draft = Draft { spec, rng, machine, declared, base: place, plans, noise_scale: 1.0 };
+    let mut draft = Draft { spec, rng, machine, declared, base: place, plans };
 
     if clips {
         draft.machine.peak_command = draft.peak_command().ok()?;
@@ -200,7 +219,7 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         };
         scales.push((i, s));
     }
-    // The second calibration may have moved the noise: each strength is measured again, alone, as it is.
+    // Beside the others each is measured again, alone, as it is.
     let mut alone = Vec::new();
     for scale in &scales {
         let now = draft.measured(scale.0, scale.1, &scales, 40e-6).ok()?;
@@ -208,10 +227,20 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     }
     let plant = draft.plant(&scales);
     let believed = draft.believed(&plant, &scales);
-    let recordings: Vec<Vec<Row>> =
+    let mut recordings: Vec<Vec<Row>> =
         draft.plans.iter().map(|p| draft.play(&plant, &believed, p, STEP)).collect::<Result<_, _>>().ok()?;
-    let rows: Vec<&[Row]> = recordings.iter().map(Vec::as_slice).collect();
     let m = &draft.machine;
+    for (k, recording) in recordings.iter_mut().enumerate() {
+        let times: Vec<f64> = recording.iter().map(|r| r.time).collect();
+        let stamps = m.stamping.of(&times, &mut rng.fork(&format!("stamps/{k}")));
+        let errs = m.stamping.by_chance();
+        for (row, stamp) in recording.iter_mut().zip(stamps) {
+            // Read as if at the stamp: at speed an error of time is one of place, and noise.
+            row.reading_error -= if errs { row.v * (stamp - row.time) } else { 0.0 };
+            row.stamp = stamp;
+        }
+    }
+    let rows: Vec<&[Row]> = recordings.iter().map(Vec::as_slice).collect();
     let together = measure(&rows[..2], 2, &believed, &declared, m.rate, m.residual_bandwidth());
     let held = measure(&rows[2..], 1, &believed, &declared, m.rate, m.residual_bandwidth());
     if together.moving < 0.08 || held.moving < 0.08 || recordings.iter().any(|r| lost_control(r, m)) {
@@ -220,10 +249,12 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     if scales.len() == 1 {
         alone[0] = together.effect / together.noise;
     }
+    let (category, level) = settle(spec, &alone);
+    let cold = draft.plans[..2].iter().all(|p| p.warm == 0.0);
     let truths = if spec.category == Category::Outside {
         Vec::new()
     } else {
-        spec.hidden.iter().flat_map(|name| effects::truth(name, &plant, &rows[..2])).collect()
+        spec.hidden.iter().flat_map(|name| effects::truth(name, &plant, &rows[..2], cold)).collect()
     };
     let nominal = draw_nominal(spec, &draft.machine, &plant, &declared, &mut rng.fork("nominal"));
     Some(Case {
@@ -236,7 +267,8 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         recordings,
         with_reference,
         with_force,
-        alone,
+        category,
+        level,
         together,
         truths,
     })
@@ -245,36 +277,21 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
 /// A drive that asks for its limit all the time, or a loop that has lost its reference: nobody would keep the recording.
 fn lost_control(rows: &[Row], m: &Machine) -> bool {
     let clipped = rows.iter().filter(|r| r.command.abs() > 0.999 * m.limit).count();
-    let (mut far, mut looped) = (0, false);
+    let mut far = 0;
     for row in rows {
-        looped |= row.reference_counts != 0.0;
         let error = (row.reference_counts - row.counts) / m.plant.counts_per_unit;
         far += usize::from(error.abs() > 0.2 * m.travel);
     }
-    clipped * 10 > rows.len() || looped && far * 10 > rows.len()
+    clipped * 10 > rows.len() || far * 10 > rows.len()
 }
 
-fn draw_kinds(spec: &Spec, pick: &mut Rng) -> [Kind; 3] {
+/// What is played in a recording, whatever is hidden: three kinds, in the small run two.
+fn draw_kinds(spec: &Spec, quick: bool, pick: &mut Rng) -> Vec<Kind> {
     if let Some(poor) = spec.poor {
-        return [*pick.pick(poor), *pick.pick(poor), *pick.pick(poor)];
+        return vec![*pick.pick(poor)];
     }
-    let lists: Vec<&[Kind]> = if spec.hidden.is_empty() {
-        vec![effects::kinds(""), &[Kind::Triangle, Kind::Hard, Kind::Injected, Kind::Ladder, Kind::Levels]]
-    } else if spec.category == Category::Outside {
-        spec.hidden.iter().map(|n| outside::kinds(n)).collect()
-    } else {
-        spec.hidden.iter().map(|n| effects::kinds(n)).collect()
-    };
-    let first = *pick.pick(lists[0]);
-    let mut second = *pick.pick(lists[lists.len() - 1]);
-    for _ in 0..4 {
-        if second != first {
-            break;
-        }
-        second = *pick.pick(lists[lists.len() - 1]);
-    }
-    let which = pick.below(lists.len());
-    [first, second, *pick.pick(lists[which])]
+    let mut left = excite::RICH.to_vec();
+    (0..if quick { 2 } else { 3 }).map(|_| left.swap_remove(pick.below(left.len()))).collect()
 }
 
 fn draw_nominal(spec: &Spec, m: &Machine, plant: &Plant, declared: &Declared, rng: &mut Rng) -> Nominal {

@@ -1,8 +1,8 @@
 //! A case before its strengths are found: a machine with plans for its recordings, played again and again.
 
 use super::case::Spec;
+use super::drive::Segment;
 use super::effects;
-use super::excite::Excitation;
 use super::machine::Machine;
 use super::outside;
 use super::plant::Plant;
@@ -13,7 +13,9 @@ use crate::rng::Rng;
 
 /// What is played and drawn for one recording.
 pub(super) struct Plan {
-    pub(super) excitation: Excitation,
+    pub(super) segments: Vec<Segment>,
+    /// How long the machine has been running already, s.
+    pub(super) warm: f64,
     pub(super) times: Vec<f64>,
     pub(super) tilt: Series,
     pub(super) force: Series,
@@ -33,7 +35,6 @@ pub(super) struct Draft<'a> {
     pub(super) declared: Declared,
     pub(super) base: f64,
     pub(super) plans: Vec<Plan>,
-    pub(super) noise_scale: f64,
 }
 
 impl Draft<'_> {
@@ -74,7 +75,7 @@ impl Draft<'_> {
     ) -> Result<Vec<Row>, Diverged> {
         let m = &self.machine;
         let coulomb = m.plant.dry.coulomb;
-        let scale = self.noise_scale * m.noise_share * coulomb;
+        let scale = m.noise_share * coulomb;
         let mut disturbance = plan.unit_noise.clone();
         disturbance.values.iter_mut().for_each(|x| *x *= scale);
         if !plan.rough.values.is_empty() {
@@ -84,8 +85,8 @@ impl Draft<'_> {
         }
         let run = Run {
             times: plan.times.clone(),
-            drive: plan.excitation.drive.clone(),
-            control: plan.excitation.control.clone(),
+            segments: plan.segments.clone(),
+            return_speed: m.top_speed,
             limit: m.limit,
             command_step: m.command_step,
             tilt: plan.tilt.clone(),
@@ -94,6 +95,8 @@ impl Draft<'_> {
             offset: plan.offset,
             start: plan.start,
             zero_counts: plan.zero,
+            noise_counts: m.noise_counts,
+            warm: plan.warm,
             speed_bound: 12.0 * m.top_speed,
             random: plan.random.clone(),
         };
@@ -134,10 +137,9 @@ impl Draft<'_> {
         Ok(commands[commands.len() * 98 / 100])
     }
 
-    /// Finds the scale of effect `i` alone at which effect over noise is `target`. Where the effect is at its bound, the
-    /// disturbance gives way, then the encoder gets finer.
+    /// Finds the scale of effect `i` alone at which effect over noise is `target`, or the bound of it that comes nearest.
     pub(super) fn calibrate(
-        &mut self,
+        &self,
         i: usize,
         target: f64,
         companions: &[(usize, f64)],
@@ -183,15 +185,12 @@ impl Draft<'_> {
                 s = if inside { wanted } else { (weak * strong).sqrt() };
                 continue;
             }
-            s = wanted.clamp(low, high);
-            if wanted > high || wanted < low {
-                let short = (wanted / s).powf(slope);
-                self.noise_scale = (self.noise_scale / short).clamp(0.03, 6.0);
-                if self.noise_scale <= 0.04 {
-                    self.machine.plant.counts_per_unit = (self.machine.plant.counts_per_unit * 2.0).round();
-                }
-                (last, weak, strong) = (None, None, None);
+            let bounded = wanted.clamp(low, high);
+            if (bounded / s).ln().abs() < 1e-3 {
+                // At its bound: the recordings show no more of it.
+                break;
             }
+            s = bounded;
         }
         Ok(s)
     }

@@ -146,6 +146,28 @@ impl Drive {
     }
 }
 
+/// A stretch of a recording with a drive and, under a loop, the loop.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Segment {
+    /// It begins at this time, s; its own time begins at nothing.
+    pub(crate) from: f64,
+    /// And lasts so long, s.
+    pub(crate) length: f64,
+    pub(crate) drive: Drive,
+    pub(crate) control: Option<Loop>,
+}
+
+impl Segment {
+    /// Place (from the start of the recording), speed and acceleration to follow at `t` of the segment's own time. A loop that
+    /// begins `away` from the start goes back at about `speed` while it follows.
+    pub(crate) fn reference(&self, t: f64, away: f64, speed: f64) -> (f64, f64, f64) {
+        let (q, v, a) = self.drive.reference(t);
+        let back = (3.0 * away.abs() / speed).clamp(0.05, 0.6 * self.length.max(0.1));
+        let x = (t / back).clamp(0.0, 1.0);
+        (q + away * (1.0 - x * x * (3.0 - 2.0 * x)), v - away * 6.0 * x * (1.0 - x) / back, a)
+    }
+}
+
 /// A digital loop on counts: proportional, derivative on a filtered difference, integral, and feed-forward of the nominal
 /// inertia, viscosity and dry friction where it is switched on. With a small `kp` it is a velocity loop with integral action.
 #[derive(Clone, Debug)]

@@ -3,7 +3,6 @@
 
 use std::f64::consts::TAU;
 
-use super::excite::Kind;
 use super::machine::{Machine, Needs};
 use super::plant::{
     Clip, Deadband, DeadbandKind, Drift, DriftLaw, Harmonic, LostCounts, Plant, Presliding, Shape, Stribeck,
@@ -50,8 +49,10 @@ pub(crate) fn needs(name: &str) -> Needs {
         "position_dependent_friction" | "position_spring" | "position_dependent_damping" => {
             needs.place = true
         }
-        "cogging" | "torque_ripple" => needs.turns = true,
-        "mass_imbalance" => needs.rotary = Some(true),
+        "mass_imbalance" => {
+            needs.rotary = Some(true);
+            needs.direct = true;
+        }
         "encoder_eccentricity" => {
             needs.rotary = Some(true);
             needs.fast = true;
@@ -62,35 +63,20 @@ pub(crate) fn needs(name: &str) -> Needs {
     needs
 }
 
-/// The excitations that show the effect; a case takes its recordings from these.
-pub(crate) fn kinds(name: &str) -> &'static [Kind] {
-    use Kind::*;
-    match name {
-        "viscous_friction" | "coulomb_friction" => &[Staircase, Trapezoids, Multisine, Levels],
-        "asymmetric_friction" => &[Staircase, Trapezoids, Triangle],
-        "stribeck_friction" => &[Staircase, Staircase, Triangle, Trapezoids],
-        "presliding_friction" => &[Ladder, Ladder, HoldRamp],
-        "quadratic_drag" => &[Staircase, Trapezoids, Levels],
-        "position_dependent_friction" => &[Triangle, Trapezoids],
-        "load_dependent_friction" => &[Triangle, Trapezoids, Staircase],
-        "friction_drift" => &[Triangle, Trapezoids, Hard],
-        "cogging" => &[Triangle, Staircase, Trapezoids],
-        "torque_ripple" => &[Hard, Injected, Trapezoids],
-        "command_deadband" => &[Multisine, Injected, Trapezoids],
-        "command_saturation" => &[Hard, Hard, Multisine],
-        "command_delay" | "electrical_lag" => &[Multisine, Injected],
-        "gain_drift" => &[Hard, Multisine, Injected],
-        "backlash" => &[Ladder, Injected, Multisine],
-        "drive_compliance" => &[Multisine, Injected],
-        "roller_slip" => &[Hard, Hard, Injected],
-        "mass_imbalance" => &[Triangle, Staircase, Trapezoids],
-        "tilt_gravity" => &[Triangle, Trapezoids, Staircase],
-        "position_spring" => &[Triangle, Trapezoids, Injected],
-        "position_dependent_damping" => &[Trapezoids, Triangle, Hard],
-        "encoder_eccentricity" => &[Staircase, Hard, Trapezoids],
-        "missed_counts" => &[Staircase, Trapezoids, Hard],
-        _ => &[Staircase, Trapezoids, Multisine],
-    }
+/// Whether two effects may be hidden together: not where one takes the other's place, nor where motor data cannot tell the
+/// two apart.
+pub(crate) fn go_together(a: &str, b: &str) -> bool {
+    const APART: [&[&str]; 8] = [
+        &["backlash", "drive_compliance", "roller_slip", "presliding_friction"],
+        &["command_delay", "electrical_lag"],
+        &["gain_drift", "friction_drift"],
+        &["mass_imbalance", "encoder_eccentricity", "cogging"],
+        &["mass_imbalance", "position_spring"],
+        &["coulomb_friction", "presliding_friction", "friction_drift", "command_deadband"],
+        &["viscous_friction", "friction_drift"],
+        &["position_spring", "position_dependent_friction", "position_dependent_damping"],
+    ];
+    a != b && !APART.iter().any(|list| list.contains(&a) && list.contains(&b))
 }
 
 /// (smallest, largest, first guess) of `s`.
@@ -247,7 +233,8 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
         "missed_counts" => {
             let above = if rng.chance(0.5) { 0.0 } else { v * rng.range(0.2, 0.5) };
             let rate = rng.range(0.8, 3.0);
-            plant.lost = Some(LostCounts { burst: s, rate, above_speed: above });
+            let both_ways = rng.chance(0.5);
+            plant.lost = Some(LostCounts { burst: s, both_ways, rate, above_speed: above });
         }
         other => unreachable!("`{other}` is not an effect of the contract"),
     }
@@ -293,7 +280,8 @@ fn harmonics(m: &Machine, rms: f64, rng: &mut Rng) -> Vec<Harmonic> {
 }
 
 /// The contract's parameters of the effect as they truly are, where the form drawn has them. `rows` are the fit recordings.
-pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]]) -> Vec<Parameter> {
+/// `cold`: they begin before anything has warmed.
+pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]], cold: bool) -> Vec<Parameter> {
     let mut list = Vec::new();
     let mut put = |parameter: &str, value: f64, force: bool| {
         list.push(Parameter { effect: name.into(), name: parameter.into(), value, force });
@@ -345,7 +333,10 @@ pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]]) -> Vec<Parameter
         "friction_drift" | "gain_drift" => {
             let drift = if name == "gain_drift" { plant.gain_drift } else { plant.dry.warm };
             if let Some(Drift { change, time_constant, law: DriftLaw::Exponential }) = drift {
-                put("change", change, false);
+                // From where a warm start begins it is another change in every recording.
+                if cold {
+                    put("change", change, false);
+                }
                 put("time_constant", time_constant, false);
             }
         }

@@ -1,6 +1,6 @@
 //! Excitations: what is played on a machine. Each kind is what an engineer would play to show some effects and not others.
 
-use super::drive::{Drive, Loop, Profile, Tones};
+use super::drive::{Drive, Loop, Profile, Segment, Tones};
 use super::machine::Machine;
 use super::simulate::Series;
 use crate::rng::Rng;
@@ -36,15 +36,39 @@ pub(crate) enum Kind {
     OneTriangle,
 }
 
-/// What is played in one recording.
-#[derive(Clone, Debug)]
-pub(crate) struct Excitation {
-    pub(crate) drive: Drive,
-    pub(crate) control: Option<Loop>,
+/// What an engineer may play on any machine, whatever is wrong with it.
+pub(crate) const RICH: [Kind; 9] = [
+    Kind::Staircase,
+    Kind::Triangle,
+    Kind::Ladder,
+    Kind::Trapezoids,
+    Kind::Hard,
+    Kind::Multisine,
+    Kind::Injected,
+    Kind::Levels,
+    Kind::HoldRamp,
+];
+
+/// Plays `kinds` one after another over the recording's duration, in shares by chance.
+pub(crate) fn programme(kinds: &[Kind], m: &Machine, rng: &mut Rng) -> Vec<Segment> {
+    let shares: Vec<f64> = kinds.iter().map(|_| rng.range(0.7, 1.3)).collect();
+    let total: f64 = shares.iter().sum();
+    let mut from = 0.0;
+    kinds
+        .iter()
+        .zip(shares)
+        .map(|(kind, share)| {
+            let part = Machine { duration: m.duration * share / total, ..m.clone() };
+            let (drive, control) = build(*kind, &part, rng);
+            let segment = Segment { from, length: part.duration, drive, control };
+            from += part.duration;
+            segment
+        })
+        .collect()
 }
 
-/// Builds an excitation of the kind for the machine.
-pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> Excitation {
+/// Builds an excitation of the kind for the machine, over the machine's duration.
+pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> (Drive, Option<Loop>) {
     let kind = match kind {
         Kind::Multisine if !m.rotary => Kind::Injected,
         Kind::SlowMultisine if !m.rotary => Kind::OneSine,
@@ -199,7 +223,7 @@ pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> Excitation {
         }
         control
     });
-    Excitation { drive, control }
+    (drive, control)
 }
 
 /// A tilt that goes slowly between random inclinations, rad.

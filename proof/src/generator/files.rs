@@ -61,6 +61,9 @@ fn rig_toml(case: &Case) -> String {
     if m.turn_told {
         let _ = writeln!(out, "turn = {:.9}", case.plant.turn);
     }
+    if m.noise_counts > 0.0 && m.noise_told {
+        let _ = writeln!(out, "noise_counts = {:.3}", m.noise_counts);
+    }
     if let Some(spread) = m.start_spread {
         let _ = writeln!(out, "start_spread = {spread:e}");
     }
@@ -80,7 +83,7 @@ fn csv(case: &Case, k: usize) -> String {
     }
     out.push('\n');
     for row in rows {
-        let _ = write!(out, "{:.6},{:.9},{:.0}", row.time, row.command, row.counts);
+        let _ = write!(out, "{:.6},{:.9},{:.0}", row.stamp, row.command, row.counts);
         if tilt {
             let _ = write!(out, ",{:.4}", row.tilt);
         }
@@ -97,7 +100,7 @@ fn csv(case: &Case, k: usize) -> String {
 
 /// The key of the case, as every folder of cases has it.
 pub(crate) fn key(case: &Case) -> Key {
-    let outside = case.spec.category == Category::Outside;
+    let outside = case.category == Category::Outside;
     let hidden = case.spec.hidden.first();
     let band = case.machine.residual_bandwidth();
     let held = case.held_out(band);
@@ -105,9 +108,12 @@ pub(crate) fn key(case: &Case) -> Key {
         effects: if outside { Vec::new() } else { case.spec.hidden.iter().map(|h| (*h).into()).collect() },
         unknown: hidden.filter(|_| outside).map(|h| (*h).into()),
         detector: outside && hidden.is_some_and(|h| outside::has_detector(h)),
-        strength: case.spec.strength,
+        strength: case.level,
         snr: (case.spec.strength > 0.0).then_some(case.together.effect / case.together.noise),
-        poverty: (case.spec.category == Category::CannotTell).then(|| "twin".into()),
+        poverty: (case.category == Category::CannotTell).then(|| {
+            // Poor recordings leave two names; what was asked for and does not show is hidden.
+            if case.spec.poor.is_some() { "twin".into() } else { "hidden".into() }
+        }),
         rig: format!("{}, {:.0} Hz", case.machine.name, case.machine.rate),
         oracle: Some(Oracle {
             floor: held.noise,
@@ -119,21 +125,21 @@ pub(crate) fn key(case: &Case) -> Key {
         parameters: case.truths.clone(),
         true_gain: Some(case.plant.gain),
         true_inertia: Some(case.plant.inertia),
-        ..Key::of(case.spec.category)
+        ..Key::of(case.category)
     }
 }
 
-/// Times in which the rows do not move.
+/// Times in which the rows do not move or turn round.
 fn still(rows: &[Row]) -> Vec<[f64; 2]> {
     let slowest = slowest(rows);
     let mut list: Vec<[f64; 2]> = Vec::new();
     for pair in rows.windows(2) {
-        if pair[0].moving && pair[0].v.abs() > slowest {
+        if pair[0].moving && pair[0].v.abs() > slowest && pair[0].v * pair[1].v > 0.0 {
             continue;
         }
-        match list.last_mut().filter(|last| last[1] == pair[0].time) {
-            Some(last) => last[1] = pair[1].time,
-            None => list.push([pair[0].time, pair[1].time]),
+        match list.last_mut().filter(|last| last[1] == pair[0].stamp) {
+            Some(last) => last[1] = pair[1].stamp,
+            None => list.push([pair[0].stamp, pair[1].stamp]),
         }
     }
     list

@@ -13,14 +13,14 @@ pub(crate) struct Needs {
     pub(crate) rotary: Option<bool>,
     /// The recordings must start at about the same place: the effect sits somewhere along the travel.
     pub(crate) place: bool,
-    /// The motor's turn is known or discoverable.
-    pub(crate) turns: bool,
     /// No weight, no tilt (they would hide the effect), or both wanted.
     pub(crate) tilt: Option<bool>,
     /// The nominal model has no offset key, and there is none.
     pub(crate) no_offset: bool,
     /// Only machines that turn fast.
     pub(crate) fast: bool,
+    /// Only machines without a gear: a turn of the motor is a turn of the load.
+    pub(crate) direct: bool,
 }
 
 /// A machine, its recorder and its range of work.
@@ -49,6 +49,10 @@ pub(crate) struct Machine {
     /// Tilt is recorded.
     pub(crate) tilt: bool,
     pub(crate) clock: Clock,
+    pub(crate) stamping: Stamping,
+    /// Standard deviation of a reading beyond its rounding, counts, and whether the rig file tells it.
+    pub(crate) noise_counts: f64,
+    pub(crate) noise_told: bool,
     /// |command| that the recordings exceed in 2 % of their rows; the drive's limit until it is measured.
     pub(crate) peak_command: f64,
     /// Loop bandwidth, rad/s.
@@ -67,6 +71,43 @@ pub(crate) enum Clock {
     Host(f64),
 }
 
+/// How the time of a row is written down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stamping {
+    True,
+    /// Off by chance with this standard deviation, s.
+    Noisy(f64),
+    /// In whole steps of so many s.
+    Rounded(f64),
+    /// A clock that is fast by so much.
+    Fast(f64),
+}
+
+impl Stamping {
+    /// Whether it errs anew with every row.
+    pub(crate) fn by_chance(self) -> bool {
+        matches!(self, Self::Noisy(_) | Self::Rounded(_))
+    }
+
+    /// What stands in the file for the times, in whole microseconds, increasing.
+    pub(crate) fn of(self, times: &[f64], rng: &mut Rng) -> Vec<f64> {
+        let mut last = f64::NEG_INFINITY;
+        times
+            .iter()
+            .map(|&t| {
+                let written = match self {
+                    Self::True => t,
+                    Self::Noisy(sd) => t + sd * rng.bounded_normal(3.0),
+                    Self::Rounded(step) => (t / step).round() * step,
+                    Self::Fast(by) => t * (1.0 + by),
+                };
+                last = ((written * 1e6).round() * 1e-6).max(last + 1e-6);
+                last
+            })
+            .collect()
+    }
+}
+
 impl Machine {
     /// Residual bandwidth in which strengths are defined, Hz: 100, or a twentieth of the rate where that is less.
     pub(crate) fn residual_bandwidth(&self) -> f64 {
@@ -81,8 +122,14 @@ impl Machine {
     /// Draws a machine. `quick` makes recordings of fewer rows.
     pub(crate) fn draw(rng: &mut Rng, needs: Needs, quick: bool) -> Self {
         let rotary = needs.rotary.unwrap_or_else(|| rng.chance(0.65));
-        let family = if rotary { rng.below(if needs.fast { 3 } else { 4 }) } else { 4 + rng.below(2) };
+        let family = match (rotary, needs.fast) {
+            (true, true) => rng.below(3),
+            (true, false) if needs.direct => rng.below(4),
+            (true, false) => *rng.pick(&[0, 1, 2, 3, 6, 7]),
+            _ => *rng.pick(&[4, 5, 8]),
+        };
         let mut cpu = 0.0;
+        let mut gear = 1.0;
         let (inertia, friction_acceleration, top_speed, limit, unit, rates, name): (
             f64,
             f64,
@@ -100,7 +147,7 @@ impl Machine {
                 friction_acceleration = 167.0 * rng.range(0.7, 1.6);
                 top_speed = rng.range(15.0, 50.0);
                 (limit, unit) = (1.2, "A");
-                rates = &[1000.0, 2000.0, 5000.0, 10_000.0, 10_000.0];
+                rates = &[500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0];
                 name = "needle drive";
             }
             2 => {
@@ -108,7 +155,7 @@ impl Machine {
                 friction_acceleration = rng.log_range(50.0, 300.0);
                 top_speed = rng.range(15.0, 80.0);
                 (limit, unit) = (rng.range(5.0, 20.0), "A");
-                rates = &[500.0, 1000.0, 2000.0, 4000.0, 20_000.0];
+                rates = &[250.0, 500.0, 1000.0, 2000.0, 4000.0, 20_000.0];
                 name = "servo drive";
             }
             3 => {
@@ -116,7 +163,7 @@ impl Machine {
                 friction_acceleration = rng.log_range(3.0, 20.0);
                 top_speed = rng.range(2.0, 10.0);
                 (limit, unit) = (rng.range(3.0, 10.0), "A");
-                rates = &[100.0, 200.0, 440.0, 1000.0];
+                rates = &[50.0, 100.0, 200.0, 440.0, 1000.0];
                 name = "direct drive";
             }
             4 => {
@@ -127,6 +174,25 @@ impl Machine {
                 rates = &[500.0, 1000.0, 2000.0, 5000.0];
                 name = "slide";
             }
+            // A joint behind a gear: much inertia and much friction, little speed.
+            6 | 7 => {
+                inertia = rng.log_range(0.05, 2.0);
+                friction_acceleration = rng.log_range(5.0, 60.0);
+                top_speed = rng.range(0.5, 3.0);
+                (limit, unit) = (rng.range(2.0, 15.0), "A");
+                rates = &[50.0, 100.0, 250.0, 500.0, 1000.0];
+                gear = rng.range(20.0, 160.0).round();
+                name = "geared joint";
+            }
+            // A lead screw or a syringe: its inertia hardly matters.
+            8 => {
+                inertia = rng.log_range(0.5, 10.0);
+                friction_acceleration = rng.log_range(3.0, 30.0);
+                top_speed = rng.log_range(0.01, 0.06);
+                (limit, unit) = (rng.range(1.0, 10.0), "A");
+                rates = &[20.0, 50.0, 100.0, 200.0];
+                name = "slow axis";
+            }
             _ => {
                 inertia = rng.log_range(30.0, 150.0);
                 friction_acceleration = rng.log_range(0.2, 0.6);
@@ -136,7 +202,7 @@ impl Machine {
                 name = "ball-screw axis";
             }
         }
-        let rate = *rng.pick(rates);
+        let rate = rng.pick(rates).min(if quick { 5000.0 } else { 20_000.0 });
         let coulomb = inertia * friction_acceleration;
         let gain = if family < 2 { 0.0234 } else { coulomb * rng.range(9.0, 22.0) / limit };
         let bandwidth_hz = (rate / 20.0).min(100.0);
@@ -150,12 +216,20 @@ impl Machine {
             cpu = if rotary { (TAU / count).round() / TAU } else { (1.0 / count).round() };
         }
         let rows = if quick { 7000.0 } else { rng.range(12_000.0, 30_000.0) };
-        let slowest = if quick { 20.0 } else { 50.0 };
-        let shortest = if quick { 6.0 } else { 10.0 };
+        let slowest = if quick { 20.0 } else { 60.0 };
+        let shortest = if quick { 8.0 } else { 12.0 };
         let duration = f64::clamp(rows / rate, shortest, slowest);
-        let turn = if rotary { TAU } else { rng.range(2.0, 20.0).round() * 1e-3 };
+        let turn = if rotary { TAU / gear } else { rng.range(2.0, 20.0).round() * 1e-3 };
         let travel = if rotary {
-            if needs.place { rng.range(1.6, 4.5) * TAU } else { (top_speed * duration / 6.0).max(3.0 * TAU) }
+            if gear > 1.0 {
+                rng.range(0.6, 2.5)
+            } else if needs.place {
+                rng.range(1.6, 4.5) * TAU
+            } else {
+                (top_speed * duration / 6.0).max(3.0 * TAU)
+            }
+        } else if top_speed < 0.08 {
+            rng.range(0.02, 0.1)
         } else {
             rng.range(0.12, 0.4)
         };
@@ -178,7 +252,19 @@ impl Machine {
             _ if rate <= 2000.0 => Clock::Host(rng.range(0.02, 0.08)),
             _ => Clock::Jitter(rng.range(0.02, 0.1)),
         };
+        // Never so far off that the place read at top speed is more than a count or so wrong.
+        let count_time = 1.0 / (cpu * top_speed);
+        let stamping = match rng.below(10) {
+            0 | 1 => Stamping::Noisy((rng.log_range(0.005, 0.1) / rate).min(count_time)),
+            2 => Stamping::Rounded((rng.log_range(0.02, 0.2) / rate).min(2.0 * count_time).max(2e-6)),
+            3 => Stamping::Fast(rng.sign() * rng.log_range(1e-5, 2e-4)),
+            _ => Stamping::True,
+        };
+        let noise_counts = if rng.chance(0.3) { rng.log_range(0.2, 2.0) } else { 0.0 };
         Self {
+            stamping,
+            noise_counts,
+            noise_told: rng.chance(0.7),
             rotary,
             name,
             command_unit: unit,
@@ -188,7 +274,7 @@ impl Machine {
             travel,
             rate,
             duration,
-            turn_told: rotary || rng.chance(0.6) || needs.turns && rng.chance(0.5),
+            turn_told: rotary || rng.chance(0.6),
             start_spread,
             offset_key,
             weight_key,

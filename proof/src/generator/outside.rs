@@ -1,12 +1,11 @@
 //! Physics outside the contract's names: the right answer is to say that something is there and that no name fits.
 
-use super::excite::Kind;
 use super::machine::{Machine, Needs};
 use super::plant::{Foreign, Plant};
 use crate::rng::Rng;
 
 /// The kinds of foreign physics.
-pub(crate) const FOREIGN: [&str; 8] = [
+pub(crate) const FOREIGN: [&str; 11] = [
     "creep_spring",
     "whirling_force",
     "hum",
@@ -15,6 +14,9 @@ pub(crate) const FOREIGN: [&str; 8] = [
     "linkage_inertia",
     "gear_loss",
     "speed_window_friction",
+    "one_way_flywheel",
+    "latching_force",
+    "travel_times_speed",
 ];
 
 /// Kinds that the tool tells for what they are, without a name: no longer outside.
@@ -28,28 +30,16 @@ pub(crate) fn has_detector(name: &str) -> bool {
 /// What it asks of the machine.
 pub(crate) fn needs(name: &str) -> Needs {
     let mut needs = Needs::default();
-    if matches!(name, "irregular_wells" | "linkage_inertia") {
+    if matches!(name, "irregular_wells" | "linkage_inertia" | "latching_force" | "travel_times_speed") {
         needs.place = true;
     }
     needs
 }
 
-/// Excitations that show it.
-pub(crate) fn kinds(name: &str) -> &'static [Kind] {
-    use Kind::*;
-    match name {
-        "irregular_wells" => &[Triangle, Trapezoids],
-        "payload_change" | "linkage_inertia" => &[Trapezoids, Injected, Hard],
-        "gear_loss" => &[Hard, Injected, Trapezoids],
-        "speed_window_friction" => &[Staircase, Trapezoids],
-        _ => &[Trapezoids, Staircase, Triangle],
-    }
-}
-
 /// (smallest, largest, first guess) of the scale.
 pub(crate) fn bounds(name: &str) -> (f64, f64, f64) {
     match name {
-        "payload_change" | "linkage_inertia" => (0.01, 1.5, 0.3),
+        "payload_change" | "linkage_inertia" | "one_way_flywheel" => (0.01, 1.5, 0.3),
         "gear_loss" => (0.005, 0.5, 0.1),
         _ => (0.01, 1.5, 0.2),
     }
@@ -88,6 +78,21 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
             share: s,
             centre: base + travel * rng.range(0.3, 0.6),
             width: travel * rng.range(0.1, 0.25),
+        },
+        "one_way_flywheel" => Foreign::Flywheel { share: s },
+        "latching_force" => {
+            let places = (0..3)
+                .map(|i| {
+                    let up = base + travel * (0.2 + 0.25 * f64::from(i) + rng.range(0.0, 0.1));
+                    (up, up - travel * rng.range(0.05, 0.15))
+                })
+                .collect();
+            Foreign::Latch { force: s * coulomb, places, side: rng.sign() }
+        }
+        "travel_times_speed" => Foreign::Shuttle {
+            amplitude: s * coulomb * rng.sign(),
+            centre: base + travel * rng.range(0.3, 0.6),
+            scale: rng.range(0.1, 0.3) * 0.5 * travel * v,
         },
         "gear_loss" => {
             plant.dry.per_drive = s;

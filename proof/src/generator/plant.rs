@@ -52,7 +52,7 @@ pub(crate) struct Drift {
 }
 
 impl Drift {
-    /// The factor at time `t` after the start of the recording.
+    /// The factor at time `t` after the cold start.
     pub(crate) fn factor(&self, t: f64) -> f64 {
         let x = t.max(0.0) / self.time_constant;
         let settled = match self.law {
@@ -170,6 +170,12 @@ pub(crate) enum Foreign {
     Wells { wells: Vec<(f64, f64, f64)> },
     /// The inertia changes at once during the recording.
     PayloadChange { share: f64, at: f64 },
+    /// A flywheel behind a one-way clutch: inertia only while it is pushed along.
+    Flywheel { share: f64 },
+    /// A force that turns round at places of its own on the way up and on the way down.
+    Latch { force: f64, places: Vec<(f64, f64)>, side: f64 },
+    /// A force of the product of travel and speed, rising and falling again.
+    Shuttle { amplitude: f64, centre: f64, scale: f64 },
     /// Configuration-dependent inertia (a linkage): J(q) = J·(1 + share·shape), with its ½J′v² force.
     Linkage { share: f64, centre: f64, width: f64 },
 }
@@ -177,8 +183,10 @@ pub(crate) enum Foreign {
 /// Where and how the encoder loses counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LostCounts {
-    /// Counts a burst; always against the motion.
+    /// Counts a burst.
     pub(crate) burst: f64,
+    /// Lost and won alike, instead of always against the motion.
+    pub(crate) both_ways: bool,
     /// Bursts a second while moving.
     pub(crate) rate: f64,
     /// Bursts come only above this speed.

@@ -2,7 +2,7 @@
 //! steps of 10 µs or less. A step that would reverse the motion under friction ends at rest, so stick and slip are events
 //! and no speed threshold decides them. Commands change only at row stamps: the zero-order hold of the contract.
 
-use super::drive::{Drive, Loop};
+use super::drive::{Loop, Segment};
 use super::plant::{Foreign, Plant, Presliding, Train, harmonic_sum, sign};
 use crate::rng::Rng;
 
@@ -44,8 +44,10 @@ pub(crate) struct Believed {
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     pub(crate) times: Vec<f64>,
-    pub(crate) drive: Drive,
-    pub(crate) control: Option<Loop>,
+    /// One after another; the first begins at the start.
+    pub(crate) segments: Vec<Segment>,
+    /// Speed at which a loop comes back to the place where it has to begin, u/s.
+    pub(crate) return_speed: f64,
     /// Largest |command| that is sent.
     pub(crate) limit: f64,
     /// Resolution of the command.
@@ -61,6 +63,10 @@ pub(crate) struct Run {
     pub(crate) start: f64,
     /// What the encoder shows at mechanical zero.
     pub(crate) zero_counts: f64,
+    /// Standard deviation of a reading beyond its rounding, counts.
+    pub(crate) noise_counts: f64,
+    /// How long the machine has been running already, for what warms, s.
+    pub(crate) warm: f64,
     /// |speed| beyond which the run counts as diverged.
     pub(crate) speed_bound: f64,
     pub(crate) random: Rng,
@@ -70,6 +76,8 @@ pub(crate) struct Run {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Row {
     pub(crate) time: f64,
+    /// Time as the recorder wrote it down.
+    pub(crate) stamp: f64,
     pub(crate) command: f64,
     pub(crate) counts: f64,
     pub(crate) reference_counts: f64,
@@ -103,6 +111,10 @@ struct State {
     creep: f64,
     phase: f64,
     lost: f64,
+    /// Speed of a flywheel behind a one-way clutch.
+    flywheel: f64,
+    /// Latches that have snapped over, one bit each.
+    latched: u32,
 }
 
 /// Plays the run. Steps are at most `max_step` ([`STEP`] for recordings; coarser only while a strength is being sought).
@@ -113,7 +125,9 @@ pub(crate) fn simulate(
     max_step: f64,
 ) -> Result<Vec<Row>, Diverged> {
     let mut random = run.random.clone();
-    let mut control = run.control.clone();
+    let mut segment = 0_usize;
+    let mut control: Option<Loop> = run.segments.first().and_then(|s| s.control.clone());
+    let mut away = 0.0;
     let elements = match &plant.dry.presliding {
         Some(Presliding::MaxwellSlip { elements }) => elements.len(),
         _ => 0,
@@ -129,6 +143,8 @@ pub(crate) fn simulate(
         creep: run.start,
         phase: random.range(0.0, std::f64::consts::TAU),
         lost: 0.0,
+        flywheel: 0.0,
+        latched: 0,
     };
     let hum_phase = s.phase;
     let duration = run.times.last().copied().unwrap_or(0.0);
@@ -144,23 +160,35 @@ pub(crate) fn simulate(
             && random.chance(1.0 - (-lost.rate * interval).exp())
         {
             // A burst never exceeds what passed since the row before would allow by much; against the motion.
-            s.lost += sign(s.v) * (lost.burst * random.range(0.6, 1.4)).round();
+            let side = if lost.both_ways { random.sign() } else { 1.0 };
+            s.lost += side * sign(s.v) * (lost.burst * random.range(0.6, 1.4)).round();
         }
-        let counts = (plant.counts_per_unit * (s.q + error) + run.zero_counts).floor() - s.lost;
+        let noise = if run.noise_counts > 0.0 { run.noise_counts * random.normal() } else { 0.0 };
+        let counts = (plant.counts_per_unit * (s.q + error) + run.zero_counts + noise).floor() - s.lost;
         let reading = (counts - run.zero_counts) / plant.counts_per_unit;
+        while run.segments.get(segment + 1).is_some_and(|next| next.from <= time) {
+            segment += 1;
+            control = run.segments[segment].control.clone();
+            away = reading - run.start;
+        }
+        let playing = &run.segments[segment];
+        let own = time - playing.from;
         let (mut command, reference) = match &mut control {
-            None => (run.drive.command(time), 0.0),
+            // Nothing is followed: the reference is where the machine is.
+            None => (playing.drive.command(own), counts),
             Some(l) => {
-                let (target, target_speed, target_acceleration) = run.drive.reference(time);
+                let (target, target_speed, target_acceleration) =
+                    playing.reference(own, away, run.return_speed);
                 let wanted =
                     l.command(reading - run.start, target, target_speed, target_acceleration, interval);
                 let reference = ((run.start + target) * plant.counts_per_unit + run.zero_counts).round();
-                (wanted + run.drive.injected(time), reference)
+                (wanted + playing.drive.injected(own), reference)
             }
         };
         command = (command.clamp(-run.limit, run.limit) / run.command_step).round() * run.command_step;
         rows.push(Row {
             time,
+            stamp: time,
             command,
             counts,
             reference_counts: reference,
@@ -255,7 +283,7 @@ fn advance(
     } else {
         s.current = shaped;
     }
-    let drive = plant.force_constant(s.q, t) * s.current;
+    let drive = plant.force_constant(s.q, t + run.warm) * s.current;
     let external = run.force.at(t);
     let motor = drive + harmonic_sum(&plant.cogging, plant.angle(s.q));
     let (share, friction_share) = match plant.train {
@@ -284,7 +312,7 @@ fn advance(
     }
 
     if rigid {
-        let level = |v: f64| plant.dry_level(v, s.q, t, external, drive);
+        let level = |v: f64| plant.dry_level(v, s.q, t + run.warm, external, drive);
         let smooth = motor + load - plant.viscous * (1.0 + plant.viscous_asymmetry * sign(s.v)) * s.v;
         let at_rest;
         if let Some(presliding) = &plant.dry.presliding {
@@ -305,7 +333,7 @@ fn advance(
     let viscous = |v: f64, part: f64| plant.viscous * part * (1.0 + plant.viscous_asymmetry * sign(v)) * v;
     let motor_smooth = motor - coupling - viscous(s.v, 1.0 - friction_share);
     let load_smooth = load + coupling - viscous(s.load_v, friction_share);
-    let level = |v: f64, q: f64, part: f64| part * plant.dry_level(v, q, t, external, drive);
+    let level = |v: f64, q: f64, part: f64| part * plant.dry_level(v, q, t + run.warm, external, drive);
     let (q, load_q) = (s.q, s.load_q);
     let (v, at_rest) =
         under_friction(jm * s.v + h * motor_smooth, jm, h, s.v, |v| level(v, q, 1.0 - friction_share));
@@ -417,6 +445,30 @@ fn foreign_force(
                 *inertia *= 1.0 + share;
             }
             0.0
+        }
+        Foreign::Flywheel { share } => {
+            // A one-way clutch: the flywheel is pushed along and never holds back.
+            if v >= s.flywheel - 1e-12 {
+                *inertia *= 1.0 + share;
+                s.flywheel = v;
+            } else {
+                s.flywheel *= 1.0 - h / 0.5;
+            }
+            0.0
+        }
+        Foreign::Latch { force, places, side } => {
+            for (i, &(up, down)) in places.iter().enumerate() {
+                if q > up {
+                    s.latched |= 1 << i;
+                } else if q < down {
+                    s.latched &= !(1 << i);
+                }
+            }
+            if s.latched.count_ones() % 2 == 1 { *force * side } else { -force * side }
+        }
+        Foreign::Shuttle { amplitude, centre, scale } => {
+            let x = (q - centre) * v / scale;
+            amplitude * 2.0 * x / (1.0 + x * x)
         }
         Foreign::Linkage { share, centre, width } => {
             let x = (q - centre) / width;

@@ -42,18 +42,18 @@ pub(crate) fn table(case: &Case, k: usize) -> Table {
     let source = &case.recordings[k];
     let (rate, band) = (case.machine.rate, case.machine.residual_bandwidth());
     let (Some(first), Some(last)) = (source.first(), source.last()) else { return Table::default() };
-    let n = ((last.time - first.time) * rate) as usize;
+    let n = ((last.stamp - first.stamp) * rate) as usize;
     let columns: [fn(&crate::generator::simulate::Row) -> f64; 4] =
         [|r| r.counts, |r| r.command, |r| r.tilt, |r| r.force];
     let mut even: [Vec<f64>; 4] = Default::default();
     let mut j = 0;
     for i in 0..n {
-        let t = first.time + i as f64 / rate;
-        while j + 2 < source.len() && source[j + 1].time <= t {
+        let t = first.stamp + i as f64 / rate;
+        while j + 2 < source.len() && source[j + 1].stamp <= t {
             j += 1;
         }
         let (a, b) = (&source[j], &source[j + 1]);
-        let share = (t - a.time) / (b.time - a.time);
+        let share = (t - a.stamp) / (b.stamp - a.stamp);
         for (c, column) in columns.iter().enumerate() {
             let value = if c == 1 {
                 // Held commands: the mean around the grid point.

@@ -1,23 +1,25 @@
-//! What one would do without the tool, on the same files: refit only, forward selection by BIC, sparse regression, an
-//! unstructured residual model. Each written in the straightforward way, on one common estimate of the motion.
+//! What one would do without the tool, on the same files: refit only, forward selection by BIC, sparse regression, a score
+//! test without opponents, an unstructured residual model, and a fit that has been told the whole structure. Each written in the straightforward way, on one common estimate of the motion.
 
 mod estimate;
 mod features;
+mod score_test;
 
+use crate::dynamics::Bench;
 use crate::generator::case::Case;
+use crate::key::{Category, Key};
 use crate::rng::Rng;
 use crate::signal::Normal;
 use estimate::Table;
 use features::Feature;
 
 /// What a rival says of a case.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Opinion {
+    /// Whose it is, in [`RIVALS`].
+    pub(crate) rival: usize,
     /// Names in the contract's words, three at most; empty for rivals that name nothing.
     pub(crate) names: Vec<&'static str>,
-    /// Held-out mean square of the force residual, and the refit's.
-    pub(crate) mean_square: f64,
-    pub(crate) refit_mean_square: f64,
     /// Held-out gain over an oracle's at the rivals' bandwidth; `None` where there is nothing to gain.
     pub(crate) share: Option<f64>,
 }
@@ -30,16 +32,34 @@ pub(crate) struct Rival {
     pub(crate) names: bool,
 }
 
-/// The rivals, in the order of [`judge`]'s result.
-pub(crate) const RIVALS: [Rival; 4] = [
+/// The rivals.
+pub(crate) const RIVALS: [Rival; 6] = [
+    Rival { name: "told the structure, least squares", names: false },
     Rival { name: "refit only", names: false },
     Rival { name: "forward selection by BIC", names: true },
     Rival { name: "sparse regression", names: true },
+    Rival { name: "score test without opponents", names: true },
     Rival { name: "unstructured", names: false },
 ];
 
+/// The fit that has been told the whole structure, by the judge's inverse dynamics; none where there is nothing to gain, or
+/// the effect has no law with few enough numbers.
+pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Option<Opinion> {
+    if !matches!(key.category, Category::Single | Category::Pair | Category::Triple) {
+        return None;
+    }
+    let (bench, oracle) = (bench.as_ref().ok()?, key.oracle.as_ref()?);
+    let left = bench.known_structure(key).ok()?;
+    let room = oracle.refit.powi(2) - oracle.floor.powi(2);
+    if room < EXPLAINABLE_BY_KEY * oracle.floor.powi(2) {
+        return None;
+    }
+    let share = ((bench.refit().powi(2) - left.powi(2)) / room).clamp(-2.0, 2.0);
+    Some(Opinion { rival: 0, names: Vec::new(), share: Some(share) })
+}
+
 /// Every rival on the case.
-pub(crate) fn judge(case: &Case) -> [Opinion; 4] {
+pub(crate) fn judge(case: &Case) -> [Opinion; 5] {
     let tables: Vec<Table> = (0..3).map(|k| estimate::table(case, k)).collect();
     let features = features::library(case, &tables);
     let base = features.iter().filter(|f| f.nominal).count();
@@ -62,30 +82,30 @@ pub(crate) fn judge(case: &Case) -> [Opinion; 4] {
         held_out(&columns[2], &tables[2], coefficients, field) * case.plant.inertia.powi(2)
     };
     let refit_mean_square = judged(&refit, None);
-    let opinion = |names: Vec<&'static str>, coefficients: &[f64]| Opinion {
-        names,
-        mean_square: judged(coefficients, None),
-        refit_mean_square,
-        share: None,
-    };
-    let (forward, forward_names) = forward_bic(&features, &normal, &nominal, tables[0].independent);
-    let (sparse, sparse_names) = thresholding(&features, &normal, &nominal, tables[0].independent);
-    let field = unstructured(case, &columns, &tables, &refit);
-    let mut flexible = opinion(Vec::new(), &refit);
-    flexible.mean_square = judged(&refit, Some(&field));
-    let mut all = [
-        opinion(Vec::new(), &refit),
-        opinion(forward_names, &forward),
-        opinion(sparse_names, &sparse),
-        flexible,
-    ];
     let oracle = case.held_out(case.machine.residual_bandwidth()).noise.powi(2);
-    all.iter_mut().for_each(|o| o.share = share_of_oracle(o.refit_mean_square, o.mean_square, oracle));
-    all
+    let opinion = |rival: usize, names: Vec<&'static str>, mean_square: f64| Opinion {
+        rival,
+        names,
+        share: share_of_oracle(refit_mean_square, mean_square, oracle),
+    };
+    let independent = tables[0].independent;
+    let (forward, forward_names) = forward_bic(&features, &normal, &nominal, independent);
+    let (sparse, sparse_names) = thresholding(&features, &normal, &nominal, independent);
+    let (scored, scored_names) = score_test::select(&features, &normal, &columns, &tables, &nominal);
+    let field = unstructured(case, &columns, &tables, &refit);
+    [
+        opinion(1, Vec::new(), refit_mean_square),
+        opinion(2, forward_names, judged(&forward, None)),
+        opinion(3, sparse_names, judged(&sparse, None)),
+        opinion(4, scored_names, judged(&scored, None)),
+        opinion(5, Vec::new(), judged(&refit, Some(&field))),
+    ]
 }
 
 /// Less than this part of the refit's mean square left to an oracle, and there is nothing to gain.
 const EXPLAINABLE: f64 = 0.05;
+/// The same against the noise's mean square, as the judge has it.
+const EXPLAINABLE_BY_KEY: f64 = 0.15;
 
 /// Share of what an oracle, which has the true model and leaves the noise, takes off the held-out mean square.
 fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {

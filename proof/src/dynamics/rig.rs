@@ -1,0 +1,128 @@
+//! A rig file as the judge reads it, patched or not.
+
+use std::collections::BTreeMap;
+
+use toml::{Table, Value};
+
+/// Numbers by name.
+pub(crate) type Numbers = BTreeMap<String, f64>;
+
+/// An effect of a patched rig.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    pub(crate) shape: Numbers,
+    pub(crate) coefficients: Numbers,
+}
+
+impl Entry {
+    pub(crate) fn shape(&self, key: &str, otherwise: f64) -> f64 {
+        self.shape.get(key).copied().unwrap_or(otherwise)
+    }
+
+    pub(crate) fn coefficient(&self, key: &str) -> f64 {
+        self.coefficients.get(key).copied().unwrap_or(0.0)
+    }
+
+    pub(crate) fn is_set(&self, key: &str) -> bool {
+        self.shape(key, 0.0) > 0.5
+    }
+}
+
+/// What the judge needs of a rig; units as in the contract.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Rig {
+    pub(crate) inertia: f64,
+    pub(crate) viscous: Option<f64>,
+    pub(crate) coulomb: Option<f64>,
+    pub(crate) offset: Option<f64>,
+    pub(crate) weight: Option<f64>,
+    pub(crate) gain: f64,
+    pub(crate) limit: f64,
+    pub(crate) counts_per_unit: f64,
+    /// Travel per turn; 2π where it is rotary, unknown where it is linear and not told.
+    pub(crate) turn: Option<f64>,
+    pub(crate) start_spread: Option<f64>,
+    /// Relative standard deviations by name; absolute for the offset.
+    pub(crate) uncertainty: Numbers,
+    pub(crate) effects: Vec<Entry>,
+}
+
+impl Rig {
+    /// Reads the text of a rig file.
+    ///
+    /// # Errors
+    /// What is missing, without the file's name.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let table: Table = text.parse().map_err(|e: toml::de::Error| e.message().to_string())?;
+        let section = |name: &str| table.get(name).and_then(Value::as_table);
+        let number = |name: &str, key: &str| section(name).and_then(|t| t.get(key)).and_then(as_number);
+        let needed = |name: &str, key: &str| number(name, key).ok_or(format!("[{name}] has no `{key}`"));
+        // What a linear rig says of neither is not in the equation of the judge.
+        for key in ["gravity"] {
+            if number("model", key).is_some_and(|x| x != 0.0) {
+                return Err(format!("the judge has no term for `{key}`"));
+            }
+        }
+        let rotary = table.get("kind").and_then(Value::as_str) == Some("rotary");
+        let effects = table.get("effect").and_then(Value::as_array).into_iter().flatten();
+        let entry = |value: &Value| {
+            let t = value.as_table().ok_or("an [[effect]] is no table")?;
+            Ok::<_, String>(Entry {
+                name: t.get("name").and_then(Value::as_str).ok_or("an [[effect]] has no name")?.to_string(),
+                shape: numbers(t.get("shape")),
+                coefficients: numbers(t.get("coefficients")),
+            })
+        };
+        Ok(Self {
+            inertia: needed("model", "inertia")?,
+            viscous: number("model", "viscous"),
+            coulomb: number("model", "coulomb"),
+            offset: number("model", "offset"),
+            weight: number("model", "weight"),
+            gain: needed("actuator", "gain")?,
+            limit: number("actuator", "limit").unwrap_or(f64::INFINITY),
+            counts_per_unit: needed("encoder", "counts_per_unit")?,
+            turn: number("encoder", "turn").or(rotary.then_some(std::f64::consts::TAU)),
+            start_spread: number("encoder", "start_spread"),
+            uncertainty: numbers(table.get("uncertainty")),
+            effects: effects.map(entry).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Relative standard deviation of a nominal value, or what is assumed where none is declared.
+    pub(crate) fn sigma(&self, key: &str, otherwise: f64) -> f64 {
+        self.uncertainty.get(key).copied().unwrap_or(otherwise).max(1e-4)
+    }
+}
+
+fn as_number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Float(x) => Some(*x),
+        Value::Integer(x) => Some(*x as f64),
+        _ => None,
+    }
+}
+
+fn numbers(value: Option<&Value>) -> Numbers {
+    let table = value.and_then(Value::as_table);
+    table.into_iter().flatten().filter_map(|(k, v)| Some((k.clone(), as_number(v)?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_patched_rig_is_read() {
+        let text = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 2\ncoulomb = 0.1\n[uncertainty]\ncoulomb = 0.3\n\
+            [actuator]\ngain = 0.5\n[encoder]\ncounts_per_unit = 1000\n\
+            [[effect]]\nname = \"stribeck_friction\"\n[effect.shape]\nspeed = 3.0\n[effect.coefficients]\npeak = 0.2\n";
+        let rig = Rig::parse(text).unwrap();
+        assert_eq!((rig.inertia, rig.coulomb, rig.viscous), (2.0, Some(0.1), None));
+        assert_eq!(rig.turn, Some(std::f64::consts::TAU));
+        assert_eq!((rig.effects[0].shape("speed", 0.0), rig.effects[0].coefficient("peak")), (3.0, 0.2));
+        assert_eq!((rig.sigma("coulomb", 0.5), rig.sigma("inertia", 0.1)), (0.3, 0.1));
+        assert!(Rig::parse("[model]\n").unwrap_err().contains("inertia"));
+    }
+}
