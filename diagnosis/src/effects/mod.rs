@@ -8,12 +8,14 @@ mod command;
 mod law;
 mod load;
 mod name;
+mod table;
 
 pub(crate) use bristles::lengths as bristle_lengths;
 pub use command::CommandLaw;
 pub use law::{Law, State};
 pub(crate) use law::{legendre, wave_mean};
 pub use name::{EffectName, Subsystem};
+pub use table::Variable;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

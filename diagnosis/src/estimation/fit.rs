@@ -118,10 +118,10 @@ pub(crate) struct Fit {
 }
 
 /// A place in the common vector: its key and, where it is a recording's own, which.
-type Place = (Key, Option<usize>);
+pub(crate) type Place = (Key, Option<usize>);
 
 /// Where each column of each recording stands in the common vector of coefficients.
-fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<Place>) {
+pub(crate) fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<Place>) {
     let mut keys: Vec<Place> = Vec::new();
     let places = prepared
         .iter()

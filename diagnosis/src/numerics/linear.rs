@@ -63,6 +63,12 @@ impl Factor {
         Self { n, l, scale, live }
     }
 
+    /// Logarithm of the determinant, without the directions that carry no information.
+    pub(crate) fn log_det(&self) -> f64 {
+        let live = (0..self.n).filter(|i| self.live[*i]);
+        live.map(|i| 2.0 * (self.l[i * self.n + i] / self.scale[i]).ln()).sum()
+    }
+
     pub(crate) fn solve(&self, b: &[f64]) -> Vec<f64> {
         let n = self.n;
         let mut x: Vec<f64> = b.iter().zip(&self.scale).map(|(b, s)| b * s).collect();

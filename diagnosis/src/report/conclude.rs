@@ -15,6 +15,7 @@ use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::assess::{Assessed, Assessment, weigh};
 use crate::validation::comparison::Shown;
 use crate::validation::known_travel;
+use crate::validation::opponent;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
 use crate::validation::residual_maps::{self, Map};
@@ -32,18 +33,22 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
     let refit = context.fit(Model::default(), &s.null.noise, Colour::White);
-    let assessment = weigh(&mut s, &context, &refit, &holdout_tracks, &excitation);
+    let mut assessment = weigh(&mut s, &context, &refit, &holdout_tracks, &excitation);
     s.fit_tracks = fit_tracks.clone();
     if let Some(reason) = misfit(&assessment, &nominal) {
         return Outcome::cannot_tell(&nominal.rig, reason);
     }
+    opponent::oppose(&mut assessment, &context, &s);
     let maps_of = |shown: &Shown| {
         let (on_fit, on_holdout) = (&shown.on_fit.patched, &shown.on_holdout.patched);
         residual_maps::maps((&fit_tracks, on_fit), (&holdout_tracks, on_holdout), nominal.rig.turn())
     };
     let maps_with_all = maps_of(&assessment.shown);
     let foreign = if assessment.named().is_empty() {
-        out_of_library::alone(&context, &refit, &holdout_tracks)
+        out_of_library::alone(&context, &refit, &holdout_tracks).or_else(|| {
+            let taken = opponent::alone(&context, &s)?;
+            Some(format!("a force over {} would explain it", taken.inputs.in_words()))
+        })
     } else {
         None
     };

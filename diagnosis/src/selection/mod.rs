@@ -3,6 +3,7 @@
 
 pub(crate) mod candidates;
 pub(crate) mod excitation;
+pub(crate) mod free_form;
 pub(crate) mod joint;
 pub(crate) mod periodic;
 pub(crate) mod score_test;

@@ -7,6 +7,7 @@ pub(crate) mod confidence;
 pub(crate) mod evidence;
 pub(crate) mod holdout;
 pub(crate) mod known_travel;
+pub(crate) mod opponent;
 pub(crate) mod out_of_library;
 pub(crate) mod parameters;
 pub(crate) mod residual_maps;

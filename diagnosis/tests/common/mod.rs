@@ -234,6 +234,13 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                     force = through.signum() * 0.8 * ceiling;
                 }
             }
+            if is("sine_of_speed") {
+                force += 2e-4 * s * (0.7 * v).sin();
+            }
+            if is("bump_of_travel_times_speed") {
+                let x = (q - 2.0) * v / 40.0;
+                force += 2e-4 * s * 2.0 * x / (1.0 + x * x);
+            }
             if is("outside") {
                 // A hysteresis that follows the slow past of the speed: nothing in the library.
                 z += (v - z) * dt / 0.08;

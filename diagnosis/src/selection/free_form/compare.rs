@@ -1,0 +1,157 @@
+//! What left-out blocks say of models with and without free forms.
+
+use super::basis::Inputs;
+use crate::estimation::blocked_recording::BlockedRecording;
+
+/// Log predictive density of each left-out unit, up to a constant of the data.
+#[derive(Debug, Clone)]
+pub(crate) struct Density(pub(super) Vec<f64>);
+
+/// Gain of one model over another on left-out units.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gain {
+    /// Sum, nats.
+    pub(crate) sum: f64,
+    /// Its standard error, nats.
+    pub(crate) error: f64,
+    /// Standard errors of the mean where each unit counts up to a limit: one with a huge gain is one witness.
+    steady: f64,
+}
+
+/// Most that one unit counts, nats.
+const WITNESS: f64 = 10.0;
+/// Standard errors from which a gain is sure: ten forms are asked of every model.
+const SURE: f64 = 3.0;
+
+impl Density {
+    pub(crate) fn over(&self, other: &Self) -> Gain {
+        let gains: Vec<f64> = self.0.iter().zip(&other.0).map(|(a, b)| a - b).collect();
+        let n = gains.len().max(2) as f64;
+        let moments = |x: &dyn Fn(f64) -> f64| {
+            let mean = gains.iter().map(|g| x(*g)).sum::<f64>() / n;
+            let variance = gains.iter().map(|g| (x(*g) - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            (mean * n, (variance * n).sqrt())
+        };
+        let (sum, error) = moments(&|g| g);
+        let (steady, steady_error) = moments(&|g| g.clamp(-WITNESS, WITNESS));
+        Gain { sum, error, steady: steady / steady_error.max(1e-300) }
+    }
+}
+
+impl Gain {
+    /// Whether it is surely above nought.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.sum > 0.0 && self.z() > SURE
+    }
+
+    /// Standard errors above nought, with or without a limit on what a unit counts, whichever is more.
+    pub(crate) fn z(&self) -> f64 {
+        (self.sum / self.error.max(1e-300)).max(self.steady)
+    }
+}
+
+/// A model and what it takes with each form beside it.
+pub(crate) struct Densities {
+    pub(crate) alone: Density,
+    pub(crate) with: Vec<(Inputs, Density)>,
+}
+
+/// A form that makes an effect needless.
+pub(crate) struct Against {
+    pub(crate) inputs: Inputs,
+    /// What the form takes in the effect's place or beside it, whichever is more, nats.
+    pub(crate) most: f64,
+    /// How much more that is than the effect takes.
+    beyond: Gain,
+}
+
+/// An effect of a model on left-out blocks.
+pub(crate) struct Standing {
+    /// What it takes.
+    pub(crate) own: Gain,
+    pub(crate) against: Option<Against>,
+}
+
+/// A form and what it takes beside a model.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taken {
+    pub(crate) inputs: Inputs,
+    pub(crate) gain: Gain,
+}
+
+/// Part of what a free form takes that an effect must take to be named, and must take beyond it where it takes less.
+const NEARLY_ALL: f64 = 0.9;
+/// Part of the innovations' mean square that a form must take to be told.
+const TOLD: f64 = 0.005;
+
+impl Densities {
+    /// What each form takes beside the model, most first.
+    pub(crate) fn taken(&self) -> Vec<Taken> {
+        let one =
+            |(inputs, with): &(Inputs, Density)| Taken { inputs: *inputs, gain: with.over(&self.alone) };
+        let mut all: Vec<Taken> = self.with.iter().map(one).collect();
+        all.sort_by(|a, b| b.gain.sum.total_cmp(&a.gain.sum));
+        all
+    }
+
+    /// How an effect stands, given the densities of the model without it.
+    pub(crate) fn standing(&self, without: &Self) -> Standing {
+        let own = self.alone.over(&without.alone);
+        let against = self.with.iter().zip(&without.with).filter_map(|((inputs, both), (_, form))| {
+            let (most, instead) = (both.over(&without.alone).sum, form.over(&without.alone).sum);
+            let better = if instead > most { form } else { both };
+            let most = most.max(instead);
+            let (beyond, beside) = (better.over(&self.alone), both.over(form).sum);
+            let little = (1.0 - NEARLY_ALL) * most;
+            (beyond.is_sure() && beyond.sum > little && beside < little).then_some(Against {
+                inputs: *inputs,
+                most,
+                beyond,
+            })
+        });
+        let against = against.max_by(|a, b| a.beyond.sum.total_cmp(&b.beyond.sum));
+        Standing { own, against }
+    }
+}
+
+/// Whether what a form takes is sure and enough to be told.
+pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
+    let blocks: usize = tracks.iter().map(BlockedRecording::blocks).sum();
+    taken.gain.is_sure() && taken.gain.sum > 0.5 * TOLD * blocks as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNITS: usize = 40;
+
+    /// Densities of a model with one form: what model and form take together and alone over nothing, nats per unit.
+    fn densities(alone: f64, with: f64) -> Densities {
+        // A little scatter, as no two units are alike.
+        let of = |sum: f64| Density((0..UNITS).map(|i| sum * (1.0 + 0.3 * (i as f64).sin())).collect());
+        Densities { alone: of(alone), with: vec![(Inputs::Speed, of(with))] }
+    }
+
+    /// Whether an effect stands that takes `own` where the form takes `form` and both together `both`.
+    fn stands(own: f64, form: f64, both: f64) -> bool {
+        densities(own, both).standing(&densities(0.0, form)).against.is_none()
+    }
+
+    #[test]
+    fn a_name_stands_where_it_takes_nearly_all_that_a_form_of_its_inputs_takes() {
+        assert!(stands(20.0, 19.0, 20.5), "its own law");
+        assert!(!stands(16.0, 20.0, 20.0), "the form takes a fifth more and leaves it nothing");
+        assert!(stands(16.0, 5.0, 21.0), "something else is there beside it, which the form takes");
+        assert!(!stands(-300.0, 20.0, -10.0), "it takes nothing");
+    }
+
+    #[test]
+    fn one_unit_with_a_huge_gain_is_one_witness() {
+        let mut gains = vec![-1.0; UNITS];
+        gains[7] = 1e6;
+        let nothing = Density(vec![0.0; UNITS]);
+        assert!(!Density(gains).over(&nothing).is_sure());
+        assert!(Density(vec![1.0; UNITS]).over(&nothing).is_sure());
+    }
+}

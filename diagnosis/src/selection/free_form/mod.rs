@@ -1,0 +1,9 @@
+//! A force of any form over given inputs, and how much it takes on blocks that were left out: the opponent of every name.
+//! It changes no model. The method: docs/free-form.md.
+
+mod basis;
+mod compare;
+mod evaluate;
+
+pub(crate) use compare::{Taken, is_told};
+pub(crate) use evaluate::Evaluator;
