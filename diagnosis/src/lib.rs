@@ -51,7 +51,9 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     let rig = Rig::read(&request.rig)?;
     let read =
         |paths: &[PathBuf]| paths.iter().map(|path| Recording::read(path)).collect::<Result<Vec<_>, _>>();
-    diagnose_recordings(&rig, &read(&request.fit)?, &read(&request.holdout)?, progress)
+    let (fit, holdout) = (read(&request.fit)?, read(&request.holdout)?);
+    io::sets::check(&rig, &fit, &holdout)?;
+    diagnose_recordings(&rig, &fit, &holdout, progress)
 }
 
 /// The same for a rig and recordings that are already read.
@@ -61,12 +63,16 @@ pub fn diagnose_recordings(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
+    let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
+    if let Some(reason) = estimation::plausibility::mistakes(&all, rig) {
+        return Ok(Outcome::cannot_tell(rig, reason));
+    }
     if let Some(reason) = fit.iter().chain(holdout).find_map(|r| io::sufficiency::too_little(r, rig)) {
         return Ok(Outcome::cannot_tell(rig, reason));
     }
     let search = validation::stepwise::search(rig, fit, holdout, progress)?;
     progress("writing down", 0.95);
-    let outcome = report::conclude::conclude(search);
+    let outcome = report::conclude::conclude(search, rig, holdout);
     progress("done", 1.0);
     Ok(outcome)
 }

@@ -7,6 +7,7 @@ pub(crate) mod force_residual;
 pub(crate) mod lost_counts;
 pub(crate) mod model;
 pub(crate) mod noise;
+pub(crate) mod plausibility;
 pub(crate) mod refit;
 pub(crate) mod regressors;
 pub(crate) mod slices;

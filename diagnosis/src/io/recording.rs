@@ -27,6 +27,19 @@ const COLUMNS: [&str; 6] = ["time_s", "command", "position_counts", "tilt_rad", 
 /// Larger than anything a sensor says, small enough that squares of squares stay finite.
 const LARGEST: f64 = 1e15;
 
+/// What a header is that is not one of fields between commas.
+fn foreign(header: &str) -> Option<String> {
+    let by = "let host-sim import read the file, or write it with";
+    if header.starts_with(['#', '%']) {
+        return Some(format!("a comment line where the header belongs; {by}out it"));
+    }
+    let between = |mark: char, what: &str| {
+        (header.contains(mark) && !header.contains(','))
+            .then(|| format!("fields stand between {what}; {by} commas and decimal points"))
+    };
+    between(';', "semicolons").or_else(|| between('\t', "tabs"))
+}
+
 impl Recording {
     /// Reads and checks a recording.
     pub fn read(path: &Path) -> Result<Self, InputError> {
@@ -51,6 +64,7 @@ impl Recording {
         let at = |line: usize, what: String| InputError::new(format!("{file}, line {line}: {what}"));
         let mut lines = text.lines();
         let header = lines.next().unwrap_or("");
+        foreign(header).map_or(Ok(()), |what| Err(at(1, what)))?;
         let names: Vec<&str> = header.split(',').map(|name| name.trim().trim_matches('"')).collect();
         let mut place = [None; 6];
         for (index, name) in names.iter().enumerate() {
@@ -81,6 +95,12 @@ impl Recording {
             if row.trim().is_empty() {
                 blank = blank.or(Some(line));
                 continue;
+            }
+            if row.starts_with(['#', '%']) {
+                return Err(at(
+                    line,
+                    "a comment line; take it out, or let host-sim import read the file".into(),
+                ));
             }
             if let Some(blank) = blank {
                 return Err(at(blank, "an empty line between rows; remove it or restore the row".into()));

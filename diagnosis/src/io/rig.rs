@@ -4,6 +4,7 @@
 
 use crate::effects::Effect;
 use crate::io::error::InputError;
+use crate::io::known_keys;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -153,6 +154,9 @@ impl Rig {
                 cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
             InputError::new(format!("{file}, line {line}: {}; see the rig format", cause.message()))
         })?;
+        if let Some(what) = text.parse().ok().as_ref().and_then(known_keys::unknown) {
+            return Err(InputError::new(format!("{file}: {what}")));
+        }
         rig.check(file)?;
         Ok(rig)
     }
@@ -169,11 +173,21 @@ impl Rig {
             ("actuator.limit", self.actuator.limit),
         ];
         for (key, value) in positive {
+            if value.is_some_and(f64::is_nan) {
+                return refuse(format!(
+                    "{key} is still to be filled in: no recording tells it; put in what your simulation has"
+                ));
+            }
             if value.is_some_and(|x| !(x.is_finite() && x > 0.0 && x < 1e30)) {
                 return refuse(format!("{key} must be a number above zero; correct it"));
             }
         }
         let gain = self.actuator.gain;
+        if gain.is_nan() {
+            return refuse(
+                "actuator.gain is still to be filled in: it is the force for one unit of command, and no recording tells it".into(),
+            );
+        }
         if !(gain.is_finite() && gain != 0.0 && gain.abs() < 1e30) {
             return refuse("actuator.gain must be a number other than zero; correct it".into());
         }

@@ -82,13 +82,59 @@ pub struct Named {
     pub separating_experiment: Option<String>,
 }
 
-/// A number on both kinds of recordings.
+/// A number on both kinds of recordings; not a number, `null` in the file, where nothing was fitted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Both {
     /// On the recordings that were fitted.
+    #[serde(deserialize_with = "null_is_nan")]
     pub fit: f64,
     /// On those that were held out.
+    #[serde(deserialize_with = "null_is_nan")]
     pub holdout: f64,
+}
+
+impl Both {
+    /// Where nothing was fitted.
+    pub const NONE: Self = Self { fit: f64::NAN, holdout: f64::NAN };
+}
+
+fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// A length under the three models, root mean square; none where there is no such model or simulation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct ByModel {
+    /// The rig as it stands.
+    pub nominal: Option<f64>,
+    /// With its values refitted.
+    pub refit: Option<f64>,
+    /// With the effects found.
+    pub patched: Option<f64>,
+}
+
+/// Windows of one length, started from the measured state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WindowsOff {
+    /// Their length, s.
+    pub seconds: f64,
+    /// What they are off, rad or m.
+    #[serde(flatten)]
+    pub position: ByModel,
+}
+
+/// What the three models are off in position when they run forward beside the held-out recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulation {
+    /// rad or m.
+    pub unit: String,
+    /// From each recording's first row to its last.
+    pub free_run: ByModel,
+    /// In windows.
+    pub windows: Vec<WindowsOff>,
+    /// Where the patched simulation follows the motion less well than the refitted one, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub worse: Option<String>,
 }
 
 /// How well the three models fit.
@@ -157,6 +203,9 @@ pub struct Report {
     /// What to record next, when the recordings cannot tell.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub separating_experiment: Option<String>,
+    /// The three models run forward beside the held-out recordings.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub simulation: Option<Simulation>,
     /// Why the recordings cannot tell, or what is left where no effect is.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub reason: Option<String>,

@@ -17,7 +17,7 @@ pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
     let rate = recording.rate_hz();
     if rate < SLOWEST_HZ {
         return Some(format!(
-            "{file} has {rate:.1} rows a second where at least 100 are needed (are its times in seconds?)"
+            "{file} has {rate:.3} rows a second where at least 100 are needed (are its times in milliseconds?)"
         ));
     }
     if seconds < SHORTEST_S || recording.len() < FEWEST_ROWS {
@@ -37,7 +37,9 @@ pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
     }
     let counts = spread(&recording.position_counts);
     if counts < FEWEST_COUNTS {
-        return Some(format!("{file} moves by {counts:.0} counts in all"));
+        return Some(format!(
+            "{file} is at rest: it moves by {counts:.0} counts in all; record a motion of some turns"
+        ));
     }
     // Longest gap: a hold of the last command over it would be a guess.
     let gap = recording.time_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);

@@ -4,11 +4,13 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::estimation::refit::command_scale;
+use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
 use crate::report::next_experiment;
 use crate::report::outcome::{self, Evidence, Outcome, Series};
 use crate::report::patched_rig::{patch, place};
+use crate::report::run_forward::{pooled, simulated};
 use crate::report::verdict::{misfit, verdict};
 use crate::selection::excitation::Excitation;
 use crate::selection::search::{FitContext, FittedModel};
@@ -23,7 +25,7 @@ use crate::validation::residuals::{Residuals, above};
 use crate::validation::stepwise::Search;
 use std::collections::BTreeMap;
 
-pub(crate) fn conclude(mut s: Search) -> Outcome {
+pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Outcome {
     let scale = command_scale(&s.nominal, &s.fit_tracks);
     let nominal = s.nominal.clone();
     let fit_tracks = std::mem::take(&mut s.fit_tracks);
@@ -59,6 +61,8 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
     let maps = with_named.as_ref().map_or(maps_with_all, maps_of);
     let effects = named_effects(&assessment, with_named.as_ref(), &context, &s);
     let patched_rig = patch(&s, patched);
+    let refit_rig = patch(&s, &refit);
+    let simulated = simulated(given, &refit_rig, &patched_rig, held_out);
     let floor = assessment.floor;
     let before = above(table.nominal.holdout, floor, 0.0).max(above(table.refit.holdout, floor, 0.0));
     let left = above(table.patched.holdout, floor, 0.0);
@@ -78,14 +82,16 @@ pub(crate) fn conclude(mut s: Search) -> Outcome {
             Verdict::InsufficientExcitation => Some(next_experiment::SPEEDS.to_owned()),
             _ => known_travel::beyond(&holdout_tracks, &patched.model, &span, nominal.rig.kind.length()),
         },
+        simulation: pooled(&simulated),
         verdict,
         reason,
     };
     report.sentence = outcome::sentence(&report, nominal.rig.kind);
     let mut series = all_series(&assessment, &fit_tracks, on_fit, false);
     series.extend(all_series(&assessment, &holdout_tracks, on_holdout, true));
-    let evidence = Evidence { series, maps, kind: nominal.rig.kind, rig: nominal.rig.name.clone() };
-    Outcome { report, evidence, patched_rig }
+    let evidence =
+        Evidence { series, maps, simulated, kind: nominal.rig.kind, rig: nominal.rig.name.clone() };
+    Outcome { report, evidence, nominal_rig: given.clone(), refit_rig, patched_rig }
 }
 
 /// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in

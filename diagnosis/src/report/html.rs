@@ -3,17 +3,14 @@
 
 use crate::io::rig::Kind;
 use crate::io::schema::{Named, Verdict};
-use crate::numerics::digits::{short, short_within};
+use crate::numerics::digits::short;
+use crate::report::axes::{HIGH, frame, safe};
+use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, Series, unit};
 use crate::validation::residual_maps::Map;
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("report.css");
-
-/// Text that may stand in a page.
-fn safe(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
 
 /// The page.
 pub(crate) fn page(outcome: &Outcome) -> String {
@@ -27,9 +24,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         safe(&outcome.evidence.rig),
         safe(&r.sentence)
     );
-    if let Some(next) = &r.separating_experiment {
-        let _ = write!(out, "<section><h2>What to record next</h2><p>{}.</p></section>", safe(next));
-    }
+    motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {
         numbers(&mut out, outcome);
         what(&mut out, outcome);
@@ -38,8 +33,73 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         hypotheses(&mut out, outcome);
         remains(&mut out, outcome);
     }
+    next(&mut out, outcome);
     out.push_str("</main></body></html>\n");
     out
+}
+
+/// The motion that the simulation gives beside the one that was recorded.
+fn motion(out: &mut String, outcome: &Outcome) {
+    let Some(first) = outcome.evidence.simulated.first() else { return };
+    let _ = write!(
+        out,
+        "<section><h2>Simulated beside recorded: {}, held out, from its first row</h2>",
+        safe(&first.file)
+    );
+    let found = first.figures("patched").is_some();
+    motion_picture::free_run(out, first, if found { &["nominal", "patched"] } else { &["nominal", "refit"] });
+    out.push_str(
+        "<p class=note>Under the recorded command alone, with nothing that corrects: errors of force add up to errors of place. \
+         A line that leaves the picture has run away.</p>",
+    );
+    motion_picture::table(out, first);
+    if let Some(worse) = outcome.report.simulation.as_ref().and_then(|s| s.worse.as_ref()) {
+        let _ = write!(
+            out,
+            "<p class=next><b>Mind:</b> {}. The force that it leaves is smaller all the same; <code>host-sim simulate --fit</code> fits its values to motion.</p>",
+            safe(worse)
+        );
+    }
+    out.push_str("</section>");
+}
+
+/// What to do with all this.
+fn next(out: &mut String, outcome: &Outcome) {
+    let r = &outcome.report;
+    let mut items = Vec::new();
+    let wanted =
+        r.effects.iter().filter_map(|e| e.separating_experiment.as_ref()).chain(&r.separating_experiment);
+    for next in wanted {
+        items.push(format!(
+            "Record what decides: {}. On a device of this project <code>host-sim characterise --device /dev/ttyACM0 --out bench</code> \
+             plays it; then <code>host-sim diagnose</code> again with the new files.",
+            safe(next)
+        ));
+    }
+    if !r.effects.is_empty() {
+        items.push(
+            "Simulate with what was found: <code>patched-rig.toml</code> beside this page is the rig with it. \
+             <code>host-sim simulate --rig patched-rig.toml --recording FILE.csv --out DIR</code> runs it."
+                .to_owned(),
+        );
+        items.push(
+            "Take it where you simulate: <code>host-sim diagnose … --export mjcf</code> writes it for MuJoCo, <code>urdf</code> and \
+             <code>json</code> for others."
+                .to_owned(),
+        );
+    } else if r.verdict == Verdict::ParametersOnly {
+        items.push(
+            "Put the refitted values of <code>patched-rig.toml</code> into your simulation.".to_owned(),
+        );
+    }
+    if items.is_empty() {
+        return;
+    }
+    let _ = write!(
+        out,
+        "<section><h2>What to do next</h2><ul><li>{}</li></ul></section>",
+        items.join("</li><li>")
+    );
 }
 
 fn numbers(out: &mut String, outcome: &Outcome) {
@@ -136,48 +196,6 @@ fn one(out: &mut String, effect: &Named, kind: Kind) {
         let _ = write!(out, "<p class=next><b>Record next:</b> {}.</p>", safe(next));
     }
     out.push_str("</article>");
-}
-
-const WIDE: f64 = 900.0;
-const HIGH: f64 = 190.0;
-const LEFT: f64 = 136.0;
-const TOP: f64 = 16.0;
-const BOTTOM: f64 = 32.0;
-
-/// A frame with its scales; returns the mapping of values to places.
-fn frame(
-    out: &mut String,
-    x: (f64, f64),
-    y: (f64, f64),
-    x_label: &str,
-    y_label: &str,
-) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
-    let _ = write!(out, "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img>", TOP + HIGH + BOTTOM);
-    let at = move |a: f64, b: f64| {
-        let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - 6.0);
-        let py = 6.0 + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 12.0);
-        (px, py.clamp(0.0, HIGH))
-    };
-    for i in 0..=4 {
-        let value = y.0 + (y.1 - y.0) * f64::from(i) / 4.0;
-        let (_, py) = at(x.0, value);
-        let _ = write!(
-            out,
-            "<line class=grid x1={LEFT} x2={WIDE} y1={py:.1} y2={py:.1} /><text x={} y={:.1} text-anchor=end>{}</text>",
-            LEFT - 5.0,
-            py + 4.0,
-            short_within(value, y.1 - y.0)
-        );
-    }
-    for i in 0..=5 {
-        let value = x.0 + (x.1 - x.0) * f64::from(i) / 5.0;
-        let (px, _) = at(value, y.0);
-        let anchor = if i == 5 { "end" } else { "middle" };
-        let label = short_within(value, x.1 - x.0);
-        let _ = write!(out, "<text x={px:.1} y={} text-anchor={anchor}>{label}</text>", HIGH + 24.0);
-    }
-    let _ = write!(out, "<title>{} over {}</title>", safe(y_label), safe(x_label));
-    at
 }
 
 /// Envelope of a column over few enough places to draw.

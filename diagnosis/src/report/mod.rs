@@ -1,12 +1,17 @@
 //! What people and files are told: the verdict, what to record next, the patched rig, and the pages. Nothing here fits.
 
+pub(crate) mod axes;
 pub(crate) mod conclude;
+pub mod exports;
 mod html;
+pub mod motion_picture;
 pub(crate) mod next_experiment;
 pub(crate) mod outcome;
 pub(crate) mod patched_rig;
+pub(crate) mod run_forward;
 pub(crate) mod verdict;
 
 pub use crate::io::schema::{
-    Both, FitTable, Hypothesis, Named, Parameter, Place, Region, Report, Stretch, Verdict,
+    Both, ByModel, FitTable, Hypothesis, Named, Parameter, Place, Region, Report, Simulation, Stretch,
+    Verdict, WindowsOff,
 };

@@ -3,9 +3,10 @@
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, FitTable, Report, Verdict};
+use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
 use crate::numerics::digits::short;
 use crate::report::html;
+use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -65,6 +66,8 @@ pub struct Evidence {
     pub series: Vec<Series>,
     /// What the patched model leaves, over states.
     pub maps: Vec<Map>,
+    /// The models run forward beside the held-out recordings.
+    pub simulated: Vec<Comparison>,
     /// Rotary or linear.
     pub kind: Kind,
     /// The rig's label.
@@ -78,6 +81,10 @@ pub struct Outcome {
     pub report: Report,
     /// What is plotted.
     pub evidence: Evidence,
+    /// The rig as it was given.
+    pub nominal_rig: Rig,
+    /// The rig with refitted values alone.
+    pub refit_rig: Rig,
     /// The rig with refitted values and the effects found.
     pub patched_rig: Rig,
 }
@@ -160,10 +167,10 @@ impl Outcome {
             fit: FitTable {
                 metric: "force_rmse".into(),
                 unit: rig.kind.force().into(),
-                nominal: Both::default(),
-                refit: Both::default(),
-                patched: Both::default(),
-                force_rms: Both::default(),
+                nominal: Both::NONE,
+                refit: Both::NONE,
+                patched: Both::NONE,
+                force_rms: Both::NONE,
                 holdout_gain_ci95: [0.0, 0.0],
             },
             refitted: BTreeMap::new(),
@@ -172,21 +179,29 @@ impl Outcome {
             unexplained_fraction: 0.0,
             hypotheses: Vec::new(),
             place: None,
+            simulation: None,
             separating_experiment: Some(crate::report::next_experiment::GENERAL.to_owned()),
             reason: Some(reason),
         };
         report.sentence = sentence(&report, rig.kind);
-        let evidence =
-            Evidence { series: Vec::new(), maps: Vec::new(), kind: rig.kind, rig: rig.name.clone() };
-        Self { report, evidence, patched_rig: rig.clone() }
+        let evidence = Evidence {
+            series: Vec::new(),
+            maps: Vec::new(),
+            simulated: Vec::new(),
+            kind: rig.kind,
+            rig: rig.name.clone(),
+        };
+        Self { report, evidence, nominal_rig: rig.clone(), refit_rig: rig.clone(), patched_rig: rig.clone() }
     }
 
-    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml` and `residuals.csv`, each whole or not at all.
+    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and `residuals.csv`, each whole or not at all.
     pub fn write(&self, dir: &Path) -> io::Result<()> {
         std::fs::create_dir_all(dir)?;
         let json = serde_json::to_string_pretty(&self.report).map_err(io::Error::other)?;
         let files = [
             ("residuals.csv", self.residuals_csv()),
+            ("nominal-rig.toml", self.nominal_rig.to_toml()),
+            ("refit-rig.toml", self.refit_rig.to_toml()),
             ("patched-rig.toml", self.patched_rig.to_toml()),
             ("report.html", html::page(self)),
             ("diagnosis.json", json + "\n"),
@@ -240,6 +255,34 @@ impl Outcome {
                 .collect();
             let _ = writeln!(out, "  {} ({:.2}): {}", effect.name, effect.confidence, values.join("; "));
         }
+        if r.fit.nominal.fit.is_finite() {
+            self.figures(&mut out);
+        }
+        let next: Vec<&String> = r
+            .effects
+            .iter()
+            .filter_map(|e| e.separating_experiment.as_ref())
+            .chain(&r.separating_experiment)
+            .collect();
+        if let Some(next) = next.first() {
+            let _ = writeln!(out, "  record next: {next}");
+        }
+        let losers: Vec<&str> = r
+            .hypotheses
+            .iter()
+            .filter(|h| h.rejected_because.is_some())
+            .map(|h| EffectName::as_str(h.name))
+            .take(6)
+            .collect();
+        if !losers.is_empty() {
+            let _ = writeln!(out, "  looked at and rejected: {}", losers.join(", "));
+        }
+        out
+    }
+
+    /// What the models leave, in force and in motion.
+    fn figures(&self, out: &mut String) {
+        let r = &self.report;
         let f = &r.fit;
         for (name, both) in [("nominal", f.nominal), ("refit", f.refit), ("patched", f.patched)] {
             let percent = |x: f64, whole: f64| if whole > 0.0 { 100.0 * x / whole } else { 0.0 };
@@ -261,25 +304,30 @@ impl Outcome {
             f.unit,
             100.0 * r.unexplained_fraction
         );
-        let next: Vec<&String> = r
-            .effects
-            .iter()
-            .filter_map(|e| e.separating_experiment.as_ref())
-            .chain(&r.separating_experiment)
-            .collect();
-        if let Some(next) = next.first() {
-            let _ = writeln!(out, "  record next: {next}");
+        if let Some(simulation) = &r.simulation {
+            let named = |name: &str, x: Option<f64>| x.map(|x| format!("{name} {}", short(x)));
+            let of = |m: &ByModel| {
+                let all = [named("nominal", m.nominal), named("refit", m.refit), named("patched", m.patched)];
+                all.into_iter().flatten().collect::<Vec<_>>().join(", ")
+            };
+            let _ = writeln!(
+                out,
+                "  held-out position off, free run: {} {}",
+                of(&simulation.free_run),
+                simulation.unit
+            );
+            if let Some(window) = simulation.windows.iter().find(|w| w.seconds >= 0.5) {
+                let _ = writeln!(
+                    out,
+                    "  held-out position off, windows of {} s: {} {}",
+                    window.seconds,
+                    of(&window.position),
+                    simulation.unit
+                );
+            }
+            if let Some(worse) = &simulation.worse {
+                let _ = writeln!(out, "  {worse}");
+            }
         }
-        let losers: Vec<&str> = r
-            .hypotheses
-            .iter()
-            .filter(|h| h.rejected_because.is_some())
-            .map(|h| EffectName::as_str(h.name))
-            .take(6)
-            .collect();
-        if !losers.is_empty() {
-            let _ = writeln!(out, "  looked at and rejected: {}", losers.join(", "));
-        }
-        out
     }
 }

@@ -126,6 +126,16 @@ impl Plant {
         self.velocity
     }
 
+    /// What a sensor without steps reads: the position with what the rig's sensor effects add.
+    pub fn reading(&self) -> f64 {
+        self.position + self.sensor
+    }
+
+    /// Sets the time since the start, s, for a replay that begins within a recording.
+    pub fn begin(&mut self, time: f64) {
+        self.time = time;
+    }
+
     /// Sets position and velocity, for replay from a measured state.
     pub fn place(&mut self, position: f64, velocity: f64) {
         self.position = position;
@@ -134,6 +144,6 @@ impl Plant {
 
     /// What the encoder reads, whole counts.
     pub fn counts(&self) -> f64 {
-        ((self.position + self.sensor) * self.rig.encoder.counts_per_unit).floor()
+        (self.reading() * self.rig.encoder.counts_per_unit).floor()
     }
 }

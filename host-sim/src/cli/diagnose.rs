@@ -26,10 +26,14 @@ pub(crate) struct Diagnose {
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Write the patched rig for another simulator too: mjcf (MuJoCo), urdf or json; again for more
+    #[arg(long, value_name = "mjcf|urdf|json")]
+    export: Vec<String>,
 }
 
 impl Diagnose {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let formats = super::export::formats(&self.export)?;
         let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout };
         let bar = Mutex::new(Progress::new("diagnosing"));
         let show = |stage: &str, done: f64| {
@@ -46,6 +50,7 @@ impl Diagnose {
             ))
         })?;
         say!("{}", outcome.summary().trim_end());
+        super::export::write(&outcome.patched_rig, &formats, &self.out)?;
         say!("report: {}", self.out.join("report.html").display());
         Ok(())
     }

@@ -2,10 +2,12 @@
 
 mod characterise;
 mod diagnose;
+mod export;
 mod import;
 mod progress;
 mod recordings;
 mod run;
+mod simulate;
 mod streams;
 
 use clap::{Parser, Subcommand};
@@ -30,6 +32,7 @@ enum Command {
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
     Import(import::Import),
+    Simulate(simulate::Simulate),
 }
 
 impl Cli {
@@ -44,6 +47,7 @@ impl Cli {
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),
+            Some(Command::Simulate(command)) => command.run(),
         }
     }
 }

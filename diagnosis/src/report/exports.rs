@@ -1,0 +1,256 @@
+//! A rig for other simulators. What a format cannot say stands in the file as a note; nothing is left out in silence.
+
+use crate::effects::{Effect, EffectName};
+use crate::io::rig::{Kind, Rig};
+use std::fmt::Write as _;
+
+/// A format to export to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// MuJoCo's XML.
+    Mjcf,
+    /// The Unified Robot Description Format.
+    Urdf,
+    /// Everything, for a program of one's own.
+    Json,
+}
+
+impl Format {
+    /// By its name.
+    pub fn find(name: &str) -> Option<Self> {
+        match name {
+            "mjcf" => Some(Self::Mjcf),
+            "urdf" => Some(Self::Urdf),
+            "json" => Some(Self::Json),
+            _ => None,
+        }
+    }
+
+    /// The name of the file.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Mjcf => "patched-rig.xml",
+            Self::Urdf => "patched-rig.urdf",
+            Self::Json => "patched-rig.json",
+        }
+    }
+}
+
+/// The text of a rig in a format.
+pub fn export(rig: &Rig, format: Format) -> String {
+    match format {
+        Format::Mjcf => mjcf(rig),
+        Format::Urdf => urdf(rig),
+        Format::Json => json(rig),
+    }
+}
+
+/// A rig in the terms of a joint and its motor.
+struct Joint {
+    inertia: f64,
+    viscous: f64,
+    dry: f64,
+    /// Force that is there all the time.
+    bias: f64,
+    stiffness: f64,
+    /// Where the spring is slack, from the start.
+    slack: f64,
+    gain: f64,
+    limit: Option<f64>,
+    delay: f64,
+    lag: f64,
+    /// What a joint and its motor cannot say.
+    notes: Vec<String>,
+}
+
+/// Numbers of an effect, for a note.
+fn numbers(effect: &Effect) -> String {
+    let all = effect.shape.iter().chain(&effect.coefficients);
+    all.map(|(key, value)| format!("{key} {value:.6e}")).collect::<Vec<_>>().join(", ")
+}
+
+impl Joint {
+    fn new(rig: &Rig) -> Self {
+        use EffectName as N;
+        let model = &rig.model;
+        let mut joint = Self {
+            inertia: model.inertia,
+            viscous: model.viscous.unwrap_or(0.0),
+            dry: model.coulomb.unwrap_or(0.0),
+            bias: model.offset.unwrap_or(0.0),
+            stiffness: 0.0,
+            slack: 0.0,
+            gain: rig.actuator.gain,
+            limit: rig.actuator.limit,
+            delay: 0.0,
+            lag: 0.0,
+            notes: Vec::new(),
+        };
+        if let Some(weight) = model.weight.filter(|w| *w != 0.0) {
+            joint.notes.push(format!(
+                "weight {weight:.6e} {} times the sine of the tilt: add it as an applied force, or tilt the joint under gravity",
+                rig.kind.force()
+            ));
+        }
+        for effect in &rig.effects {
+            let of = |key: &str| effect.coefficient(key);
+            match effect.name {
+                N::ViscousFriction => joint.viscous += of("viscous"),
+                N::CoulombFriction => joint.dry += of("coulomb"),
+                N::AsymmetricFriction => {
+                    // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
+                    joint.bias -= of("coulomb_difference");
+                    if of("viscous_difference") != 0.0 {
+                        joint.notes.push(format!(
+                            "asymmetric_friction: viscous friction is {:.6e} forward and {:.6e} backward; damping holds their mean",
+                            joint.viscous + of("viscous_difference"),
+                            joint.viscous - of("viscous_difference")
+                        ));
+                    }
+                }
+                N::PositionSpring
+                    if effect.shape_or("fades_s", f64::INFINITY).is_infinite()
+                        && effect.shape_or("one_sided", 0.0) < 0.5 =>
+                {
+                    joint.stiffness += of("stiffness");
+                    joint.slack = effect.shape_or("from", 0.0);
+                    joint.bias += of("preload");
+                }
+                N::CommandDelay => joint.delay += effect.shape_or("delay", 0.0),
+                N::ElectricalLag => joint.lag += effect.shape_or("time_constant", 0.0),
+                N::CommandSaturation => {
+                    let clip = effect.shape_or("limit", f64::INFINITY);
+                    joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
+                }
+                name => joint.notes.push(format!("{name} ({}): {}", name.in_words(), numbers(effect))),
+            }
+        }
+        joint
+    }
+}
+
+/// Text that may stand in XML, and in its comments.
+fn xml(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace("--", "– ")
+}
+
+fn notes(out: &mut String, joint: &Joint) {
+    for note in &joint.notes {
+        let _ = writeln!(out, "  <!-- not in this file: {} -->", xml(note));
+    }
+}
+
+/// Seconds of a step of MuJoCo.
+const TIMESTEP_S: f64 = 2e-4;
+
+fn mjcf(rig: &Rig) -> String {
+    let joint = Joint::new(rig);
+    let mut out = String::new();
+    let _ = writeln!(out, "<mujoco model=\"{}\">", xml(&rig.name));
+    let _ = writeln!(
+        out,
+        "  <!-- Written by host-sim. ctrl is the command, in {}; qpos the coordinate, in {}. -->",
+        xml(&rig.actuator.command_unit),
+        rig.kind.length()
+    );
+    notes(&mut out, &joint);
+    // Friction acts in steps: implicit ones hold it at rest.
+    let _ =
+        writeln!(out, "  <option timestep=\"{TIMESTEP_S}\" gravity=\"0 0 0\" integrator=\"implicitfast\"/>");
+    let (kind, axis) = if rig.kind == Kind::Rotary { ("hinge", "0 0 1") } else { ("slide", "1 0 0") };
+    // MuJoCo wants a body with some mass of its own; nearly all of the inertia is the joint's.
+    let own = 1e-3 * joint.inertia;
+    let inertial = match rig.kind {
+        Kind::Rotary => format!("mass=\"{own:e}\" diaginertia=\"{own:e} {own:e} {own:e}\""),
+        Kind::Linear => format!("mass=\"{own:e}\" diaginertia=\"{own:e} {own:e} {own:e}\""),
+    };
+    let _ = writeln!(out, "  <worldbody>\n    <body name=\"axis\">");
+    let _ = writeln!(
+        out,
+        "      <joint name=\"axis\" type=\"{kind}\" axis=\"{axis}\" armature=\"{:e}\" damping=\"{:e}\" frictionloss=\"{:e}\" \
+         stiffness=\"{:e}\" springref=\"{:e}\" solreffriction=\"{:e} 1\" solimpfriction=\"0.9999 0.9999 0.001 0.5 2\"/>",
+        joint.inertia - own,
+        joint.viscous,
+        joint.dry,
+        joint.stiffness,
+        if rig.kind == Kind::Rotary { joint.slack.to_degrees() } else { joint.slack },
+        2.0 * TIMESTEP_S
+    );
+    let _ = writeln!(
+        out,
+        "      <inertial pos=\"0 0 0\" {inertial}/>\n    </body>\n  </worldbody>\n  <actuator>"
+    );
+    let mut drive = format!(
+        "    <general name=\"drive\" joint=\"axis\" gaintype=\"fixed\" gainprm=\"{:e}\" biastype=\"affine\" biasprm=\"{:e} 0 0\"",
+        joint.gain, joint.bias
+    );
+    if let Some(limit) = joint.limit {
+        let _ = write!(drive, " ctrllimited=\"true\" ctrlrange=\"{:e} {limit:e}\"", -limit);
+    }
+    if joint.lag > 0.0 {
+        let _ = write!(drive, " dyntype=\"filterexact\" dynprm=\"{:e}\"", joint.lag);
+    }
+    if joint.delay > 0.0 {
+        // MuJoCo 3.5 and newer: a buffer of past commands.
+        let samples = (joint.delay / TIMESTEP_S).ceil() as usize + 2;
+        let _ = write!(drive, " delay=\"{:e}\" nsample=\"{samples}\"", joint.delay);
+    }
+    let _ = writeln!(out, "{drive}/>\n  </actuator>\n</mujoco>");
+    out
+}
+
+fn urdf(rig: &Rig) -> String {
+    let mut joint = Joint::new(rig);
+    let unit = rig.kind.force();
+    joint.notes.push(format!(
+        "the drive gives {:.6e} {unit} for one {} of command",
+        joint.gain, rig.actuator.command_unit
+    ));
+    for (value, what) in [
+        (joint.bias, format!("a force of {:.6e} {unit} that is there all the time", joint.bias)),
+        (joint.delay, format!("a delay of {:.6e} s between command and force", joint.delay)),
+        (joint.lag, format!("a lag of {:.6e} s between command and force", joint.lag)),
+        (joint.stiffness, format!("a spring of {:.6e} {unit}/{}", joint.stiffness, rig.kind.length())),
+    ] {
+        if value != 0.0 {
+            joint.notes.push(what);
+        }
+    }
+    let mut out = String::from("<?xml version=\"1.0\"?>\n");
+    let _ = writeln!(out, "<robot name=\"{}\">\n  <!-- Written by host-sim. -->", xml(&rig.name));
+    notes(&mut out, &joint);
+    let (kind, axis) =
+        if rig.kind == Kind::Rotary { ("continuous", "0 0 1") } else { ("prismatic", "1 0 0") };
+    let j = joint.inertia;
+    let effort = joint.limit.map_or(1e9, |limit| (limit * joint.gain).abs());
+    let _ = writeln!(
+        out,
+        "  <link name=\"base\"/>\n  <link name=\"axis\">\n    <inertial>\n      <mass value=\"{j:e}\"/>\n      \
+         <inertia ixx=\"{j:e}\" ixy=\"0\" ixz=\"0\" iyy=\"{j:e}\" iyz=\"0\" izz=\"{j:e}\"/>\n    </inertial>\n  </link>\n  \
+         <joint name=\"axis\" type=\"{kind}\">\n    <parent link=\"base\"/>\n    <child link=\"axis\"/>\n    <axis xyz=\"{axis}\"/>\n    \
+         <limit lower=\"-1e9\" upper=\"1e9\" effort=\"{effort:e}\" velocity=\"1e9\"/>\n    \
+         <dynamics damping=\"{:e}\" friction=\"{:e}\"/>\n  </joint>\n</robot>",
+        joint.viscous, joint.dry
+    );
+    out
+}
+
+fn json(rig: &Rig) -> String {
+    let joint = Joint::new(rig);
+    let value = serde_json::json!({
+        "format": 1,
+        "rig": rig,
+        "joint": {
+            "inertia": joint.inertia, "damping": joint.viscous, "frictionloss": joint.dry, "bias": joint.bias,
+            "stiffness": joint.stiffness, "springref": joint.slack, "gain": joint.gain, "limit": joint.limit,
+            "delay_s": joint.delay, "lag_s": joint.lag
+        },
+        "units": { "length": rig.kind.length(), "force": rig.kind.force(), "command": rig.actuator.command_unit },
+        "not_in_joint": joint.notes
+    });
+    serde_json::to_string_pretty(&value).expect("a rig has nothing that JSON cannot say") + "\n"
+}

@@ -1,0 +1,152 @@
+//! Several models of one machine beside one recording: what each is off, and the motions to draw.
+
+use super::replay::{Beside, Deviation, Trajectory};
+use super::{Motion, PositionLoop};
+use crate::io::recording::Recording;
+use crate::io::rig::{Kind, Rig};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// One model beside a recording.
+#[derive(Debug, Clone)]
+pub struct Simulated {
+    /// What it is called: nominal, refit, patched and so on.
+    pub model: String,
+    /// From the first row under the recorded command.
+    pub free: Trajectory,
+    /// Under the recorded reference, where there is one and the loop was recognised.
+    pub under: Option<Trajectory>,
+    /// Inertia times acceleration along the recorded motion, N·m or N.
+    pub force: Vec<f64>,
+    /// What it is off.
+    pub figures: Figures,
+}
+
+/// What a model is off, root mean square.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figures {
+    /// Of the whole recording.
+    pub free_run: Off,
+    /// Of windows started from the measured state.
+    pub windows: Vec<Window>,
+    /// Under the recorded reference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub under_reference: Option<Off>,
+    /// Where the first row lies on the mechanism, fitted where the model has periodic effects, rad or m.
+    pub start: f64,
+}
+
+/// Root mean squares.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Off {
+    /// rad or m.
+    pub position_rms: f64,
+    /// rad/s or m/s.
+    pub velocity_rms: f64,
+}
+
+impl From<Deviation> for Off {
+    fn from(d: Deviation) -> Self {
+        Self { position_rms: d.position, velocity_rms: d.velocity }
+    }
+}
+
+/// Windows of one length.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Window {
+    /// Their length, s.
+    pub seconds: f64,
+    /// What they are off.
+    #[serde(flatten)]
+    pub off: Off,
+}
+
+/// Models beside a recording.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The recording's file name.
+    pub file: String,
+    /// Rotary or linear.
+    pub kind: Kind,
+    /// As recorded.
+    pub motion: Motion,
+    /// Inertia of the first model times the recorded acceleration, N·m or N.
+    pub force: Vec<f64>,
+    /// The loop that ran, where it was recognised.
+    pub feedback: Option<PositionLoop>,
+    /// In the order given.
+    pub models: Vec<Simulated>,
+}
+
+impl Comparison {
+    /// Runs every model beside a recording; the first names kind, resolution and inertia.
+    /// `windows` are lengths in s.
+    pub fn new(recording: &Recording, models: &[(String, Rig)], windows: &[f64]) -> Self {
+        let Some((_, first)) = models.first() else {
+            unreachable!("a comparison is asked for with at least one model")
+        };
+        let motion = Motion::new(recording, first);
+        let feedback = PositionLoop::fit(recording, &motion, first.actuator.gain);
+        let simulated = |(name, rig): &(String, Rig)| {
+            let beside = Beside::new(recording, rig);
+            let free = beside.free_run(rig);
+            let under = feedback.map(|feedback| beside.under_reference(rig, feedback));
+            let whole = beside.motion.seconds();
+            let windows = windows
+                .iter()
+                .copied()
+                .filter(|seconds| *seconds <= whole)
+                .map(|seconds| Window { seconds, off: beside.windows(rig, seconds).into() })
+                .collect();
+            let figures = Figures {
+                free_run: free.deviation(&beside.motion).into(),
+                windows,
+                under_reference: under.as_ref().map(|u| u.deviation(&beside.motion).into()),
+                start: beside.start,
+            };
+            Simulated { model: name.clone(), free, under, force: beside.force(rig), figures }
+        };
+        let models: Vec<Simulated> = models.par_iter().map(simulated).collect();
+        let force = motion.accelerations().iter().map(|a| a * first.model.inertia).collect();
+        Self { file: recording.file.clone(), kind: first.kind, motion, force, feedback, models }
+    }
+
+    /// The figures of a model of this name.
+    pub fn figures(&self, model: &str) -> Option<&Figures> {
+        self.models.iter().find(|m| m.model == model).map(|m| &m.figures)
+    }
+
+    /// A sentence where a model is off by more in its trajectory than another, in the free run or in windows; none where not.
+    pub fn worse(&self, model: &str, than: &str) -> Option<String> {
+        let (a, b) = (self.figures(model)?, self.figures(than)?);
+        let unit = self.kind.length();
+        let mut said = Vec::new();
+        if a.free_run.position_rms > MUCH * b.free_run.position_rms {
+            said.push(format!(
+                "over the whole of {} it is {} {unit} off instead of {}",
+                self.file,
+                crate::numerics::digits::short(a.free_run.position_rms),
+                crate::numerics::digits::short(b.free_run.position_rms)
+            ));
+        }
+        let worse: Vec<String> = a
+            .windows
+            .iter()
+            .zip(&b.windows)
+            .filter(|(a, b)| a.off.position_rms > MUCH * b.off.position_rms)
+            .map(|(a, _)| format!("{}", a.seconds))
+            .collect();
+        if !worse.is_empty() {
+            said.push(format!("it is further off in windows of {} s", worse.join(", ")));
+        }
+        (!said.is_empty()).then(|| {
+            format!(
+                "The {model} simulation follows the motion less well than the {than}: {}",
+                said.join("; ")
+            )
+        })
+    }
+}
+
+/// What counts as worse, as a ratio.
+const MUCH: f64 = 1.05;
