@@ -37,7 +37,11 @@ const STEPS: [Step; 11] = [
     Step { name: "wasm", shows: "what the page computes is built from its sources", run: page_wasm },
     Step { name: "board", shows: "the flash image on the emulated board", run: board },
     Step { name: "browser", shows: "the page in a real browser", run: browser },
-    Step { name: "clients", shows: "the live streams as other people's programs read them", run: clients },
+    Step {
+        name: "clients",
+        shows: "streams and exported rigs as other people's programs read them",
+        run: clients,
+    },
     Step { name: "fuzz", shows: "the frame parser, a minute of damaged frames", run: fuzz },
     Step { name: "prove", shows: "the small proof of the diagnosis", run: prove },
 ];
@@ -195,14 +199,15 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 2] = ["pyigtl==0.3.4", "websockets==17.4"];
+const CLIENTS: [&str; 3] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0"];
 
 fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let python = setup::python(&CLIENTS)?;
     clock.run(cargo().args(["build", "--release", "--quiet", "-p", "host-sim", ANY_RUST]))?;
     let top = shell::top();
     let program = shell::target().join("release/host-sim");
-    passed(clock.run(Command::new(python).arg(top.join("tests/clients/streams.py")).arg(program)))
+    clock.run(Command::new(&python).arg(top.join("tests/clients/streams.py")).arg(&program))?;
+    passed(clock.run(Command::new(&python).arg(top.join("tests/clients/mujoco_rig.py")).arg(&program)))
 }
 
 fn fuzz(clock: &Clock) -> Result<Ended, Failure> {
