@@ -6,7 +6,7 @@
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
 use crate::shell::{self, Failure, cargo};
-use crate::{firmware, test};
+use crate::{firmware, setup, test};
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_EXTENSION;
 use std::fmt::Write as _;
@@ -51,6 +51,7 @@ pub(crate) fn run() -> Result<(), Failure> {
             measure(name, example(package, name));
         }
     }
+    measure("peers", peers());
     measure("stream", stream());
     measure("diagnosis", diagnosis());
     let mut board_lines = vec![];
@@ -167,6 +168,22 @@ fn packages() -> Result<Values, Failure> {
 fn image() -> Result<Values, Failure> {
     let (_, bytes) = Elf::read(&firmware::build()?)?.flash_image()?;
     Ok(Values::from([("firmware_flash_bytes".into(), bytes.len().to_string())]))
+}
+
+/// Other people's solvers on the same tasks, in Python; pinned.
+const PEERS: [&str; 2] = ["numpy==2.4.6", "mujoco==4.0.0"];
+
+/// Runs them: each prints the row that it stands beside.
+fn peers() -> Result<Values, Failure> {
+    let python = setup::python(&PEERS)?;
+    let mut values = Values::new();
+    for script in ["soft_body.py", "bmode.py"] {
+        let mut command = Command::new(&python);
+        // One core, as ours.
+        command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+        values.extend(values_in(&shell::output(command.arg(shell::top().join("xtask/peers").join(script)))?));
+    }
+    Ok(values)
 }
 
 /// The whole way of a sample: plant, control law, frame, bytes, frame again, tallies.

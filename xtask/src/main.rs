@@ -11,6 +11,7 @@ mod mutants;
 mod rows;
 mod setup;
 mod shell;
+mod site;
 mod stack;
 mod test;
 mod wasm;
@@ -22,10 +23,11 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt clippy doc unit firmware wasm board browser clients fuzz prove
+                                fmt clippy doc unit firmware wasm site board browser clients fuzz prove
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
+  cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask bench             measures, prints the table and writes target/bench.json
   cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         "firmware" => no_more(rest).and_then(|()| firmware::report(&firmware::build()?)),
         "flash" => flash::run(rest),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
+        "site" => no_more(rest).and_then(|()| site::run()),
         "mutants" => mutants::run(rest),
         "bench" => no_more(rest).and_then(|()| bench::run()),
         other => Err(Failure::usage(format!(

@@ -72,6 +72,15 @@ pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Failure> {
     Ok(interpreter)
 }
 
+/// What runs WebAssembly without a browser.
+pub(crate) fn node() -> Result<(), Failure> {
+    if shell::is_on_path("node") {
+        Ok(())
+    } else {
+        install(&["nodejs"], "the test of the device in a browser")
+    }
+}
+
 /// How the image for the board is built on this machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Toolchain {

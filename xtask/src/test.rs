@@ -2,7 +2,7 @@
 
 use crate::setup::{self, TARGET};
 use crate::shell::{self, Failure, cargo};
-use crate::{firmware, setup::Toolchain, wasm};
+use crate::{firmware, setup::Toolchain, site, wasm};
 use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -28,13 +28,14 @@ enum Ended {
 }
 
 /// In the order that finds the most for the least time.
-const STEPS: [Step; 11] = [
+const STEPS: [Step; 12] = [
     Step { name: "fmt", shows: "the sources are formatted", run: fmt },
     Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
     Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
     Step { name: "doc", shows: "the documentation builds without warnings, its examples run", run: doc },
     Step { name: "unit", shows: "the crates' tests", run: unit },
     Step { name: "wasm", shows: "what the page computes is built from its sources", run: page_wasm },
+    Step { name: "site", shows: "the device in a browser gives the same bits as host-sim's", run: same_bits },
     Step { name: "board", shows: "the flash image on the emulated board", run: board },
     Step { name: "browser", shows: "the page in a real browser", run: browser },
     Step {
@@ -183,6 +184,10 @@ fn page_wasm(_: &Clock) -> Result<Ended, Failure> {
     Ok(Ended::Passed)
 }
 
+fn same_bits(_: &Clock) -> Result<Ended, Failure> {
+    passed(site::check())
+}
+
 fn board(clock: &Clock) -> Result<Ended, Failure> {
     let image = firmware::build()?;
     let names = test_programs()?.into_iter().filter(|name| !is_for_browser(name));
@@ -195,6 +200,7 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
         return Ok(Ended::Skipped("there is no test program for the browser in tests/tests".into()));
     }
     setup::browser()?;
+    site::build()?;
     passed(clock.run(tests().args(["-p", "tests"]).args(each(names.into_iter()))))
 }
 

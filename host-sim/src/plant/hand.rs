@@ -50,7 +50,12 @@ impl Hand {
             let hertz = BAND.0 + width * (index as f64 + random.unit());
             let phase = TAU * random.unit();
             let per_tick = TAU * hertz * TICK_S;
-            Sine { cos: phase.cos(), sin: phase.sin(), turn: per_tick.sin_cos(), rad_per_s: TAU * hertz }
+            Sine {
+                cos: libm::cos(phase),
+                sin: libm::sin(phase),
+                turn: libm::sincos(per_tick),
+                rad_per_s: TAU * hertz,
+            }
         });
         Self { grip, sines, ticks: 0, start }
     }
@@ -86,7 +91,7 @@ impl Hand {
     /// Rounding lets the pairs grow or shrink by an ulp a tick.
     fn renormalise(&mut self) {
         for sine in &mut self.sines {
-            let length = sine.cos.hypot(sine.sin);
+            let length = libm::hypot(sine.cos, sine.sin);
             sine.cos /= length;
             sine.sin /= length;
         }

@@ -2,7 +2,8 @@
 //! bearings, a needle held by the grip of the roller, its weight, a hand. SI units; positive is the insertion direction.
 //!
 //! It knows a converter's set value, an enable line and an encoder count, and nothing of force laws: tissue exists only as
-//! the torque that the control law asks for. The same inputs give the same bits, always.
+//! the torque that the control law asks for. The same inputs give the same bits, always and on every machine, in a browser
+//! too: sines come from `libm`, not from the system.
 
 pub mod bearing;
 pub mod hand;
@@ -117,7 +118,7 @@ impl Plant {
     /// Inclines the insertion axis below the horizontal, rad.
     pub fn set_tilt(&mut self, tilt: f64) {
         self.tilt = tilt;
-        self.weight = self.config.needle_mass * GRAVITY * tilt.sin();
+        self.weight = self.config.needle_mass * GRAVITY * libm::sin(tilt);
     }
 
     /// Inclination below the horizontal, rad.

@@ -1,0 +1,43 @@
+//! The virtual device for a while, as `run` drives it, and a hash (FNV-1a) of every byte that it sent: what the same device
+//! in a browser has to equal. `device_digest PROFILE TICKS`.
+
+use host_sim::device::virtual_device::VirtualDevice;
+use host_sim::driver::{Driver, Request};
+use host_sim::procedure::Procedure;
+use host_sim::profile::Profile;
+use link::codec::MAX_FRAME;
+use std::time::Duration;
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let name = arguments.next().unwrap_or_else(|| "adult".into());
+    let ticks: u64 = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(100_000);
+    let profile = Profile::find(&name).expect("a built-in profile");
+    let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
+    let mut device = VirtualDevice::new(&profile, procedure);
+    let mut driver = Driver::new(profile.config.clone());
+    driver.connected(Duration::ZERO);
+    let mut hash = 0xCBF2_9CE4_8422_2325_u64;
+    let mut bytes = [0; MAX_FRAME];
+    while device.ticks() < ticks {
+        let now = Duration::from_micros(device.ticks() * 100);
+        if driver.is_ready(now) && !driver.has_started() && !driver.is_starting() {
+            driver.request(Request::Start);
+        }
+        device.receive(driver.transmit(now));
+        for _ in 0..10 {
+            device.tick();
+        }
+        loop {
+            let count = device.transmit(&mut bytes);
+            if count == 0 {
+                break;
+            }
+            for byte in &bytes[..count] {
+                hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3);
+            }
+            driver.receive(now, &bytes[..count], |_| {});
+        }
+    }
+    println!("{hash:016x}");
+}

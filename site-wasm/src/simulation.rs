@@ -1,0 +1,220 @@
+//! The virtual device, the PC's side of its link and what the page is told, in one thread and without a clock.
+
+use crate::device::virtual_device::VirtualDevice;
+use crate::driver::{Driver, Request};
+use crate::failure::Failure;
+use crate::procedure::Procedure;
+use crate::profile::Profile;
+use crate::session::{self, Control, LinkStatus, Publisher, Session, Source, Subscription};
+use crate::visualizer::condense::Condenser;
+use crate::visualizer::messages::{FromPage, Hand, ToPage};
+use link::codec::MAX_FRAME;
+use link::frames::DeviceFrame;
+use std::time::Duration;
+
+/// Ticks between two exchanges with the device, as host-sim's station has them.
+const LOCKSTEP_TICKS: u64 = 10;
+/// What the scripted hand does.
+const PROCEDURE: &str = "venepuncture";
+
+/// A device, and everything up to the page.
+pub struct Simulation {
+    device: VirtualDevice,
+    driver: Driver,
+    session: Session,
+    publisher: Publisher,
+    subscription: Subscription,
+    condenser: Condenser,
+    said_scene: bool,
+    person: bool,
+    person_starts: bool,
+    digest: Digest,
+}
+
+impl Simulation {
+    /// With a built-in profile.
+    pub fn new(profile: &str) -> Result<Self, Failure> {
+        let profile = Profile::find(profile)?;
+        let procedure = Procedure::find(PROCEDURE, &profile)?;
+        let scene = profile.scene(Source::Virtual, Some(PROCEDURE.to_owned()));
+        let (session, publisher) = session::open(scene);
+        let mut driver = Driver::new(profile.config.clone());
+        driver.connected(Duration::ZERO);
+        Ok(Self {
+            device: VirtualDevice::new(&profile, procedure),
+            driver,
+            subscription: session.subscribe(),
+            session,
+            publisher,
+            condenser: Condenser::default(),
+            said_scene: false,
+            person: false,
+            person_starts: false,
+            digest: Digest::default(),
+        })
+    }
+
+    /// Moves time on, as host-sim's station does it with a virtual device.
+    pub fn advance(&mut self, ticks: u64) {
+        let end = self.device.ticks() + ticks;
+        let mut bytes = [0; MAX_FRAME];
+        while self.device.ticks() < end {
+            let now = Duration::from_micros(self.device.ticks() * 100);
+            while let Some(control) = self.publisher.next_control() {
+                self.control(control);
+            }
+            let may_start = self.driver.is_ready(now) && !self.person_starts;
+            if may_start && !self.driver.has_started() && !self.driver.is_starting() {
+                self.driver.request(Request::Start);
+            }
+            self.device.receive(self.driver.transmit(now));
+            for _ in 0..LOCKSTEP_TICKS {
+                self.device.tick();
+            }
+            loop {
+                let count = self.device.transmit(&mut bytes);
+                if count == 0 {
+                    break;
+                }
+                self.digest.take(&bytes[..count]);
+                let publisher = &self.publisher;
+                self.driver.receive(now, &bytes[..count], |frame| publish(publisher, frame));
+            }
+        }
+        self.status();
+    }
+
+    fn control(&mut self, control: Control) {
+        match control {
+            Control::Start => self.driver.request(Request::Start),
+            Control::Stop => {
+                // Stopped once, only a person starts it again.
+                self.person_starts = true;
+                self.driver.request(Request::Stop);
+            }
+            Control::Zero => self.driver.request(Request::Zero),
+            other => self.device.control(other),
+        }
+    }
+
+    fn status(&self) {
+        let now = Duration::from_micros(self.device.ticks() * 100);
+        let counts = self.driver.counts();
+        self.publisher.link(|status| {
+            *status = LinkStatus {
+                connected: self.driver.is_ready(now),
+                frames: counts.frames,
+                lost_frames: counts.lost_frames,
+                samples: counts.samples,
+                lost_samples: counts.lost_samples,
+                garbage: counts.garbage,
+                recording: None,
+                notice: self.driver.notice().map(str::to_owned),
+            };
+        });
+    }
+
+    /// Does what the page asks for; what is wrong with it where it asked for nonsense.
+    pub fn receive(&mut self, text: &str) -> Result<(), String> {
+        let control = match FromPage::parse(text)? {
+            FromPage::Start => Control::Start,
+            FromPage::Stop => Control::Stop,
+            FromPage::Zero => Control::Zero,
+            FromPage::Drag { depth_mm } => {
+                self.person = true;
+                Control::Drag { depth_mm }
+            }
+            FromPage::Demo => {
+                self.person = false;
+                Control::Script
+            }
+            FromPage::Tilt { rad } => Control::Tilt { rad },
+            // A lifted pointer leaves the hand where it is.
+            _ => Control::Release,
+        };
+        self.session.control(control);
+        Ok(())
+    }
+
+    /// What there is to tell the page, one JSON text a line.
+    pub fn tell(&mut self) -> String {
+        let mut lines = String::new();
+        let mut say = |message: &ToPage| {
+            // Only a map with keys that are no strings cannot be written, and there is none.
+            if let Ok(text) = serde_json::to_string(message) {
+                lines.push_str(&text);
+                lines.push('\n');
+            }
+        };
+        if !std::mem::replace(&mut self.said_scene, true) {
+            say(&ToPage::Scene(self.session.scene()));
+        }
+        let (device, mut frame) = self.condenser.take(self.subscription.drain());
+        if let Some(device) = device {
+            say(&ToPage::Device(device));
+        }
+        frame.hand = if self.person { Hand::Person } else { Hand::Demo };
+        say(&ToPage::Frame(frame));
+        lines
+    }
+
+    /// A hash of every byte that the device has sent.
+    pub fn digest(&self) -> u64 {
+        self.digest.0
+    }
+}
+
+fn publish(publisher: &Publisher, frame: &DeviceFrame) {
+    match frame {
+        DeviceFrame::Hello(hello) => publisher.hello(hello),
+        DeviceFrame::Samples(block) => publisher.samples(block.first_tick, &block.samples),
+        DeviceFrame::Pose(pose) => publisher.pose(*pose),
+        DeviceFrame::Event(event) => publisher.event(*event),
+        DeviceFrame::Timing(timing) => publisher.timing(*timing),
+        DeviceFrame::Ack(_) => {}
+    }
+}
+
+/// FNV-1a, 64 bits.
+struct Digest(u64);
+
+impl Default for Digest {
+    fn default() -> Self {
+        Self(0xCBF2_9CE4_8422_2325)
+    }
+}
+
+impl Digest {
+    fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_told_scene_device_and_a_needle_that_goes_in_and_may_move_it() {
+        let mut simulation = Simulation::new("adult").expect("it is built in");
+        simulation.advance(30_000);
+        let told = simulation.tell();
+        assert!(told.starts_with(r#"{"type":"scene""#), "{}", &told[..60]);
+        assert!(told.contains(r#""type":"device""#) && told.contains(r#""kind":"puncture""#));
+        simulation.receive(r#"{"do":"drag","depth_mm":-4.0}"#).expect("it is a message");
+        simulation.advance(20_000);
+        let told = simulation.tell();
+        let depth =
+            told.split(r#""depth_mm":"#).nth(1).and_then(|rest| rest.split(',').next()).expect("a pose");
+        assert!((depth.parse::<f64>().expect("a number") + 4.0).abs() < 0.3, "{depth}");
+        assert!(told.contains(r#""hand":"person""#));
+        assert!(simulation.receive("{}").is_err());
+    }
+
+    #[test]
+    fn an_unknown_profile_is_refused() {
+        assert!(Simulation::new("giant").is_err());
+    }
+}

@@ -1,0 +1,149 @@
+//! `cargo xtask site`: the whole simulator as one folder without a server: the page, its modules inside it, and the device as
+//! WebAssembly in the place of the WebSocket. A folder opened from a disk may load neither modules nor WebAssembly, so that
+//! both lie in the page as text.
+
+use crate::setup;
+use crate::shell::{self, Failure, cargo};
+use crate::wasm;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The page, and what takes the place of some of its modules.
+const PAGE: &str = "host-sim/page";
+const IN_PLACE: &str = "site-wasm/page";
+/// Where the page starts its modules, and what stands there in the site.
+const STARTS: &str = r#"<script type="module" src="main.js"></script>"#;
+/// Profiles and ticks whose bits are compared: an insertion and withdrawal each.
+const COMPARED: [(&str, &str); 2] = [("adult", "80000"), ("firm-skin", "80000")];
+
+/// Builds the site into `target/site`; its page.
+pub(crate) fn build() -> Result<PathBuf, Failure> {
+    let device = wasm::build_crate("site-wasm")?;
+    let top = shell::top();
+    let mut modules = scripts(&top.join(PAGE))?;
+    modules.extend(scripts(&top.join(IN_PLACE))?);
+    let picture = top.join(PAGE).join("picture.wasm");
+    let mut files = String::from("export const files = {\n");
+    for (name, path) in [("picture.wasm", &picture), ("device.wasm", &device)] {
+        let _ = writeln!(files, "  \"{name}\": \"{}\",", base64(&read(path)?));
+    }
+    files.push_str("};\n");
+    modules.insert("files.js".into(), files);
+    let page = String::from_utf8_lossy(&read(&top.join(PAGE).join("index.html"))?).into_owned();
+    let page = page.replacen(STARTS, &starts(&modules), 1);
+    if page.contains(STARTS) || !page.contains("importmap") {
+        return Err(Failure::new(format!("{PAGE}/index.html does not start main.js as `{STARTS}` does")));
+    }
+    let site = shell::target().join("site");
+    write(&site, "index.html", page.as_bytes())?;
+    for file in ["style.css", "icon.svg"] {
+        write(&site, file, &read(&top.join(PAGE).join(file))?)?;
+    }
+    Ok(site.join("index.html"))
+}
+
+/// Builds it and says where it is.
+pub(crate) fn run() -> Result<(), Failure> {
+    let page = build()?;
+    println!("{} opens in a browser as it is, or from any web server", page.display());
+    println!("another patient: add ?profile=firm-skin to its address");
+    Ok(())
+}
+
+/// Whether the device in the browser gives the same bits as host-sim's.
+pub(crate) fn check() -> Result<(), Failure> {
+    setup::node()?;
+    let device = wasm::build_crate("site-wasm")?;
+    for (profile, ticks) in COMPARED {
+        let mut native = cargo();
+        native.args(["run", "--release", "--ignore-rust-version", "--quiet", "-p", "host-sim"]);
+        let native = shell::output(native.args(["--example", "device_digest", "--", profile, ticks]))?;
+        let mut node = Command::new("node");
+        let browser = shell::output(
+            node.current_dir(shell::top()).arg("site-wasm/digest.mjs").arg(&device).args([profile, ticks]),
+        )?;
+        eprintln!("{profile}: {} natively, {} as WebAssembly", native.trim(), browser.trim());
+        if native.trim() != browser.trim() {
+            return Err(Failure::new(format!(
+                "profile {profile}: the device in a browser sends other bytes within {ticks} ticks than host-sim's"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The modules of a folder by their names, importing each other by name alone.
+fn scripts(folder: &Path) -> Result<BTreeMap<String, String>, Failure> {
+    let cannot =
+        |error: &dyn std::fmt::Display| Failure::new(format!("{} cannot be read: {error}", folder.display()));
+    let mut modules = BTreeMap::new();
+    for entry in fs::read_dir(folder).map_err(|error| cannot(&error))?.flatten() {
+        let path = entry.path();
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+        if name.ends_with(".js") {
+            let text = fs::read_to_string(&path).map_err(|error| cannot(&error))?;
+            modules.insert(
+                name.to_string(),
+                text.replace("from \"./", "from \"").replace("import \"./", "import \""),
+            );
+        }
+    }
+    Ok(modules)
+}
+
+/// The modules as addresses that hold them, and the start of the first.
+fn starts(modules: &BTreeMap<String, String>) -> String {
+    let entries: Vec<String> = modules
+        .iter()
+        .map(|(name, text)| format!("\"{name}\":\"data:text/javascript;base64,{}\"", base64(text.as_bytes())))
+        .collect();
+    format!(
+        "<script type=\"importmap\">{{\"imports\":{{{}}}}}</script>\n  <script type=\"module\">import \"main.js\";</script>",
+        entries.join(",\n")
+    )
+}
+
+/// RFC 4648, with padding.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let mut bits = [0; 3];
+        bits[..three.len()].copy_from_slice(three);
+        let number = u32::from(bits[0]) << 16 | u32::from(bits[1]) << 8 | u32::from(bits[2]);
+        for place in 0..4 {
+            let letter = LETTERS[(number >> (18 - 6 * place) & 63) as usize];
+            text.push(if place <= three.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))
+}
+
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    let cannot = |error: std::io::Error| {
+        Failure::new(format!("{name} cannot be written to {}: {error}", folder.display()))
+    };
+    fs::create_dir_all(folder).map_err(cannot)?;
+    fs::write(folder.join(name), bytes).map_err(cannot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_the_published_one() {
+        for (text, coded) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
+            assert_eq!(base64(text.as_bytes()), coded);
+        }
+    }
+}
