@@ -67,7 +67,7 @@ pub fn diagnose_recordings(
     if let Some(reason) = estimation::plausibility::mistakes(&all, rig) {
         return Ok(Outcome::cannot_tell(rig, reason));
     }
-    if let Some(reason) = fit.iter().chain(holdout).find_map(|r| io::sufficiency::too_little(r, rig)) {
+    if let Some(reason) = io::sufficiency::too_little(fit, holdout, rig) {
         return Ok(Outcome::cannot_tell(rig, reason));
     }
     let search = validation::stepwise::search(rig, fit, holdout, progress)?;

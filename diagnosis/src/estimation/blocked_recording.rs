@@ -3,6 +3,7 @@
 //! A block's position is the mean of its rows; an input is held row by row and enters as what it does to velocity, to
 //! position and to the block's mean, so that time stamps are used as they stand and nothing is resampled.
 
+use crate::effects::{CommandLaw, Effect, EffectName};
 use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -23,6 +24,12 @@ pub(crate) enum Input {
 #[derive(Debug, Clone)]
 pub(crate) struct BlockedRecording {
     pub(crate) file: String,
+    /// How much of the file was left out before the first row, s.
+    pub(crate) lead_s: f64,
+    /// Travel per turn of the motor where it is known, rad or m.
+    pub(crate) turn: Option<f64>,
+    /// Position at which travel is nought, rad or m; the encoder's, which means something where it is absolute.
+    pub(crate) origin: f64,
     /// Rows per block.
     pub(crate) rows_per_block: usize,
     /// Start of each block since the first row, s.
@@ -85,6 +92,12 @@ const CONTACT_STEP_S: f64 = 6e-4;
 const GRIP_STEP_S: f64 = 1e-3;
 
 impl BlockedRecording {
+    /// Cuts a checked recording into blocks, long rests at its ends left out.
+    pub(crate) fn moving(recording: &Recording, rig: &Rig) -> Self {
+        let (part, lead_s) = recording.without_idle_ends();
+        Self { lead_s, ..Self::new(&part, rig) }
+    }
+
     /// Cuts a checked recording into blocks.
     pub(crate) fn new(recording: &Recording, rig: &Rig) -> Self {
         let scale = 1.0 / rig.encoder.counts_per_unit;
@@ -99,6 +112,9 @@ impl BlockedRecording {
         let zero = recording.position_counts[0];
         let mut track = Self {
             file: recording.file.clone(),
+            lead_s: 0.0,
+            turn: rig.turn(),
+            origin: zero * scale,
             rows_per_block: m,
             start: Vec::with_capacity(n),
             span: Vec::with_capacity(n),
@@ -106,7 +122,12 @@ impl BlockedRecording {
             tau2: Vec::with_capacity(n),
             z: Vec::with_capacity(n),
             quantum: Vec::with_capacity(n),
-            command: recording.command[..rows].iter().map(|u| u.clamp(-limit, limit)).collect(),
+            command: as_known(
+                rig,
+                recording.command[..rows].iter().map(|u| u.clamp(-limit, limit)),
+                &row_hold,
+            )
+            .into(),
             command_input: Arc::new(Input::Held(Vec::new())),
             of_contact: Arc::default(),
             of_grip: Arc::default(),
@@ -149,7 +170,10 @@ impl BlockedRecording {
             track.z.push(sum / count * scale);
             // Rows within one count tell no more than one of them.
             let moved = (recording.position_counts[end - 1] - recording.position_counts[first]).abs();
-            track.quantum.push(scale * scale / 12.0 / (1.0 + moved.min(count - 1.0)));
+            let noise = rig.encoder.noise_counts.unwrap_or(0.0);
+            track
+                .quantum
+                .push(scale * scale * (1.0 / 12.0 / (1.0 + moved.min(count - 1.0)) + noise * noise / count));
         }
         track.inflate_where_slow(scale);
         track.command_input = track.rows_input(&track.command).into();
@@ -286,6 +310,19 @@ impl BlockedRecording {
     pub(crate) fn segment_count(&self) -> usize {
         self.segments.len() - 1
     }
+}
+
+/// The command behind the delay and the lag that the rig already knows. A known filter of the reading is one of all that
+/// moves the axis, for both are linear: the command passes it too.
+fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<f64> {
+    let law = |name, key: &str, value: Option<f64>| {
+        value.filter(|x| *x > 0.0).and_then(|x| CommandLaw::new(&Effect::shaped(name, &[(key, x)])))
+    };
+    let lag = |value| law(EffectName::ElectricalLag, "time_constant", value);
+    let delay = law(EffectName::CommandDelay, "delay", rig.actuator.delay_s);
+    let mut laws: Vec<CommandLaw> =
+        [delay, lag(rig.actuator.lag_s), lag(rig.encoder.filter_s)].into_iter().flatten().collect();
+    command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, *h))).collect()
 }
 
 impl Input {

@@ -52,11 +52,18 @@ fn step_of(track: &BlockedRecording, noise: &Noise, j: usize) -> Step {
     Step { h, rho, q }
 }
 
+/// Variance of the place at the start over that of one reading: as good as unknown, and far from rounding.
+const DIFFUSE: f64 = 1e4;
+
 fn initial(track: &BlockedRecording, noise: &Noise) -> Sym {
     let reach = track.z.iter().fold(0.0_f64, |m, z| m.max(z.abs())).max(1e-12);
     let duration = track.start[track.blocks() - 1].max(1e-3);
     let speed = 100.0 * reach / duration.min(1.0);
-    [reach * reach, 0.0, 0.0, speed * speed, 0.0, noise.slow]
+    // Where the reading's own error is the larger, the start has to be unsure against that: an estimator may count in errors
+    // of one, whatever the unit of length.
+    let error = DIFFUSE * noise.sensor * track.quantum[0];
+    let span = track.span[0].max(1e-9);
+    [(reach * reach).max(error), 0.0, 0.0, (speed * speed).max(error / (span * span)), 0.0, noise.slow]
 }
 
 /// Measurement update: innovation variance, gain, covariance after it.

@@ -57,7 +57,7 @@ pub(crate) fn find(track: &BlockedRecording, alone: &Fit, count: f64, asked: Ask
         left = settle(&mut jumps, &residual, stands);
     }
     let mut lost = vec![0.0; n];
-    if jumps.len() < asked.fewest {
+    if jumps.len() < asked.fewest || follows_command(track, &jumps) || follows_angle(track, &jumps) {
         return lost;
     }
     for Jump { block, later, size, .. } in jumps {
@@ -65,6 +65,48 @@ pub(crate) fn find(track: &BlockedRecording, alone: &Fit, count: f64, asked: Ask
         lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
     }
     lost
+}
+
+/// Time before a jump in which the command is looked at, s: a belt or a joint gives way at once.
+const JUST_BEFORE_S: f64 = 0.02;
+/// Mean rank of the command's change before jumps, among all moving blocks, from which on jumps follow the command; by chance
+/// it is a half.
+const FOLLOWS: f64 = 0.8;
+/// Fewest jumps whose places say something, and standard errors by which they must.
+const TELLING: usize = 6;
+const SURELY: f64 = 3.0;
+
+/// Whether jumps come just after the command has changed: what is lost is lost whatever the drive does, what a spring in the
+/// drive takes up is not.
+fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
+    if jumps.len() < TELLING {
+        return false;
+    }
+    let mean = track.block_mean(&track.command);
+    let reach = ((JUST_BEFORE_S * track.block_rate()).round() as usize).max(1);
+    let change = |j: usize| {
+        let before = &mean[j.saturating_sub(reach + 1)..j.max(1)];
+        let fold = |start: f64, pick: fn(f64, f64) -> f64| before.iter().copied().fold(start, pick);
+        fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
+    };
+    let mut all: Vec<f64> = (1..track.blocks()).filter(|j| !track.rest[*j]).map(change).collect();
+    all.sort_by(f64::total_cmp);
+    let rank = |x: f64| {
+        let (below, up_to) = (all.partition_point(|y| *y < x), all.partition_point(|y| *y <= x));
+        0.5 * (below + up_to) as f64 / all.len().max(1) as f64
+    };
+    let ranks: f64 = jumps.iter().map(|jump| rank(change(jump.block))).sum::<f64>() / jumps.len() as f64;
+    // Ranks that are even between nought and one have a variance of a twelfth.
+    ranks > FOLLOWS && ranks - 0.5 > SURELY / (12.0 * jumps.len() as f64).sqrt()
+}
+
+/// Whether jumps come at one angle of the turn: that is a fault of the scale, told as what it is.
+fn follows_angle(track: &BlockedRecording, jumps: &[Jump]) -> bool {
+    let Some(turn) = track.turn.filter(|_| jumps.len() >= TELLING) else { return false };
+    let angle = |jump: &Jump| std::f64::consts::TAU * track.x[jump.block] / turn;
+    let sum = |of: fn(f64) -> f64| jumps.iter().map(|jump| of(angle(jump))).sum::<f64>() / jumps.len() as f64;
+    let travel = track.x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    travel > turn && sum(f64::cos).hypot(sum(f64::sin)) > FOLLOWS
 }
 
 /// A response after blocks in which there is none.
@@ -243,7 +285,7 @@ mod tests {
         let count = 1.0 / rig.encoder.counts_per_unit;
         let mut tracks = [BlockedRecording::new(&recording, &rig)];
         tracks[0].v.fill(3.0);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
         let lost = find(&tracks[0], &fit, count, asked);
@@ -267,5 +309,29 @@ mod tests {
         assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
         let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
         assert!(!any(lost(impact, Asked::KNOWN)));
+    }
+
+    #[test]
+    fn jumps_just_after_the_command_has_changed_are_no_lost_counts() {
+        let rows = 10_000;
+        let time_s: Vec<f64> = (0..rows).map(|row| f64::from(row) / ROWS_PER_S).collect();
+        let recording = Recording {
+            command: time_s.iter().map(|t| if (t / 0.1) as i32 % 2 == 0 { 1.0 } else { -1.0 }).collect(),
+            position_counts: vec![0.0; time_s.len()],
+            time_s,
+            ..Recording::default()
+        };
+        let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
+        track.rest.fill(false);
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let gains = Gains::new(&track, &noise);
+        let at = |time: f64| {
+            let block = track.start.partition_point(|start| *start < time);
+            Jump::new(&track, &gains, block, 0.0)
+        };
+        let switched: Vec<Jump> = (1..12).map(|i| at(0.1 * f64::from(i) + 0.006)).collect();
+        assert!(follows_command(&track, &switched));
+        let anywhere: Vec<Jump> = (1..12).map(|i| at(0.137 * f64::from(i) + 0.02)).collect();
+        assert!(!follows_command(&track, &anywhere));
     }
 }

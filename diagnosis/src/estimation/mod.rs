@@ -8,6 +8,7 @@ pub(crate) mod lost_counts;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod plausibility;
+pub(crate) mod quasi_static;
 pub(crate) mod refit;
 pub(crate) mod regressors;
 pub(crate) mod slices;

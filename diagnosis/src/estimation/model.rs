@@ -17,6 +17,8 @@ pub(crate) enum Key {
     Coulomb,
     Offset,
     Weight,
+    /// Gravity on an off-centre mass, of absolute counts.
+    Gravity,
     /// The measured external load.
     External,
     /// Term of an effect of the model.
@@ -45,6 +47,8 @@ pub(crate) struct Nominal {
     pub(crate) anchor: Option<(f64, f64)>,
     /// Whether the refit explains most of the force.
     pub(crate) is_balanced: bool,
+    /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
+    pub(crate) virtual_inertia: f64,
 }
 
 /// What the law of a joint takes from the whole machine, all per inertia: per unit of command and of the measured load, by dry
@@ -132,6 +136,7 @@ impl Nominal {
         match name {
             EffectName::ViscousFriction => model.viscous.is_some_and(|x| x > 0.0),
             EffectName::CoulombFriction => model.coulomb.is_some_and(|x| x > 0.0),
+            EffectName::MassImbalance => model.gravity.is_some_and(|x| x != 0.0),
             EffectName::TiltGravity => model.weight.is_some_and(|x| x != 0.0),
             _ => false,
         }
@@ -158,6 +163,7 @@ impl Nominal {
             Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
             Key::Coulomb => relative(rig.model.coulomb.unwrap_or(0.0), rig.coulomb_sd()),
             Key::Weight => relative(rig.model.weight.unwrap_or(0.0), rig.weight_sd()),
+            Key::Gravity => relative(rig.model.gravity.unwrap_or(0.0), rig.gravity_sd()),
             Key::Offset => {
                 // A rig without an offset still sees a bias that wanders by a fraction of the disturbance.
                 let wander = 0.5 * noise.slow.sqrt();
@@ -369,6 +375,10 @@ impl Model {
         if let (true, Some(tilt)) = (nominal.holds(EffectName::TiltGravity), &track.tilt) {
             push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
         }
+        if nominal.rig.model.gravity.is_some_and(|x| x != 0.0) {
+            let zero = nominal.rig.model.gravity_zero.unwrap_or(0.0) - track.origin;
+            push(Key::Gravity, Input::Held(track.x.iter().map(|x| -(x - zero).sin()).collect()), false);
+        }
         if let Some(force) = &track.force {
             push(Key::External, Input::Held(force.clone()), false);
         }
@@ -411,7 +421,7 @@ mod tests {
 
     fn nominal(viscous: f64, coulomb: f64) -> Nominal {
         let rig = Rig::of_values(0.01, viscous, coulomb);
-        Nominal { rig, external: 0.0, anchor: None, is_balanced: true }
+        Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 }
     }
 
     #[test]

@@ -33,6 +33,9 @@ fn excerpt(track: &BlockedRecording, total: &Total, from: usize, to: usize) -> E
     let z0 = track.z[from];
     let mut part = BlockedRecording {
         file: String::new(),
+        lead_s: 0.0,
+        turn: None,
+        origin: 0.0,
         rows_per_block: track.rows_per_block,
         start: track.start[from..to].iter().map(|t| t - track.start[from]).collect(),
         span: cut(&track.span),

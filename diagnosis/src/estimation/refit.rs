@@ -121,19 +121,57 @@ fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
     (seen.abs() > 0.5 && seen.abs() < 2.0).then(|| seen.signum())
 }
 
-/// Scale of acceleration that the command makes.
-pub(crate) fn command_scale(nominal: &Nominal, tracks: &[BlockedRecording]) -> f64 {
+/// Scale of acceleration of the recordings: what the command makes or, where something else drives the motion, what is seen.
+pub(crate) fn acceleration_scale(nominal: &Nominal, tracks: &[BlockedRecording]) -> f64 {
     let (mut square, mut rows) = (0.0, 0.0);
     for track in tracks {
         square += track.command.iter().map(|u| u * u).sum::<f64>();
         rows += track.command.len() as f64;
     }
-    nominal.known_gain().abs() * (square / rows).sqrt().max(1e-12)
+    let of_command = nominal.known_gain().abs() * (square / rows).sqrt();
+    let of_motion = tracks.iter().map(seen_acceleration).fold(0.0, f64::max);
+    let least = DRIVEN_ELSEWHERE * of_motion;
+    if of_command >= least { of_command.max(1e-12) } else { of_motion.max(1e-12) }
+}
+
+/// Whether the command drives the motion, rather than weight or a push at the start.
+pub(crate) fn is_driven(nominal: &Nominal, tracks: &[BlockedRecording]) -> bool {
+    let square: f64 = tracks.iter().flat_map(|track| track.command.iter()).map(|u| u * u).sum();
+    let rows: f64 = tracks.iter().map(|track| track.command.len() as f64).sum();
+    let seen = tracks.iter().map(seen_acceleration).fold(0.0, f64::max);
+    nominal.known_gain().abs() * (square / rows).sqrt() >= DRIVEN_ELSEWHERE * seen
+}
+
+/// Part of the acceleration seen below which the command does not drive the motion.
+const DRIVEN_ELSEWHERE: f64 = 0.2;
+/// Times the error of reading that a second difference must be to be an acceleration.
+const CLEAR: f64 = 5.0;
+
+/// Acceleration that positions show over the shortest time that shows any, root mean square.
+pub(crate) fn seen_acceleration(track: &BlockedRecording) -> f64 {
+    let n = track.blocks();
+    let h = 1.0 / track.block_rate();
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), x| (sum + x, count + 1.0));
+        sum / count.max(1.0)
+    };
+    let error = mean(&mut track.quantum.iter().copied());
+    let mut reach = 1;
+    while 8 * reach < n {
+        let step = (reach as f64 * h).powi(2);
+        let second = |j: usize| (track.z[j + reach] - 2.0 * track.z[j] + track.z[j - reach]) / step;
+        let square = mean(&mut (reach..n - reach).map(|j| second(j).powi(2)));
+        if square > CLEAR * CLEAR * 6.0 * error / (step * step) {
+            return square.sqrt();
+        }
+        reach *= 2;
+    }
+    0.0
 }
 
 /// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
 pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> (Noise, Fit) {
-    let mut scale = command_scale(nominal, tracks);
+    let mut scale = acceleration_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
@@ -145,7 +183,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> 
         if round == 0 && nominal.gain_sd() > LOOSE {
             let white = noise::estimate(tracks, &totals, &noise, scale, Colour::White);
             anchor(nominal, &Fit::new(&model, nominal, tracks, &white));
-            scale = command_scale(nominal, tracks);
+            scale = acceleration_scale(nominal, tracks);
             fit = Fit::new(&model, nominal, tracks, &noise);
         }
         let totals = fit.totals(tracks);

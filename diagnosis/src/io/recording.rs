@@ -1,6 +1,7 @@
 //! Recordings: CSV with a header line, read and checked; nothing is dropped in silence.
 
 use crate::io::error::InputError;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// One recording. All columns have the same length.
@@ -39,6 +40,10 @@ fn foreign(header: &str) -> Option<String> {
     };
     between(';', "semicolons").or_else(|| between('\t', "tabs"))
 }
+
+/// Rest at an end that is idle, and how much of it is kept, s.
+const IDLE_S: f64 = 1.0;
+const MARGIN_S: f64 = 0.3;
 
 impl Recording {
     /// Reads and checks a recording.
@@ -161,6 +166,42 @@ impl Recording {
             reference_counts: optional(reference, 4),
             force: optional(force, 5),
         })
+    }
+
+    /// The recording without long rests at its ends, in which nothing can be told, and how much was taken from its start, s.
+    pub(crate) fn without_idle_ends(&self) -> (Cow<'_, Self>, f64) {
+        let n = self.len();
+        let counts = &self.position_counts;
+        let still = |from: f64| move |x: &&f64| (**x - from).abs() <= 1.0;
+        let lead = counts.iter().take_while(still(counts[0])).count();
+        let trail = counts.iter().rev().take_while(still(counts[n - 1])).count();
+        let t = &self.time_s;
+        if lead == n {
+            return (Cow::Borrowed(self), 0.0);
+        }
+        let first = match t[lead] - t[0] {
+            idle if idle > IDLE_S => t.partition_point(|x| *x < t[lead] - MARGIN_S),
+            _ => 0,
+        };
+        let end = match t[n - 1] - t[n - 1 - trail] {
+            idle if idle > IDLE_S => t.partition_point(|x| *x < t[n - 1 - trail] + MARGIN_S).min(n),
+            _ => n,
+        };
+        if first == 0 && end == n {
+            return (Cow::Borrowed(self), 0.0);
+        }
+        let cut = |column: &Vec<f64>| column[first..end].to_vec();
+        let cut_if = |column: &Option<Vec<f64>>| column.as_ref().map(cut);
+        let part = Self {
+            file: self.file.clone(),
+            time_s: cut(&self.time_s),
+            command: cut(&self.command),
+            position_counts: cut(&self.position_counts),
+            tilt_rad: cut_if(&self.tilt_rad),
+            reference_counts: cut_if(&self.reference_counts),
+            force: cut_if(&self.force),
+        };
+        (Cow::Owned(part), t[first] - t[0])
     }
 
     /// Number of rows.

@@ -36,7 +36,7 @@ impl Kind {
 }
 
 /// Nominal values; a key that is missing is not in the nominal model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// kg·m² or kg.
     pub inertia: f64,
@@ -52,6 +52,12 @@ pub struct Model {
     /// N·m or N, the load torque at a tilt of 90°.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
+    /// N·m: an off-centre mass adds −gravity·sin(q − gravity_zero); only with absolute counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<f64>,
+    /// rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_zero: Option<f64>,
 }
 
 /// Relative standard deviation of each nominal value (absolute for the offset).
@@ -74,11 +80,14 @@ pub struct Uncertainty {
     pub weight: Option<f64>,
     /// Relative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<f64>,
+    /// Relative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }
 
 /// The drive.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Actuator {
     /// N·m (or N) per unit of command.
     pub gain: f64,
@@ -88,6 +97,12 @@ pub struct Actuator {
     /// The largest |command| that the drive accepts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
+    /// A delay already known between command and force, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
+    /// A first-order lag already known, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lag_s: Option<f64>,
 }
 
 fn unit_of_command() -> String {
@@ -95,10 +110,19 @@ fn unit_of_command() -> String {
 }
 
 /// The encoder.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Encoder {
     /// Counts per rad or per m.
     pub counts_per_unit: f64,
+    /// Whether counts have the same zero in every recording.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub absolute: bool,
+    /// Standard deviation of a reading beyond its quantisation, counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_counts: Option<f64>,
+    /// A first-order filter already known in the reading, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter_s: Option<f64>,
     /// Travel per turn of the motor, rad or m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turn: Option<f64>,
@@ -196,6 +220,11 @@ impl Rig {
             ("model.viscous", self.model.viscous),
             ("model.coulomb", self.model.coulomb),
             ("encoder.start_spread", self.encoder.start_spread),
+            ("encoder.noise_counts", self.encoder.noise_counts),
+            ("encoder.filter_s", self.encoder.filter_s),
+            ("actuator.delay_s", self.actuator.delay_s),
+            ("actuator.lag_s", self.actuator.lag_s),
+            ("uncertainty.gravity", u.gravity),
             ("uncertainty.inertia", u.inertia),
             ("uncertainty.viscous", u.viscous),
             ("uncertainty.coulomb", u.coulomb),
@@ -208,7 +237,17 @@ impl Rig {
                 return refuse(format!("{key} must be a number not below zero; correct it"));
             }
         }
-        for (key, value) in [("model.offset", self.model.offset), ("model.weight", self.model.weight)] {
+        if self.model.gravity.is_some_and(|x| x != 0.0) && !self.encoder.absolute {
+            return refuse(
+                "model.gravity needs counts of one zero; set encoder.absolute = true or take it out".into(),
+            );
+        }
+        for (key, value) in [
+            ("model.offset", self.model.offset),
+            ("model.weight", self.model.weight),
+            ("model.gravity", self.model.gravity),
+            ("model.gravity_zero", self.model.gravity_zero),
+        ] {
             if value.is_some_and(|x| !(x.is_finite() && x.abs() < 1e30)) {
                 return refuse(format!("{key} must be a finite number; correct it"));
             }
@@ -246,6 +285,10 @@ impl Rig {
     /// Relative standard deviation of the dry friction.
     pub fn coulomb_sd(&self) -> f64 {
         self.uncertainty.coulomb.unwrap_or(UNDECLARED_FRICTION).max(1e-4)
+    }
+    /// Relative standard deviation of the gravity of an off-centre mass.
+    pub fn gravity_sd(&self) -> f64 {
+        self.uncertainty.gravity.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
     /// Relative standard deviation of the weight.
     pub fn weight_sd(&self) -> f64 {

@@ -3,26 +3,54 @@
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 
-/// Shortest recording, s, and slowest rate, Hz, that are worth fitting.
+/// Least of all recordings of a kind together, s and rows: short ones are pooled.
 const SHORTEST_S: f64 = 1.9;
-const SLOWEST_HZ: f64 = 90.0;
-const FEWEST_ROWS: usize = 300;
+const SHORTEST_HOLDOUT_S: f64 = 0.9;
+const FEWEST_ROWS: usize = 150;
+/// Least of one recording, s and rows.
+const LEAST_S: f64 = 0.25;
+const LEAST_ROWS: usize = 40;
+/// Slowest and fastest rate that is worth fitting, Hz.
+const SLOWEST_HZ: f64 = 19.0;
+const FASTEST_HZ: f64 = 25_000.0;
 /// Fewest counts of travel.
 const FEWEST_COUNTS: f64 = 100.0;
 
-/// The reason why a recording cannot tell, if there is one.
-pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
+/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells alone.
+pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording], rig: &Rig) -> Option<String> {
+    if let Some(reason) = fit.iter().chain(holdout).find_map(|recording| alone(recording, rig)) {
+        return Some(reason);
+    }
+    let pooled = |all: &[Recording], least: f64, what: &str| {
+        let seconds: f64 = all.iter().map(Recording::duration_s).sum();
+        let rows: usize = all.iter().map(Recording::len).sum();
+        let files: Vec<&str> = all.iter().map(|recording| recording.file.as_str()).collect();
+        (seconds < least || rows < FEWEST_ROWS).then(|| {
+            format!(
+                "{} {} {seconds:.2} s and {rows} rows {what} where at least {:.0} s and {FEWEST_ROWS} rows are needed (are its times in seconds?)",
+                files.join(", "),
+                if all.len() == 1 { "lasts" } else { "last" },
+                least.ceil()
+            )
+        })
+    };
+    pooled(fit, SHORTEST_S, "to fit on").or_else(|| pooled(holdout, SHORTEST_HOLDOUT_S, "to judge by"))
+}
+
+/// The reason why one recording cannot tell anything.
+fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
     let file = &recording.file;
     let seconds = recording.duration_s();
     let rate = recording.rate_hz();
-    if rate < SLOWEST_HZ {
+    if !(SLOWEST_HZ..FASTEST_HZ).contains(&rate) {
         return Some(format!(
-            "{file} has {rate:.3} rows a second where at least 100 are needed (are its times in milliseconds?)"
+            "{file} has {rate:.1} rows a second where 20 to 20000 are read (are its times in seconds?)"
         ));
     }
-    if seconds < SHORTEST_S || recording.len() < FEWEST_ROWS {
+    if seconds < LEAST_S || recording.len() < LEAST_ROWS {
         return Some(format!(
-            "{file} lasts {seconds:.2} s where at least 2 s are needed (are its times in seconds?)"
+            "{file} lasts {seconds:.2} s with {} rows where at least {LEAST_S} s and {LEAST_ROWS} rows are needed (are its times in seconds?)",
+            recording.len()
         ));
     }
     let spread = |column: &[f64]| {
@@ -30,11 +58,7 @@ pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
         let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         high - low
     };
-    let command = spread(&recording.command);
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-    if command <= 1e-6 * largest || command == 0.0 {
-        return Some(format!("the command of {file} is constant"));
-    }
     let counts = spread(&recording.position_counts);
     if counts < FEWEST_COUNTS {
         return Some(format!(
@@ -56,8 +80,9 @@ pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
     }
     let travel = counts / rig.encoder.counts_per_unit;
     let asked = rig.actuator.gain.abs() * largest / rig.model.inertia;
-    // Constant acceleration over the whole recording bounds how far the axis can get; a thousandth of noise shows less.
-    if travel > 30.0 * asked * seconds * seconds {
+    // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is nought, or is
+    // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
+    if largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds {
         return Some(format!(
             "{file} travels {travel:.3} {}, which its command cannot bring about with the rig's inertia and gain: a unit is off",
             rig.kind.length()
@@ -65,3 +90,6 @@ pub(crate) fn too_little(recording: &Recording, rig: &Rig) -> Option<String> {
     }
     None
 }
+
+/// How many times as far as its command can bring it an axis travels where a unit is off.
+const IMPOSSIBLE: f64 = 30.0;

@@ -123,6 +123,21 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
 }
 
+/// Correlation of two signals of the same length; nought where one does not vary.
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len()).max(1) as f64;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (ma, mb) = (mean(a), mean(b));
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (x, y) in a.iter().zip(b) {
+        let (x, y) = (x - ma, y - mb);
+        aa += x * x;
+        bb += y * y;
+        ab += x * y;
+    }
+    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
+}
+
 /// What is known of a coefficient before the recordings, and how far it may go.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prior {

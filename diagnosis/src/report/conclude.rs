@@ -3,7 +3,7 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::estimation::refit::command_scale;
+use crate::estimation::refit::{acceleration_scale, is_driven};
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
@@ -26,7 +26,7 @@ use crate::validation::stepwise::Search;
 use std::collections::BTreeMap;
 
 pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Outcome {
-    let scale = command_scale(&s.nominal, &s.fit_tracks);
+    let scale = acceleration_scale(&s.nominal, &s.fit_tracks);
     let nominal = s.nominal.clone();
     let fit_tracks = std::mem::take(&mut s.fit_tracks);
     let holdout_tracks = std::mem::take(&mut s.holdout_tracks);
@@ -37,7 +37,8 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     let refit = context.fit(Model::default(), &s.null.noise, Colour::White);
     let mut assessment = weigh(&mut s, &context, &refit, &holdout_tracks, &excitation);
     s.fit_tracks = fit_tracks.clone();
-    if let Some(reason) = misfit(&assessment, &nominal) {
+    let driven = is_driven(&nominal, &fit_tracks);
+    if let Some(reason) = misfit(&assessment, &nominal).filter(|_| driven) {
         return Outcome::cannot_tell(&nominal.rig, reason);
     }
     opponent::oppose(&mut assessment, &context, &s);
@@ -57,11 +58,14 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     let (verdict, reason) = verdict(&assessment, &maps_with_all, &holdout_tracks, &excitation, foreign);
     // The verdict rests on all that was weighed, what people see on what is named.
     let with_named = only_named(&assessment, &context, &refit, &holdout_tracks, &s);
-    let Shown { patched, on_fit, on_holdout, table } = with_named.as_ref().unwrap_or(&assessment.shown);
+    let Shown { patched, on_fit, on_holdout, table, keeps_nominal } =
+        with_named.as_ref().unwrap_or(&assessment.shown);
     let maps = with_named.as_ref().map_or(maps_with_all, maps_of);
     let effects = named_effects(&assessment, with_named.as_ref(), &context, &s);
-    let patched_rig = patch(&s, patched);
-    let refit_rig = patch(&s, &refit);
+    let rig_of = |model: &FittedModel| {
+        if *keeps_nominal && model.model.effects.is_empty() { s.original.clone() } else { patch(&s, model) }
+    };
+    let (patched_rig, refit_rig) = (rig_of(patched), rig_of(&refit));
     let simulated = simulated(given, &refit_rig, &patched_rig, held_out);
     let floor = assessment.floor;
     let before = above(table.nominal.holdout, floor, 0.0).max(above(table.refit.holdout, floor, 0.0));
@@ -185,6 +189,7 @@ fn refitted(patched: &Rig) -> BTreeMap<String, f64> {
         ("coulomb", model.coulomb),
         ("offset", model.offset),
         ("weight", model.weight),
+        ("gravity", model.gravity),
     ]
     .into_iter()
     .filter_map(|(key, value)| Some((key.to_owned(), value?)))

@@ -49,7 +49,7 @@ impl Series {
         Self {
             file: track.file.clone(),
             held_out,
-            time_s: track.start.iter().zip(&track.span).map(|(t, h)| t + 0.5 * h).collect(),
+            time_s: track.start.iter().zip(&track.span).map(|(t, h)| track.lead_s + t + 0.5 * h).collect(),
             velocity: track.v.clone(),
             nominal: moving(nominal),
             refit: moving(refit),

@@ -10,11 +10,16 @@ use crate::validation::parameters;
 use crate::validation::residual_maps;
 use crate::validation::stepwise::Search;
 
+/// Part of its nominal value that an inertia which hardly matters keeps at the least.
+const LEAST_INERTIA: f64 = 0.1;
+
 /// The rig with refitted values and the effects found.
 pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
     let mut rig = s.nominal.rig.clone();
     let (inertia, gain, _) = parameters::scale(&s.nominal, last);
-    rig.model.inertia = inertia;
+    // What was added to rig and command alike is no inertia of the machine.
+    let added = s.nominal.virtual_inertia * gain / s.nominal.rig.actuator.gain;
+    rig.model.inertia = (inertia - added).max(LEAST_INERTIA * s.original.model.inertia);
     rig.actuator.gain = gain;
     let value = |key: Key| last.fit.value(key).map(|x| x * inertia);
     if let Some(x) = value(Key::Viscous) {
@@ -28,6 +33,9 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
     }
     if let Some(x) = value(Key::Weight) {
         rig.model.weight = Some(x);
+    }
+    if let Some(x) = value(Key::Gravity) {
+        rig.model.gravity = Some(x);
     }
     let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
     let theta = last.fit.theta(0);

@@ -23,9 +23,10 @@ pub(crate) fn misfit(assessment: &Assessment, nominal: &Nominal) -> Option<Strin
     let force = table.force_rms;
     // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something, unless what was
     // found explains nearly all.
-    let judged = if nominal.anchor.is_some() { table.patched } else { table.refit };
-    // A command that is another one explains anything.
+    // A command that is another one explains anything; a plain force that was left out explains what it should.
     let is_another = assessment.effects.iter().any(|e| CommandLaw::new(&e.found.effect).is_some());
+    let refitted = nominal.anchor.is_none() && (is_another || assessment.effects.is_empty());
+    let judged = if refitted { table.refit } else { table.patched };
     let fits_not = judged.holdout > FOREIGN * force.holdout
         && judged.fit > FOREIGN * force.fit
         && (is_another || table.patched.holdout > LITTLE_FORCE * force.holdout);

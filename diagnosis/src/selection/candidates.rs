@@ -3,7 +3,10 @@
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Machine, Nominal};
+use crate::io::rig::Kind;
 use crate::numerics::golden::logarithmic;
+use crate::numerics::linear::correlation;
+use std::f64::consts::TAU;
 
 /// What the recordings span.
 #[derive(Debug, Clone)]
@@ -33,6 +36,18 @@ pub(crate) struct Span {
     /// Whether the columns are there and vary.
     pub(crate) tilt: bool,
     pub(crate) force: bool,
+    /// Whether the tilt is the axis' own angle.
+    pub(crate) tilt_is_angle: bool,
+}
+
+/// Correlation of tilt and angle from which on they are the same.
+const SAME_ANGLE: f64 = 0.98;
+
+/// Whether the tilt of every recording follows its travel.
+fn tilt_is_angle(tracks: &[BlockedRecording]) -> bool {
+    tracks
+        .iter()
+        .all(|track| track.tilt.as_ref().is_some_and(|tilt| correlation(tilt, &track.x).abs() > SAME_ANGLE))
 }
 
 fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
@@ -73,6 +88,7 @@ impl Span {
             clip: if nominal.anchor.is_some() { 0.45 } else { 0.27 },
             dead: nominal.most_ignored() * command,
             tilt: varies(tracks.iter().flat_map(|t| column(&t.tilt))),
+            tilt_is_angle: tilt_is_angle(tracks),
             force: varies(tracks.iter().flat_map(|t| column(&t.force))),
         }
     }
@@ -111,10 +127,51 @@ const STIFFEST_HZ: f64 = 400.0;
 /// narrow beside the travel.
 const PROFILE_DEGREES: [f64; 3] = [3.0, 6.0, 12.0];
 
+/// Part of a turn over which once a turn is told from a slope, and over which gravity bends from a spring's straight line.
+const LEAST_TURNS: f64 = 0.6;
+const LEAST_OF_AXIS: f64 = 0.15;
+
+fn once_a_turn(name: N, turn: f64) -> Effect {
+    Effect::shaped(name, &[("turn", turn), ("order_1", 1.0)])
+}
+
+/// Turns over which an axis runs on rather than to and fro: a law of the travel is of a stroke.
+const RUNS_ON: f64 = 100.0;
+/// Part of the travel within which recordings must start for a law of the travel to be the same in all.
+const SAME_PLACE: f64 = 0.3;
+
+/// Whether a law of the travel may hold for all recordings.
+fn has_stroke(span: &Span, nominal: &Nominal) -> bool {
+    let runs_on = nominal.rig.kind == Kind::Rotary && span.travel() > RUNS_ON * TAU;
+    match nominal.rig.encoder.start_spread {
+        Some(spread) => spread < SAME_PLACE * span.travel(),
+        None => !runs_on || nominal.rig.encoder.absolute,
+    }
+}
+
 /// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds it already.
 /// Periodic effects and missed counts are sought in a way of their own.
 pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
-    if nominal.holds(name) {
+    let follows_travel =
+        matches!(name, N::PositionDependentFriction | N::PositionDependentDamping | N::PositionSpring);
+    // A command that holds a part of the motion is none to clip or to delay, no joint is seen by it, and where force and command
+    // are all but equal its scale is what everything is told by.
+    let is_of_command = matches!(
+        name,
+        N::GainDrift
+            | N::TorqueRipple
+            | N::CommandDeadband
+            | N::CommandSaturation
+            | N::CommandDelay
+            | N::ElectricalLag
+            | N::Backlash
+            | N::DriveCompliance
+            | N::RollerSlip
+    );
+    if is_of_command && nominal.virtual_inertia > 0.0 {
+        return Vec::new();
+    }
+    if nominal.holds(name) || (follows_travel && !has_stroke(span, nominal)) {
         return Vec::new();
     }
     let machine = nominal.machine(None);
@@ -223,8 +280,19 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
             }
             out
         }
-        N::MassImbalance | N::EncoderEccentricity if turns > 0.6 => {
-            vec![Effect::shaped(name, &[("turn", turn.unwrap_or(1.0)), ("order_1", 1.0)])]
+        N::EncoderEccentricity if turns > LEAST_TURNS => vec![once_a_turn(name, turn.unwrap_or(1.0))],
+        // A weight whose tilt follows the angle is the gravity of that very mass.
+        N::MassImbalance if nominal.holds(N::TiltGravity) && span.tilt_is_angle => Vec::new(),
+        N::MassImbalance => {
+            // Gravity turns with the axis, an unbalanced rotor with the motor.
+            let axis = (nominal.rig.kind == Kind::Rotary).then_some(TAU);
+            let motor = turn.filter(|turn| axis.is_none_or(|axis| (turn / axis - 1.0).abs() > 1e-6));
+            let seen = |turn: &f64, least: f64| span.travel() > least * turn;
+            let axis = axis.filter(|turn| seen(turn, LEAST_OF_AXIS));
+            axis.into_iter()
+                .chain(motor.filter(|turn| seen(turn, LEAST_TURNS)))
+                .map(|turn| once_a_turn(name, turn))
+                .collect()
         }
         _ => Vec::new(),
     }
@@ -347,6 +415,7 @@ mod tests {
             dead: 0.8,
             tilt: false,
             force: false,
+            tilt_is_angle: false,
         };
         let at_end = |name: N, time_constant: f64| {
             is_at_end(&Effect::shaped(name, &[("time_constant", time_constant)]), &span)

@@ -111,6 +111,14 @@ impl FitContext<'_> {
         FittedModel { model, noise, fit, merit }
     }
 
+    /// Fits a model under known noise.
+    pub(crate) fn fit_at(&self, model: Model, noise: &Noise) -> FittedModel {
+        let fit = Fit::new(&model, self.nominal, self.tracks, noise);
+        let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
+        let merit = fit.log_likelihood - spent;
+        FittedModel { model, noise: *noise, fit, merit }
+    }
+
     /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
     /// what a disturbance explains are two optima.
     pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
@@ -138,6 +146,7 @@ impl FitContext<'_> {
                 return None;
             }
             let best = match name {
+                N::TorqueRipple if self.nominal.virtual_inertia > 0.0 => None,
                 N::Cogging | N::TorqueRipple => periodic::search(
                     *name,
                     &now.fit,

@@ -272,7 +272,7 @@ impl Scales<'_> {
         alternatives::fit_rivals(context, &patched, &s.last, holdout, &mut found);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
         let shown = Shown::new(context, holdout, &estimator, refit, patched);
-        let Shown { patched, on_fit, on_holdout, table } = &shown;
+        let Shown { patched, on_fit, on_holdout, table, .. } = &shown;
         let (inertia, _, _) = parameters::scale(nominal, patched);
         let count = 1.0 / nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(context.tracks, &patched.noise, count) * inertia;

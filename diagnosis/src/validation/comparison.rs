@@ -13,6 +13,8 @@ pub(crate) struct Shown {
     pub(crate) on_fit: Residuals,
     pub(crate) on_holdout: Residuals,
     pub(crate) table: FitTable,
+    /// Whether the nominal values explain held-out recordings better than refitted ones, which then stand for them.
+    pub(crate) keeps_nominal: bool,
 }
 
 impl Shown {
@@ -28,6 +30,18 @@ impl Shown {
         let known: &[BlockedRecording] = &known(holdout, &patched.model, context.span);
         let on_fit = residuals(nominal, estimator, context.tracks, false, refit, &patched);
         let on_holdout = residuals(nominal, estimator, known, true, refit, &patched);
+        // Values that a refit moved for the worse are not kept: the structure is wrong, or what the rig says of them.
+        let (mut on_fit, mut on_holdout) = (on_fit, on_holdout);
+        let keeps_nominal =
+            estimator.rms(&on_holdout.refit, known) > estimator.rms(&on_holdout.nominal, known);
+        if keeps_nominal {
+            for on in [&mut on_fit, &mut on_holdout] {
+                on.refit = on.nominal.clone();
+                if patched.model.effects.is_empty() {
+                    on.patched = on.nominal.clone();
+                }
+            }
+        }
         let both = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| Both {
             fit: estimator.rms(a, context.tracks),
             holdout: estimator.rms(b, holdout),
@@ -43,6 +57,6 @@ impl Shown {
             // Nothing can take more than there is; some resamplings of few segments would.
             holdout_gain_ci95: [helps.low, helps.high].map(|x| x.min(1.0)),
         };
-        Self { patched, on_fit, on_holdout, table }
+        Self { patched, on_fit, on_holdout, table, keeps_nominal }
     }
 }

@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true };
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let span = Span::of(&[slide(10.0)], &nominal);
         let model = |name| Model { effects: vec![Effect::shaped(name, &[])], ..Model::default() };
         let unknown = |to: f64, name| {

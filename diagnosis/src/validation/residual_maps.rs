@@ -181,7 +181,7 @@ pub(crate) fn intervals(track: &BlockedRecording, weight: &[f64]) -> Vec<[f64; 2
             continue;
         }
         let (a, b) = (i * length, ((i + 1) * length).min(n) - 1);
-        let (from, to) = (track.start[a], track.start[b] + track.span[b]);
+        let (from, to) = (track.lead_s + track.start[a], track.lead_s + track.start[b] + track.span[b]);
         match out.last_mut() {
             Some((last, sum)) if from - last[1] < 0.15 => {
                 last[1] = to;

@@ -23,7 +23,10 @@ pub(crate) fn forces(
         .collect()
 }
 
-/// The drive's force per block, as an estimator of this bandwidth sees it.
+/// Part of the inertia's force below which the drive is not what moves the axis.
+const DRIVES: f64 = 0.2;
+
+/// The force that moves the axis, the drive's where it has one, per block, as an estimator of this bandwidth sees it.
 pub(crate) fn drive_force(
     nominal: &Nominal,
     estimator: &Estimator,
@@ -34,7 +37,10 @@ pub(crate) fn drive_force(
     let j0 = nominal.rig.model.inertia;
     let all = forces(estimator, tracks, &none, j0);
     let less = forces(estimator, tracks, &drive, j0);
-    all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect()
+    let drive: Vec<Vec<f64>> =
+        all.iter().zip(&less).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+    // Where the drive does little, what accelerates the axis is the force.
+    if estimator.rms(&drive, tracks) < DRIVES * estimator.rms(&all, tracks) { all } else { drive }
 }
 
 /// Residual force per recording and block under the three models, and the drive's force, all by one estimator.

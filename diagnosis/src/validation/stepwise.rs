@@ -8,17 +8,18 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::lost_counts::{self, Asked};
 use crate::estimation::model::{Model, Nominal};
 use crate::estimation::noise::Colour;
-use crate::estimation::refit;
+use crate::estimation::{quasi_static, refit};
 use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::selection::candidates::Span;
-use crate::selection::joint;
 use crate::selection::search::{FitContext, FittedModel, MOST};
+use crate::selection::{candidates, joint};
 use crate::validation::evidence::{EffectEvidence, evaluate_all, judge_all};
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use crate::validation::residuals::{drive_force, forces};
+use rayon::prelude::*;
 
 /// Least gain of log-likelihood under coloured noise, after the cost of freedom, for an effect to be looked at on.
 pub(crate) const MIN_LOG_LIKELIHOOD_GAIN: f64 = 6.0;
@@ -28,6 +29,8 @@ const TRIED: usize = 3;
 
 /// What the search ends with.
 pub(crate) struct Search {
+    /// The rig as it was read.
+    pub(crate) original: Rig,
     pub(crate) nominal: Nominal,
     pub(crate) fit_tracks: Vec<BlockedRecording>,
     pub(crate) holdout_tracks: Vec<BlockedRecording>,
@@ -141,6 +144,8 @@ struct SearchState {
 struct Rejected {
     names: Vec<(EffectName, f64, String)>,
     tried: usize,
+    /// Whether plain forces were looked for together.
+    plain_tried: bool,
     /// What stood and excluded: not looked at again.
     excluded: Vec<EffectName>,
 }
@@ -152,6 +157,82 @@ struct Next {
     generalises: bool,
 }
 
+/// Forces that any machine may have, looked for together before anything else: neither of two may show without the other.
+const PLAIN: [EffectName; 6] = [
+    EffectName::CoulombFriction,
+    EffectName::ViscousFriction,
+    EffectName::TiltGravity,
+    EffectName::MassImbalance,
+    EffectName::AsymmetricFriction,
+    EffectName::PositionSpring,
+];
+/// Most plain forces taken together.
+const PLAIN_TOGETHER: usize = 3;
+/// Part of what the best of all effects gains that plain friction and weight must gain to be taken before it, and that
+/// forces with a twin in the library must.
+const PLAIN_ENOUGH: f64 = 0.6;
+const PLAIN_NEARLY_ALL: f64 = 0.9;
+
+/// Sets of plain forces that the rig does not hold, as models.
+fn plain_sets(on: &FitContext) -> Vec<Model> {
+    let shapes = PLAIN.iter().flat_map(|name| {
+        let all = candidates::shapes(*name, on.span, on.nominal);
+        let two_sided = all.into_iter().filter(|effect| effect.shape_or("one_sided", 0.0) < 0.5);
+        two_sided.collect::<Vec<_>>()
+    });
+    let mut sets: Vec<Vec<Effect>> = vec![Vec::new()];
+    for effect in shapes {
+        let with = |set: &Vec<Effect>| {
+            let fits = set.len() < PLAIN_TOGETHER && set.iter().all(|other| other.name != effect.name);
+            fits.then(|| set.iter().chain([&effect]).cloned().collect::<Vec<_>>())
+        };
+        sets.extend(sets.iter().filter_map(with).collect::<Vec<_>>());
+    }
+    sets.into_iter().skip(1).map(|effects| Model { effects, ..Model::default() }).collect()
+}
+
+/// The model with the best set of plain forces, where they gain enough beside `best`, what any effect gains at the most, and
+/// all of them generalise.
+fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Next> {
+    let mut ranked: Vec<FittedModel> = plain_sets(on)
+        .into_par_iter()
+        .map(|model| on.fit_at(model, &now.white.noise))
+        .filter(|fitted| fitted.merit - now.white.merit > MIN_LOG_LIKELIHOOD_GAIN)
+        .collect();
+    ranked.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    let mut sizes: Vec<usize> = Vec::new();
+    let mut fitted: Vec<FittedModel> = Vec::new();
+    for one in ranked {
+        if !sizes.contains(&one.model.effects.len()) {
+            sizes.push(one.model.effects.len());
+            fitted.push(on.fit(one.model, &now.white.noise, Colour::White));
+        }
+    }
+    fitted.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    for white in fitted {
+        let has_twin = |effect: &Effect| {
+            !matches!(
+                effect.name,
+                EffectName::CoulombFriction | EffectName::ViscousFriction | EffectName::TiltGravity
+            )
+        };
+        let enough = if white.model.effects.iter().any(has_twin) { PLAIN_NEARLY_ALL } else { PLAIN_ENOUGH };
+        let gain = white.merit - now.white.merit;
+        if gain < MIN_LOG_LIKELIHOOD_GAIN || gain < enough * best {
+            continue;
+        }
+        let (tracks, white) = in_its_own_motion(&now.tracks, white, on);
+        let own = FitContext { tracks: &tracks, ..*on };
+        let mut holdout = now.holdout.clone();
+        smooth_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
+        if judge_all(&own, &white, &holdout).iter().all(|judged| judged.rejection_reason().is_none()) {
+            let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
+            return Some(Next { state: SearchState { white, slow, tracks, holdout }, generalises: true });
+        }
+    }
+    None
+}
+
 /// The model with one more effect, if there is one that generalises or, failing that, promises to; at most `most` may have
 /// been tried by then.
 fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, most: usize) -> Option<Next> {
@@ -160,6 +241,13 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
     let mut finalists = on.finalists(&now.white, &candidates);
     on.polish(&mut finalists);
     order_near_ties(on, now.white.merit, &mut finalists);
+    if now.white.model.effects.is_empty() && !rejected.plain_tried {
+        rejected.plain_tried = true;
+        let best = finalists.first().map_or(0.0, |best| best.merit - now.white.merit);
+        if let Some(next) = with_plain_forces(now, on, best) {
+            return Some(next);
+        }
+    }
     for finalist in finalists {
         let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
         if finalist.merit - now.white.merit < MIN_LOG_LIKELIHOOD_GAIN || rejected.tried >= most {
@@ -206,12 +294,15 @@ pub(crate) fn search(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Search, InputError> {
-    let mut tracks: Vec<BlockedRecording> = fit.iter().map(|r| BlockedRecording::new(r, rig)).collect();
-    let mut holdout: Vec<BlockedRecording> = holdout.iter().map(|r| BlockedRecording::new(r, rig)).collect();
-    let mut nominal = Nominal { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false };
+    let mut tracks: Vec<BlockedRecording> = fit.iter().map(|r| BlockedRecording::moving(r, rig)).collect();
+    let mut holdout: Vec<BlockedRecording> =
+        holdout.iter().map(|r| BlockedRecording::moving(r, rig)).collect();
+    let mut nominal =
+        Nominal { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false, virtual_inertia: 0.0 };
+    quasi_static::add_inertia(&mut nominal, &mut tracks, &mut holdout);
     progress("refitting the nominal model", 0.1);
     let (noise, refit) = refit::settle(&mut nominal, &mut tracks);
-    let scale = refit::command_scale(&nominal, &tracks);
+    let scale = refit::acceleration_scale(&nominal, &tracks);
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = Span::of(&tracks, &nominal);
     find_steps(&nominal, &span, &mut tracks, &noise, scale, Asked::UNKNOWN);
@@ -226,7 +317,8 @@ pub(crate) fn search(
     let context = FitContext { nominal: &nominal, tracks: &tracks, span: &span, scale };
     let white = context.fit(Model::default(), &noise, Colour::White);
     let slow = context.fit_slow(Model::default(), &[&noise, &white.noise]);
-    let ground = SearchContext { nominal: &nominal, span: &span, scale, noise: &noise, progress };
+    let ground =
+        SearchContext { original: rig, nominal: &nominal, span: &span, scale, noise: &noise, progress };
     let mut rejected = Rejected::default();
     let grown = ground.forward_selection(SearchState { white, slow, tracks, holdout }, &mut rejected);
     progress("judging on holdout-out recordings", 0.8);
@@ -248,6 +340,7 @@ pub(crate) fn search(
 
 /// What every model of a search stands on.
 struct SearchContext<'a> {
+    original: &'a Rig,
     nominal: &'a Nominal,
     span: &'a Span,
     scale: f64,
@@ -264,7 +357,8 @@ impl SearchContext<'_> {
     /// Adds effects one after another as long as one generalises.
     fn forward_selection(&self, mut now: SearchState, rejected: &mut Rejected) -> SearchState {
         let mut before = None;
-        for step in now.white.model.effects.len()..MOST {
+        while now.white.model.effects.len() < MOST {
+            let step = now.white.model.effects.len();
             (self.progress)("searching for what was left out", 0.15 + 0.2 * step as f64);
             let Some(next) = with_one_more(&now, &self.context(&now.tracks), rejected, TRIED * (step + 1))
             else {
@@ -286,6 +380,7 @@ impl SearchContext<'_> {
         let context = self.context(&tracks);
         let null = context.fit_slow(Model::default(), &[self.noise, &white.noise]);
         let mut s = Search {
+            original: self.original.clone(),
             nominal: self.nominal.clone(),
             fit_tracks: Vec::new(),
             holdout_tracks: Vec::new(),

@@ -118,6 +118,7 @@ pub fn rig(name: &str, hello: &Hello) -> Rig {
             coulomb: Some(plant.bearing.coulomb),
             offset: None,
             weight: Some(plant.needle_mass * GRAVITY * radius),
+            ..Model::default()
         },
         uncertainty: Uncertainty {
             inertia: Some(0.15),
@@ -126,12 +127,18 @@ pub fn rig(name: &str, hello: &Hello) -> Rig {
             offset: None,
             weight: Some(0.1),
             gain: Some(0.1),
+            ..Uncertainty::default()
         },
-        actuator: Actuator { gain: full_scale / span, command_unit: "dac".into(), limit: Some(span) },
+        actuator: Actuator {
+            gain: full_scale / span,
+            command_unit: "dac".into(),
+            limit: Some(span),
+            ..Actuator::default()
+        },
         encoder: Encoder {
             counts_per_unit: counts_per_turn / std::f64::consts::TAU,
             turn: Some(std::f64::consts::TAU),
-            start_spread: None,
+            ..Encoder::default()
         },
         effects: Vec::new(),
     }

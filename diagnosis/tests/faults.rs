@@ -1,0 +1,243 @@
+//! Faults of input and estimation that recordings of real machines showed, each on a small simulated one: starts in motion,
+//! free swings, slow rates, idle stretches, short recordings, plain forces in pairs, machines without inertia to speak of.
+
+use diagnosis::effects::EffectName as N;
+use diagnosis::recording::Recording;
+use diagnosis::rig::Rig;
+use diagnosis::{Outcome, Verdict, diagnose_recordings};
+use std::f64::consts::TAU;
+
+/// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, and the delay of its drive.
+#[derive(Clone, Copy)]
+struct Machine {
+    inertia: f64,
+    viscous: f64,
+    forward: f64,
+    backward: f64,
+    gravity: f64,
+    delay_s: f64,
+}
+
+const AXIS: Machine =
+    Machine { inertia: 2.0, viscous: 8.0, forward: 3.0, backward: 3.0, gravity: 0.0, delay_s: 0.0 };
+
+/// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
+#[derive(Clone, Copy)]
+struct Taken {
+    rate: f64,
+    seconds: f64,
+    start: (f64, f64),
+    counts: f64,
+}
+
+const BENCH: Taken = Taken { rate: 500.0, seconds: 8.0, start: (0.0, 0.0), counts: 2e5 };
+
+/// Runs the machine under a command over time; `seed` draws a white disturbance of 1 % of its dry friction.
+fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f64) -> Recording {
+    let steps = 40;
+    let h = 1.0 / taken.rate / f64::from(steps);
+    let (mut q, mut v) = taken.start;
+    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut noise = || {
+        random ^= random >> 12;
+        random ^= random << 25;
+        random ^= random >> 27;
+        (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let mut out = Recording { file: format!("{seed}.csv"), ..Recording::default() };
+    for row in 0..(taken.rate * taken.seconds) as u32 {
+        let t = f64::from(row) / taken.rate;
+        out.time_s.push(t);
+        out.command.push(command(t));
+        out.position_counts.push((q * taken.counts).floor());
+        let disturbance = 0.05 * machine.forward.max(0.02 * machine.gravity) * noise();
+        for i in 0..steps {
+            let u = command(((t + f64::from(i) * h - machine.delay_s) * taken.rate).floor() / taken.rate);
+            let free = u + disturbance - machine.gravity * q.sin();
+            let dry = if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
+            if v == 0.0 && free.abs() <= dry {
+                continue;
+            }
+            let way = if v == 0.0 { free.signum() } else { v.signum() };
+            let next = v + h * (free - machine.viscous * v - dry * way) / machine.inertia;
+            v = if next * v < 0.0 { 0.0 } else { next };
+            q += h * v;
+        }
+    }
+    out
+}
+
+/// Several frequencies, drawn by a phase.
+fn mixed(size: f64, phase: f64) -> impl Fn(f64) -> f64 {
+    move |t| {
+        let tone = |hz: f64, part: f64| part * (TAU * hz * t + phase * hz).sin();
+        size * (tone(0.31, 1.0) + tone(0.83, 0.7) + tone(2.3, 0.5) + tone(5.1, 0.3))
+    }
+}
+
+fn rig(model: &str, encoder: &str, actuator: &str, counts: f64) -> Rig {
+    let text = format!(
+        "format = 1\nkind = \"rotary\"\n[model]\n{model}\n[uncertainty]\ninertia = 0.1\nviscous = 0.3\ncoulomb = 0.3\ngain = 0.05\n\
+         [actuator]\ngain = 1.0\ncommand_unit = \"N·m\"\n{actuator}\n[encoder]\ncounts_per_unit = {counts}\n{encoder}\n"
+    );
+    Rig::parse(&text, "a test").expect("the rig is right")
+}
+
+fn diagnosed(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Outcome {
+    let outcome = diagnose_recordings(rig, fit, holdout, &|_, _| ()).expect("the recordings are usable");
+    println!("{}", outcome.summary());
+    outcome
+}
+
+fn names(outcome: &Outcome) -> Vec<N> {
+    outcome.report.effects.iter().map(|e| e.name).collect()
+}
+
+const WHOLE: &str = "inertia = 2.0\nviscous = 8.0\ncoulomb = 3.0";
+
+#[test]
+fn a_start_in_motion_leaves_no_force_whatever_the_unit_of_length() {
+    let taken = Taken { start: (0.0, 2.5), ..BENCH };
+    let take = |seed| record(AXIS, taken, seed, mixed(14.0, seed as f64));
+    let (fit, holdout) = (take(1), take(2));
+    let at_start = |scale: f64| {
+        // A unit of length of 1/scale: forces are in kg·m/s² times the scale.
+        let model = format!("inertia = 2.0\nviscous = 8.0\ncoulomb = {}", 3.0 * scale);
+        let mut rig = rig(&model, "", "", BENCH.counts / scale);
+        rig.actuator.gain = scale;
+        let outcome = diagnosed(&rig, std::slice::from_ref(&fit), std::slice::from_ref(&holdout));
+        assert!(names(&outcome).is_empty(), "nothing was left out");
+        let series = &outcome.evidence.series[0];
+        let largest = |from: f64, to: f64| {
+            let of = series.time_s.iter().zip(&series.refit);
+            of.filter(|(t, _)| **t >= from && **t < to)
+                .filter_map(|(_, x)| *x)
+                .fold(0.0_f64, |most, x| most.max(x.abs()))
+                / scale
+        };
+        (largest(0.0, 0.3), largest(0.3, 8.0))
+    };
+    let (at_once, later) = at_start(1.0);
+    assert!(at_once < 1.5 * later.max(0.3), "{at_once} N at the start, {later} N later");
+    let (in_mm, later_mm) = at_start(1000.0);
+    assert!((in_mm - at_once).abs() < 0.05 && (later_mm - later).abs() < 0.05, "{in_mm} {at_once}");
+}
+
+#[test]
+fn a_free_swing_needs_no_command_and_tells_its_gravity() {
+    let pendulum =
+        Machine { inertia: 0.02, viscous: 4e-4, forward: 4e-3, backward: 4e-3, gravity: 0.7, ..AXIS };
+    let swing = |start: f64, seed| {
+        record(pendulum, Taken { start: (start, 0.0), counts: 2000.0, ..BENCH }, seed, |_| 0.0)
+    };
+    let rig = rig("inertia = 0.02\nviscous = 4e-4", "", "", 2000.0);
+    let outcome = diagnosed(&rig, &[swing(1.2, 1), swing(-0.9, 2)], &[swing(1.0, 3)]);
+    assert_eq!(outcome.report.verdict, Verdict::MissingPhysics);
+    let class = &outcome.report.effects[0].class;
+    assert!(class.contains(&N::MassImbalance), "{class:?}");
+}
+
+#[test]
+fn fifty_rows_a_second_are_enough_where_the_motion_is_slow() {
+    let taken = Taken { rate: 50.0, seconds: 20.0, ..BENCH };
+    let take = |seed| record(AXIS, taken, seed, mixed(14.0, seed as f64));
+    let outcome =
+        diagnosed(&rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts), &[take(1)], &[take(2)]);
+    assert_eq!(names(&outcome).first(), Some(&N::CoulombFriction));
+}
+
+#[test]
+fn a_minute_of_rest_costs_no_answer() {
+    let take = |seed| {
+        let moving = record(AXIS, BENCH, seed, mixed(14.0, seed as f64));
+        let idle = (60.0 * BENCH.rate) as usize;
+        let mut all = Recording { file: moving.file.clone(), ..Recording::default() };
+        all.time_s = (0..2 * idle + moving.len()).map(|i| i as f64 / BENCH.rate).collect();
+        let rest = |at: f64| vec![at; idle];
+        all.command = [rest(0.0), moving.command.clone(), rest(0.0)].concat();
+        let end = moving.position_counts[moving.len() - 1];
+        all.position_counts = [rest(moving.position_counts[0]), moving.position_counts, rest(end)].concat();
+        all
+    };
+    let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
+    let outcome = diagnosed(&rig, &[take(1)], &[take(2)]);
+    assert_eq!(names(&outcome).first(), Some(&N::CoulombFriction));
+    let series = &outcome.evidence.series[0];
+    assert!(series.time_s[0] > 59.0, "times are those of the file");
+}
+
+#[test]
+fn ten_recordings_of_a_second_tell_together_what_none_tells_alone() {
+    let taken = Taken { seconds: 1.0, ..BENCH };
+    let take = |seed| record(AXIS, taken, seed, mixed(20.0, 2.0 * seed as f64));
+    let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
+    let fit: Vec<Recording> = (1..8).map(take).collect();
+    let holdout: Vec<Recording> = (8..11).map(take).collect();
+    let outcome = diagnosed(&rig, &fit, &holdout);
+    assert_eq!(names(&outcome).first(), Some(&N::CoulombFriction));
+    let alone = diagnosed(&rig, &fit[..1], &holdout[..1]);
+    assert_eq!(alone.report.verdict, Verdict::InsufficientExcitation, "one second alone is too little");
+}
+
+#[test]
+fn dry_friction_that_differs_with_direction_is_found_where_neither_part_is_in_the_rig() {
+    let machine = Machine { forward: 2.0, backward: 4.5, ..AXIS };
+    let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));
+    let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
+    let outcome = diagnosed(&rig, &[take(1), take(2)], &[take(3)]);
+    let mut names = names(&outcome);
+    names.sort();
+    assert_eq!(names, [N::CoulombFriction, N::AsymmetricFriction]);
+}
+
+#[test]
+fn a_machine_without_inertia_to_speak_of_has_friction_and_no_dead_drive() {
+    let machine = Machine { inertia: 1e-4, viscous: 2.0, ..AXIS };
+    let taken = Taken { seconds: 12.0, counts: 5000.0, ..BENCH };
+    let slow = |phase: f64| {
+        move |t: f64| 5.0 * (TAU * 0.2 * t + phase).sin() + 3.0 * (TAU * 0.47 * t + 2.0 * phase).sin()
+    };
+    let take = |seed| record(machine, taken, seed, slow(seed as f64));
+    let rig = rig("inertia = 1e-4\nviscous = 2.0", "", "", taken.counts);
+    let outcome = diagnosed(&rig, &[take(1), take(2)], &[take(3)]);
+    assert_eq!(names(&outcome), [N::CoulombFriction]);
+    let dry = outcome.report.effects[0].parameters["coulomb"].value;
+    assert!((2.5..3.5).contains(&dry), "{dry} N·m");
+    assert!((1e-5..1e-2).contains(&outcome.patched_rig.model.inertia), "what was added is taken out again");
+}
+
+#[test]
+fn a_refit_is_not_kept_where_the_rigs_own_values_explain_held_out_recordings_better() {
+    let other = Machine { inertia: 2.6, viscous: 11.0, ..AXIS };
+    let fit = record(other, BENCH, 1, mixed(14.0, 1.0));
+    let holdout = record(AXIS, BENCH, 2, mixed(14.0, 2.0));
+    let report = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &[fit], &[holdout]).report;
+    assert!(report.fit.refit.holdout <= report.fit.nominal.holdout);
+}
+
+#[test]
+fn a_delay_that_the_rig_knows_is_not_missing() {
+    let machine = Machine { delay_s: 0.012, ..AXIS };
+    let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));
+    let (fit, holdout) = ([take(1)], [take(2)]);
+    let unknown = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &fit, &holdout);
+    let class = &unknown.report.effects[0].class;
+    assert!(class.contains(&N::CommandDelay), "{class:?}");
+    let known = diagnosed(&rig(WHOLE, "", "delay_s = 0.012", BENCH.counts), &fit, &holdout);
+    assert!(names(&known).is_empty());
+}
+
+#[test]
+fn a_gravity_that_the_rig_knows_is_not_missing() {
+    let machine = Machine { gravity: 9.0, ..AXIS };
+    let take = |seed| record(machine, Taken { counts: 5000.0, ..BENCH }, seed, mixed(20.0, seed as f64));
+    let model = format!("{WHOLE}\ngravity = 9.0");
+    let outcome = diagnosed(&rig(&model, "absolute = true", "", 5000.0), &[take(1)], &[take(2)]);
+    assert!(names(&outcome).is_empty());
+    assert!(outcome.report.fit.refit.holdout < 0.05 * outcome.report.fit.force_rms.holdout);
+    let without = Rig::parse(
+        &rig(&model, "absolute = true", "", 5000.0).to_toml().replace("absolute = true", ""),
+        "a.toml",
+    );
+    assert!(without.expect_err("gravity needs absolute counts").to_string().contains("absolute"));
+}
