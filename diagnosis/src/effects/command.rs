@@ -1,6 +1,6 @@
 //! What stands between the command as recorded and the command that makes torque.
 
-use super::{Effect, EffectName};
+use super::Effect;
 use std::collections::VecDeque;
 
 /// An effect on the command, with its state. Steps may be of any length: each answer is the mean over its step.
@@ -23,18 +23,7 @@ pub enum CommandLaw {
 impl CommandLaw {
     /// The law of an effect on the command; none where the effect acts elsewhere.
     pub fn new(effect: &Effect) -> Option<Self> {
-        let get = |key: &str| effect.shape_or(key, 0.0);
-        Some(match effect.name {
-            EffectName::CommandDeadband => {
-                Self::Deadband { half_width: get("half_width"), shift: get("shift") > 0.5 }
-            }
-            EffectName::CommandSaturation => Self::Clip { limit: get("limit") },
-            EffectName::CommandDelay => {
-                Self::Delay { delay: get("delay"), queue: VecDeque::new(), waiting: 0.0 }
-            }
-            EffectName::ElectricalLag => Self::Lag { time_constant: get("time_constant"), state: None },
-            _ => return None,
-        })
+        effect.name.definition().command_law(effect)
     }
 
     /// The mean effective command over a step of `dt` s during which `command` is held.

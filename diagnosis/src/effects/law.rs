@@ -1,9 +1,7 @@
-//! The effects that act as a force or in the sensor: their terms, linear in the coefficients, with internal state.
+//! The law of an effect on force or sensor: its terms, linear in the coefficients, with internal state; and what several share.
 
-use super::bristles::Bristles;
-use super::load::Load;
+use super::definition::ForceLaw;
 use super::{Effect, EffectName};
-use std::f64::consts::TAU;
 
 /// Where the plant is during one step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -33,128 +31,35 @@ pub struct State {
 }
 
 /// Names of terms of which the second is not always there.
-fn first_or_both(first: &str, second: &str, both: bool) -> Vec<String> {
+pub(super) fn first_or_both(first: &str, second: &str, both: bool) -> Vec<String> {
     [first, second].into_iter().take(if both { 2 } else { 1 }).map(str::to_owned).collect()
 }
 
 /// Sign with `sgn(0) = 0`.
-fn sign(x: f64) -> f64 {
+pub(super) fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
 /// An effect with its internal state. The force is the sum of coefficient times term; sensor effects give travel instead.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Law {
     name: EffectName,
-    a: f64,
-    b: f64,
-    /// Time in which a spring's force fades while it stays bent, s; never, but where that is asked.
-    fades_s: f64,
-    /// Time at which a drift comes all at once, s; never, but where that is asked.
-    at_once_s: f64,
-    /// Whether a profile along the travel is of the inertia.
-    of_inertia: bool,
-    /// Whether the load that friction grows with is the drive's own force.
-    of_drive: bool,
-    waves: Vec<f64>,
-    times: Vec<f64>,
     /// Names of the terms, in the order of [`Law::terms`].
     names: Vec<String>,
-    /// Internal state: what has faded of a spring, resonator.
-    state: [f64; 3],
-    bristles: Bristles,
-    /// What hangs on the motor by a gap or a grip.
-    load: Load,
+    law: Box<dyn ForceLaw>,
+}
+
+impl Clone for Law {
+    fn clone(&self) -> Self {
+        Self { name: self.name, names: self.names.clone(), law: self.law.copy() }
+    }
 }
 
 impl Law {
     /// The law of an effect on force or sensor; none where it acts on the command.
     pub fn new(effect: &Effect) -> Option<Self> {
-        use EffectName as N;
-        let get = |key: &str, otherwise: f64| effect.shape_or(key, otherwise);
-        let mut waves = Vec::new();
-        let mut times = Vec::new();
-        let (mut a, mut b) = (0.0, 0.0);
-        let fades_s = get("fades_s", f64::INFINITY);
-        let at_once_s = get("at_once_s", f64::INFINITY);
-        let set = |key: &str| get(key, 0.0) > 0.5;
-        let (of_inertia, of_drive) = (set("of_inertia"), set("of_drive"));
-        let names: Vec<String> = match effect.name {
-            N::ViscousFriction => vec!["viscous".into()],
-            N::CoulombFriction => vec!["coulomb".into()],
-            N::AsymmetricFriction => {
-                first_or_both("viscous_difference", "coulomb_difference", !set("viscous_only"))
-            }
-            N::StribeckFriction => {
-                (a, b) = (get("speed", 1.0), get("exponent", 2.0));
-                vec!["peak".into()]
-            }
-            // Alike, they are LuGre's, which dampen as they bend.
-            N::PreslidingFriction => first_or_both("coulomb", "damping", get("spread", 1.0) <= 1.0),
-            N::QuadraticDrag | N::LoadDependentFriction => vec!["coefficient".into()],
-            N::PositionDependentFriction | N::PositionDependentDamping => {
-                (a, b) = (get("low", -1.0), get("high", 1.0));
-                (1..=get("degree", 3.0) as usize).map(|k| format!("legendre_{k}")).collect()
-            }
-            N::FrictionDrift => {
-                a = get("time_constant", 1.0);
-                // What is not there does not drift.
-                first_or_both("coulomb", "viscous", !set("dry_only"))
-            }
-            N::GainDrift => {
-                a = get("time_constant", 1.0);
-                vec!["change".into()]
-            }
-            N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => {
-                let mut found = effect.waves();
-                if found.is_empty() {
-                    found.push(("1".into(), TAU / get("turn", TAU)));
-                }
-                waves = found.iter().map(|wave| wave.1).collect();
-                found.iter().flat_map(|(n, _)| [format!("cos_{n}"), format!("sin_{n}")]).collect()
-            }
-            N::TiltGravity => vec!["weight".into()],
-            N::PositionSpring => {
-                (a, b) = (get("from", 0.0), get("one_sided", 0.0));
-                // Where it is at rest is not known: a force that is there at the start.
-                first_or_both("stiffness", "preload", set("preload"))
-            }
-            N::Backlash | N::RollerSlip => vec!["inertia_ratio".into()],
-            N::DriveCompliance => {
-                (a, b) = (TAU * get("resonance_hz", 1.0), get("damping", 0.05));
-                vec!["inertia_ratio".into()]
-            }
-            N::MissedCounts => {
-                for (key, value) in &effect.shape {
-                    if key.starts_with("time_") {
-                        times.push(*value);
-                    }
-                }
-                effect
-                    .shape
-                    .keys()
-                    .filter_map(|key| key.strip_prefix("time_").map(|n| format!("step_{n}")))
-                    .collect()
-            }
-            N::CommandDeadband | N::CommandSaturation | N::CommandDelay | N::ElectricalLag => return None,
-        };
-        let state = [0.0; 3];
-        let (bristles, load) = (Bristles::new(effect), Load::new(effect));
-        Some(Self {
-            name: effect.name,
-            a,
-            b,
-            fades_s,
-            at_once_s,
-            of_inertia,
-            of_drive,
-            waves,
-            times,
-            names,
-            state,
-            bristles,
-            load,
-        })
+        let law = effect.name.definition().law(effect)?;
+        Some(Self { name: effect.name, names: law.names(), law })
     }
 
     /// Names of the terms, in order.
@@ -164,137 +69,18 @@ impl Law {
 
     /// Whether the terms are travel added to what the encoder reads, rather than force.
     pub fn in_sensor(&self) -> bool {
-        matches!(self.name, EffectName::EncoderEccentricity | EffectName::MissedCounts)
+        self.name.definition().in_sensor()
     }
 
     /// Whether the force is dry friction, which holds an axis at rest rather than moving it.
     pub fn is_dry(&self) -> bool {
-        use EffectName as N;
-        matches!(
-            self.name,
-            N::CoulombFriction
-                | N::AsymmetricFriction
-                | N::StribeckFriction
-                | N::PositionDependentFriction
-                | N::LoadDependentFriction
-                | N::FrictionDrift
-        )
+        self.name.definition().is_dry()
     }
 
     /// The terms for this step; `out` has one place per name.
-    pub fn terms(&mut self, s: &State, out: &mut [f64]) {
-        use EffectName as N;
-        let velocity = if s.rest { 0.0 } else { s.velocity };
-        let way = sign(velocity);
-        match self.name {
-            N::ViscousFriction => out[0] = -velocity,
-            N::CoulombFriction => out[0] = -way,
-            N::AsymmetricFriction => {
-                out[0] = -velocity.abs();
-                if let Some(dry) = out.get_mut(1) {
-                    *dry = -way.abs();
-                }
-            }
-            N::StribeckFriction => out[0] = -way * (-(velocity.abs() / self.a).powf(self.b)).exp(),
-            // Bristles bend on where the sign is too unsure for dry friction, and hold alone there.
-            N::PreslidingFriction => {
-                let (bent, more) = self.bristles.bend(s.velocity * s.dt);
-                out[0] = way - bent;
-                if let Some(damping) = out.get_mut(1) {
-                    *damping = if s.dt > 0.0 { -more / s.dt } else { 0.0 };
-                }
-            }
-            N::QuadraticDrag => out[0] = -velocity * velocity.abs(),
-            N::LoadDependentFriction => {
-                let load = if self.of_drive { s.drive } else { s.external };
-                out[0] = -way * load.abs();
-            }
-            N::PositionDependentFriction => legendre(self.along(s.position), -way, out),
-            N::PositionDependentDamping if self.of_inertia => self.inertia(s, out),
-            N::PositionDependentDamping => legendre(self.along(s.position), -velocity, out),
-            N::FrictionDrift => {
-                let settled = 1.0 - (-s.time / self.a).exp();
-                out[0] = -way * settled;
-                if let Some(viscous) = out.get_mut(1) {
-                    *viscous = -velocity * settled;
-                }
-            }
-            N::GainDrift if self.at_once_s.is_finite() => {
-                out[0] = if s.time >= self.at_once_s { s.drive } else { 0.0 };
-            }
-            N::GainDrift => out[0] = s.drive * (1.0 - (-s.time / self.a).exp()),
-            N::Cogging | N::MassImbalance | N::EncoderEccentricity => {
-                self.harmonics(s.position, velocity * s.dt, 1.0, out)
-            }
-            N::TorqueRipple => self.harmonics(s.position, velocity * s.dt, s.drive, out),
-            N::TiltGravity => out[0] = s.tilt.sin(),
-            N::PositionSpring => {
-                let x = s.position - self.a;
-                // Maxwell's spring and dashpot in series: what has faded is no longer bent.
-                self.state[0] += (x - self.state[0]) * (1.0 - (-s.dt / self.fades_s).exp());
-                let bent = x - self.state[0];
-                out[0] = if self.b > 0.5 { -bent.max(0.0) } else { -bent };
-                if let Some(preload) = out.get_mut(1) {
-                    *preload = 1.0;
-                }
-            }
-            N::Backlash => out[0] = self.load.through_gap(s),
-            N::RollerSlip => out[0] = self.load.by_grip(s),
-            N::DriveCompliance => out[0] = self.resonate(s.drive, s.dt),
-            N::MissedCounts => {
-                for (term, time) in out.iter_mut().zip(&self.times) {
-                    *term = if s.time >= *time { 1.0 } else { 0.0 };
-                }
-            }
-            _ => out.fill(0.0),
-        }
-    }
-
-    fn along(&self, position: f64) -> f64 {
-        let (low, high) = (self.a, self.b);
-        let half = 0.5 * (high - low);
-        if half > 0.0 { ((position - low) / half - 1.0).clamp(-1.0, 1.0) } else { 0.0 }
-    }
-
-    /// What an inertia J(q) takes beside a constant one, J′v²/2 and its part of the acceleration, by Lagrange's equation.
-    fn inertia(&self, s: &State, out: &mut [f64]) {
-        let half = 0.5 * (self.b - self.a);
-        let step = 1e-3 * half;
-        let mut beyond = vec![0.0; out.len()];
-        legendre(self.along(s.position + step), 1.0, &mut beyond);
-        legendre(self.along(s.position - step), 1.0, out);
-        for (term, beyond) in out.iter_mut().zip(beyond) {
-            let slope = (beyond - *term) / (2.0 * step);
-            *term = -0.5 * (beyond + *term) * s.acceleration - 0.5 * slope * s.velocity * s.velocity;
-        }
-    }
-
-    /// Means over the step: a wave that is passed within it averages out.
-    fn harmonics(&self, position: f64, passed: f64, times: f64, out: &mut [f64]) {
-        for (pair, wave) in out.chunks_exact_mut(2).zip(&self.waves) {
-            let (cos, sin) = wave_mean(*wave, position, passed);
-            pair[0] = times * cos;
-            pair[1] = times * sin;
-        }
-    }
-
-    /// Mean over the step of s²/(s² + 2ζωs + ω²) applied to a held force: what a rigid model misses of two masses on a
-    /// spring seen from the motor, per unit of the ratio of load to motor inertia.
-    fn resonate(&mut self, force: f64, dt: f64) -> f64 {
-        if dt <= 0.0 {
-            return 0.0;
-        }
-        let (omega, zeta) = (self.a, self.b);
-        let m = transition(omega, zeta, dt);
-        if self.state[2] == 0.0 {
-            // At the start the spring carries the standing force.
-            self.state = [force / (self.a * self.a), 0.0, 1.0];
-        }
-        let [x, v, _] = self.state;
-        let next = m[2] * x + m[3] * v + m[5] * force;
-        self.state[0] = m[0] * x + m[1] * v + m[4] * force;
-        self.state[1] = next;
-        (next - v) / dt
+    pub fn terms(&mut self, state: &State, out: &mut [f64]) {
+        let velocity = if state.rest { 0.0 } else { state.velocity };
+        self.law.terms(state, velocity, out);
     }
 }
 
@@ -313,21 +99,6 @@ fn sinc(x: f64) -> f64 {
         return x.sin() / x;
     }
     1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0))))
-}
-
-/// Exact transition of x″ + 2ζωx′ + ω²x = f over `dt` with `f` held: [a11 a12 a21 a22 b1 b2].
-fn transition(omega: f64, zeta: f64, dt: f64) -> [f64; 6] {
-    let zeta = zeta.clamp(1e-4, 0.99);
-    let decay = zeta * omega;
-    let damped = omega * (1.0 - zeta * zeta).sqrt();
-    let e = (-decay * dt).exp();
-    let (sin, cos) = (damped * dt).sin_cos();
-    let k = decay / damped;
-    let a11 = e * (cos + k * sin);
-    let a12 = e * sin / damped;
-    let a21 = -omega * omega * a12;
-    let a22 = e * (cos - k * sin);
-    [a11, a12, a21, a22, (1.0 - a11) / (omega * omega), -a21 / (omega * omega)]
 }
 
 /// Legendre polynomials of degree 1 and up, times a factor.

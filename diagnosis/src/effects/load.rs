@@ -8,7 +8,7 @@
 //! the command, so that little noise of the measured motion enters, and bounded, so that nothing drifts.
 
 use super::Effect;
-use super::law::State;
+use super::State;
 use std::f64::consts::TAU;
 
 /// The load's motion against the motor's.
@@ -44,6 +44,17 @@ struct Held {
     apart: f64,
     /// To the motor of a rigid machine and not to one that carries its load by a joint.
     missed: f64,
+}
+
+/// Inertia of a load over its motor's.
+pub(super) const RATIOS: (f64, f64) = (0.2, 5.0);
+/// Part of the machine's friction that the load's may be: the rig may have the machine's too small.
+pub(super) const MOST_OF_DRY: f64 = 1.2;
+
+/// The load's own dry friction over the whole inertia.
+pub(super) fn own_friction(effect: &Effect) -> f64 {
+    let get = |key: &str| effect.shape_or(key, 0.0);
+    get("coast") * get("ratio") / (1.0 + get("ratio"))
 }
 
 /// Damping of the contact: it bounces once or twice.

@@ -1,24 +1,111 @@
 //! One model per effect, written once: the diagnosis evaluates its terms along a recording, the simulator runs it forward.
 //!
-//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state, and [`Plant`] runs a
-//! whole patched rig. Nothing here may know how an effect is found.
+//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. What an effect is stands in
+//! a file of its own, as a [`definition::Definition`]; to add one, write its file and a line in the registry below. Nothing here
+//! may know how an effect is found.
 
 mod bristles;
 mod command;
+pub(crate) mod definition;
+pub(crate) mod experiments;
 mod law;
 mod load;
-mod name;
 mod table;
+mod travel_profile;
+mod waves;
 
-pub(crate) use bristles::lengths as bristle_lengths;
 pub use command::CommandLaw;
+pub(crate) use law::wave_mean;
 pub use law::{Law, State};
-pub(crate) use law::{legendre, wave_mean};
-pub use name::{EffectName, Subsystem};
 pub use table::Variable;
 
+use definition::Definition;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
+
+/// Where an effect sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs)]
+pub enum Subsystem {
+    Transmission,
+    Actuator,
+    Load,
+    Sensor,
+}
+
+macro_rules! registry {
+    ($($variant:ident $module:ident;)*) => {
+        $(mod $module;)*
+
+        /// The effects, by the name that the report uses: that of the file which defines it.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        #[allow(missing_docs)]
+        pub enum EffectName { $($variant,)* }
+
+        impl EffectName {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+
+            /// The name in reports.
+            pub fn as_str(self) -> &'static str { match self { $(Self::$variant => stringify!($module),)* } }
+
+            /// What it is.
+            pub(crate) fn definition(self) -> &'static dyn Definition {
+                match self { $(Self::$variant => &$module::Defined,)* }
+            }
+        }
+    };
+}
+
+// In the order in which near ties are looked through.
+registry! {
+    ViscousFriction viscous_friction;
+    CoulombFriction coulomb_friction;
+    AsymmetricFriction asymmetric_friction;
+    StribeckFriction stribeck_friction;
+    PreslidingFriction presliding_friction;
+    QuadraticDrag quadratic_drag;
+    PositionDependentFriction position_dependent_friction;
+    LoadDependentFriction load_dependent_friction;
+    FrictionDrift friction_drift;
+    Cogging cogging;
+    TorqueRipple torque_ripple;
+    CommandDeadband command_deadband;
+    CommandSaturation command_saturation;
+    CommandDelay command_delay;
+    ElectricalLag electrical_lag;
+    GainDrift gain_drift;
+    Backlash backlash;
+    DriveCompliance drive_compliance;
+    RollerSlip roller_slip;
+    MassImbalance mass_imbalance;
+    TiltGravity tilt_gravity;
+    PositionSpring position_spring;
+    PositionDependentDamping position_dependent_damping;
+    EncoderEccentricity encoder_eccentricity;
+    MissedCounts missed_counts;
+}
+
+impl EffectName {
+    /// Where it sits.
+    pub fn subsystem(self) -> Subsystem {
+        self.definition().subsystem()
+    }
+
+    /// What it is, in words a technician uses.
+    pub fn in_words(self) -> &'static str {
+        self.definition().words()
+    }
+}
+
+impl fmt::Display for EffectName {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(self.as_str())
+    }
+}
 
 /// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients` linearly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +130,11 @@ impl Effect {
     /// One value of the shape, or what stands for it where it is missing.
     pub fn shape_or(&self, key: &str, otherwise: f64) -> f64 {
         self.shape.get(key).copied().unwrap_or(otherwise)
+    }
+
+    /// Whether a value of the shape that is a yes or no is a yes.
+    pub(crate) fn is_set(&self, key: &str) -> bool {
+        self.shape_or(key, 0.0) > 0.5
     }
 
     /// One coefficient; zero where it is missing.
@@ -72,20 +164,7 @@ impl Effect {
                 return Err(format!("{key} must be a finite number"));
             }
         }
-        let positive: &[&str] = match self.name {
-            EffectName::StribeckFriction => &["speed"],
-            EffectName::PreslidingFriction => &["deflection"],
-            EffectName::FrictionDrift | EffectName::GainDrift | EffectName::ElectricalLag => {
-                &["time_constant"]
-            }
-            EffectName::CommandSaturation => &["limit"],
-            EffectName::RollerSlip => &["limit", "creep", "coast", "ratio"],
-            EffectName::Backlash => &["gap", "coast", "contact_hz", "ratio"],
-            EffectName::DriveCompliance => &["resonance_hz", "damping"],
-            EffectName::CommandDelay => &["delay"],
-            _ => &[],
-        };
-        for key in positive {
+        for key in self.name.definition().needed() {
             if !self.shape.get(*key).is_some_and(|value| *value > 0.0) {
                 return Err(format!("shape.{key} must stand there and be above zero"));
             }

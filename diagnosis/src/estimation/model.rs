@@ -1,5 +1,6 @@
 //! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
 
+use crate::effects::definition::Allowed;
 use crate::effects::{CommandLaw, Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
 use crate::estimation::filter::Noise;
@@ -182,47 +183,18 @@ impl Nominal {
 
     /// What the coefficient of an effect's term may be for the effect to be what its name says.
     pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
-        let gain = self.known_gain();
-        match name {
-            EffectName::GainDrift => {
-                // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
-                let least = 0.6 * gain.abs() / self.gain_reach();
-                (-least, least)
-            }
-            // What warms changes both frictions alike.
-            EffectName::FrictionDrift if term > 0 && self.holds(EffectName::ViscousFriction) => {
-                let viscous = self.most_friction(self.rig.model.viscous);
-                (-0.9 * viscous, 3.0 * viscous)
-            }
-            EffectName::AsymmetricFriction if term == 0 && self.holds(EffectName::ViscousFriction) => {
-                let viscous = self.most_friction(self.rig.model.viscous);
-                (-viscous, viscous)
-            }
-            EffectName::AsymmetricFriction if term > 0 && self.holds(EffectName::CoulombFriction) => {
-                let dry = self.most_friction(self.rig.model.coulomb);
-                (-dry, dry)
-            }
-            EffectName::FrictionDrift if self.holds(EffectName::CoulombFriction) => {
-                // How much of the friction as it is may go or come is judged where that is known.
-                let dry = self.rig.model.coulomb.unwrap_or(0.0) / self.known_inertia();
-                let most = most_over_nominal(self.rig.coulomb_sd()) * dry;
-                (-0.9 * most, 3.0 * most)
-            }
-            // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
-            // hardly known, a ripple as large explains what cogging does.
-            EffectName::TorqueRipple => {
-                let part = if self.anchor.is_some() { 0.45 } else { 0.9 * self.gain_reach() };
-                (-part * gain.abs(), part * gain.abs())
-            }
-            EffectName::Backlash => ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain)),
-            // A small mass that always slips is a friction of another form, not a drive that lets go.
-            EffectName::RollerSlip => ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain)),
-            EffectName::DriveCompliance => ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0)),
-            EffectName::MissedCounts => (0.5, 1.5),
-            EffectName::PositionSpring if term > 0 => (f64::NEG_INFINITY, f64::INFINITY),
-            name if name.is_positive() => (0.0, f64::INFINITY),
-            _ => (f64::NEG_INFINITY, f64::INFINITY),
-        }
+        let model = &self.rig.model;
+        let most = |held: EffectName, value| self.holds(held).then(|| self.most_friction(value));
+        let dry = model.coulomb.unwrap_or(0.0) / self.known_inertia();
+        let allowed = Allowed {
+            gain: self.known_gain(),
+            gain_reach: self.gain_reach(),
+            is_anchored: self.anchor.is_some(),
+            viscous: most(EffectName::ViscousFriction, model.viscous),
+            dry: most(EffectName::CoulombFriction, model.coulomb),
+            dry_by_uncertainty: most_over_nominal(self.rig.coulomb_sd()) * dry,
+        };
+        name.definition().limits(term, &allowed)
     }
 
     /// Most that a friction of the rig may be over the inertia: twice what the rig says, anything where it says nought.
@@ -333,17 +305,6 @@ fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Whether each recording has its own phase, so that coefficients are not shared.
-pub(crate) fn own_phase(name: EffectName) -> bool {
-    matches!(
-        name,
-        EffectName::Cogging
-            | EffectName::TorqueRipple
-            | EffectName::MassImbalance
-            | EffectName::EncoderEccentricity
-    )
-}
-
 /// Sign of the velocity where it is known, per block.
 pub(crate) fn direction(track: &BlockedRecording) -> Vec<f64> {
     track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
@@ -387,7 +348,7 @@ impl Model {
                 .into_iter()
                 .enumerate()
             {
-                push(Key::Term { effect: index, term }, input, own_phase(effect.name));
+                push(Key::Term { effect: index, term }, input, effect.name.definition().has_own_phase());
             }
         }
         for column in &mut columns {

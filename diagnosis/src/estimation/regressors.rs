@@ -3,11 +3,6 @@
 use crate::effects::{Effect, EffectName, Law, State};
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 
-/// Whether an effect's terms are proportional to the command, so that its exact input can be scaled.
-fn scales_drive(name: EffectName) -> bool {
-    matches!(name, EffectName::TorqueRipple | EffectName::GainDrift)
-}
-
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
 /// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.
 pub(crate) fn effect_inputs(
@@ -21,7 +16,7 @@ pub(crate) fn effect_inputs(
         return vec![Input::Sensor(track.lost.clone())];
     }
     let Some(mut law) = Law::new(effect) else { return Vec::new() };
-    if matches!(effect.name, EffectName::DriveCompliance | EffectName::Backlash | EffectName::RollerSlip) {
+    if effect.name.definition().is_second_mass() {
         return vec![of_second_mass(track, effect, &mut law, command, bias)];
     }
     let count = law.names().len();
@@ -49,7 +44,7 @@ pub(crate) fn effect_inputs(
         }
     }
     let sensor = law.in_sensor();
-    let drive = scales_drive(effect.name).then(drive);
+    let drive = effect.name.definition().scales_drive().then(drive);
     columns
         .into_iter()
         .map(|column| {

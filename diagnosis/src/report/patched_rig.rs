@@ -57,10 +57,8 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
                     continue;
                 }
                 let name = law.names()[term].clone();
-                let drive = matches!(
-                    effect.name,
-                    EffectName::TorqueRipple | EffectName::GainDrift | EffectName::DriveCompliance
-                );
+                let definition = effect.name.definition();
+                let drive = definition.scales_drive() || effect.name == EffectName::DriveCompliance;
                 let unit = if law.in_sensor() {
                     1.0
                 } else if drive {
@@ -80,21 +78,8 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
 /// Where an effect of the model acts: stretches of time, and the states in which it acts most.
 pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
     let mut place = Place::default();
-    let name = last.model.effects[index].name;
     let mut pooled: Vec<(f64, f64)> = Vec::new();
-    let variable = match name {
-        EffectName::CommandDeadband
-        | EffectName::CommandSaturation
-        | EffectName::RollerSlip
-        | EffectName::TorqueRipple => "command",
-        EffectName::PositionDependentFriction
-        | EffectName::PositionDependentDamping
-        | EffectName::PositionSpring => "travel",
-        EffectName::FrictionDrift | EffectName::GainDrift | EffectName::MissedCounts => "time",
-        EffectName::TiltGravity => "tilt",
-        EffectName::Cogging | EffectName::MassImbalance | EffectName::EncoderEccentricity => "angle",
-        _ => "speed",
-    };
+    let variable = last.model.effects[index].name.definition().variable();
     let mut less = last.model.clone();
     less.effects.remove(index);
     for (r, track) in s.fit_tracks.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! What recordings excite: how many speeds, how many amplitudes. What they never played they cannot tell apart.
 
-use crate::effects::EffectName as N;
+use crate::effects::definition::Shown;
 use crate::estimation::blocked_recording::BlockedRecording;
 
 /// Range of the motion of some recordings.
@@ -83,18 +83,13 @@ impl Excitation {
         )
     }
 
-    /// The twin of an effect that these recordings cannot tell from it, however well either fits.
-    pub(crate) fn twin(&self, name: N) -> Option<N> {
-        match name {
-            N::PreslidingFriction if self.strokes < ONE_LENGTH => Some(N::Backlash),
-            N::Backlash if self.strokes < ONE_LENGTH => Some(N::PreslidingFriction),
-            N::PositionSpring if self.turns < ONE_TURN => Some(N::MassImbalance),
-            N::MassImbalance if self.turns < ONE_TURN => Some(N::PositionSpring),
-            N::StribeckFriction if self.is_one_speed() => Some(N::QuadraticDrag),
-            N::QuadraticDrag if self.is_one_speed() => Some(N::StribeckFriction),
-            N::FrictionDrift if self.is_one_speed() => Some(N::GainDrift),
-            N::GainDrift if self.is_one_speed() => Some(N::FrictionDrift),
-            _ => None,
+    /// What decides between twins.
+    pub(crate) fn shown(&self) -> Shown {
+        Shown {
+            one_speed: self.is_one_speed(),
+            one_length: self.strokes < ONE_LENGTH,
+            less_than_a_turn: self.turns < ONE_TURN,
+            ..Shown::default()
         }
     }
 }
@@ -102,6 +97,7 @@ impl Excitation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{Effect, EffectName as N};
 
     #[test]
     fn what_one_speed_one_length_and_less_than_a_turn_cannot_tell() {
@@ -113,8 +109,11 @@ mod tests {
             (Excitation { turns: 0.5, ..rich }, N::PositionSpring, N::MassImbalance),
         ];
         for (poor, a, b) in twins {
-            assert_eq!((poor.twin(a), poor.twin(b)), (Some(b), Some(a)));
-            assert_eq!((rich.twin(a), rich.twin(b)), (None, None));
+            let twins = |name: N, seen: Excitation| {
+                name.definition().twins(&Effect::shaped(name, &[]), &seen.shown())
+            };
+            assert_eq!((twins(a, poor), twins(b, poor)), (vec![b], vec![a]));
+            assert!(twins(a, rich).is_empty() && twins(b, rich).is_empty());
         }
     }
 }

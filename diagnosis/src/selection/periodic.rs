@@ -1,5 +1,6 @@
 //! Periodic effects: which orders of a turn, or which period along the travel, stand out of the residual.
 
+use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N, wave_mean};
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 use crate::estimation::fit::Fit;
@@ -7,7 +8,6 @@ use crate::estimation::model::{Model, Nominal, effective_command};
 use crate::numerics::golden::golden;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
-use crate::selection::candidates::Span;
 use crate::selection::score_test::{Sums, Terms, project};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -186,11 +186,6 @@ fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<u
     (chosen, gain)
 }
 
-/// Whether an effect is made of waves that are sought: the search is dear, and only waves are like waves.
-pub(crate) fn is_periodic(name: N) -> bool {
-    matches!(name, N::Cogging | N::TorqueRipple)
-}
-
 /// Longest run of neighbouring orders that teeth or poles make.
 const LONGEST_RUN: usize = 4;
 /// How near to a whole number an order is one.
@@ -202,7 +197,7 @@ const STANDS: f64 = 0.2;
 /// after the other, and repeats only because so little of the travel is seen. Orders count from the turn where it is known,
 /// otherwise from the longest wave.
 pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
-    if !is_periodic(effect.name) {
+    if !effect.name.definition().is_periodic() {
         return true;
     }
     let strongest = amplitudes.iter().copied().fold(0.0, f64::max);

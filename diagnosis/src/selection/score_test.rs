@@ -3,11 +3,10 @@
 use crate::effects::Effect;
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 use crate::estimation::fit::{Fit, Prepared};
-use crate::estimation::model::{Model, Nominal, effective_command, effective_commands, own_phase};
+use crate::estimation::model::{Model, Nominal, effective_command, effective_commands};
 use crate::estimation::regressors::effect_inputs;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
-use crate::selection::candidates;
 use crate::selection::search::PER_COEFFICIENT;
 use rayon::prelude::*;
 
@@ -95,7 +94,7 @@ pub(crate) fn score(
     let all: Vec<Effect> = model.effects.iter().chain([effect]).cloned().collect();
     let effective = effective_commands(tracks, &all);
     let ignores = |effective: &Vec<Vec<f64>>| nominal.ignores_too_much(tracks, effective);
-    if !candidates::is_possible(effect) || effective.as_ref().is_some_and(ignores) {
+    if !effect.name.definition().is_possible(effect) || effective.as_ref().is_some_and(ignores) {
         return Score { gain: 0.0 };
     }
     // Responses of the effect's terms under the noise of the fit.
@@ -105,7 +104,7 @@ pub(crate) fn score(
         inputs.iter().map(|input| one.gains.response(track, input)).collect()
     };
     let terms: Terms = tracks.par_iter().zip(&fit.prepared).enumerate().map(response).collect();
-    let sums = project(fit, residuals, &terms, own_phase(effect.name));
+    let sums = project(fit, residuals, &terms, effect.name.definition().has_own_phase());
     if effective.is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.
         let gain = fit.value(crate::estimation::model::Key::Gain).unwrap_or(0.0);

@@ -1,5 +1,6 @@
 //! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
 
+use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
@@ -7,7 +8,7 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::{Model, Nominal, effective_commands};
 use crate::estimation::noise::{self, Colour};
 use crate::numerics::golden::golden;
-use crate::selection::candidates::{self, Span};
+use crate::selection::candidates;
 use crate::selection::joint;
 use crate::selection::periodic;
 use crate::selection::score_test;
@@ -55,15 +56,7 @@ pub(crate) const MOST: usize = 3;
 /// What an effect's freedom costs.
 fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
     let movable = candidates::movable(effect, span).len() as f64;
-    let waves = effect.waves().len();
-    let coefficients = match effect.name {
-        N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity => 2 * waves.max(1) * tracks,
-        N::PositionDependentFriction | N::PositionDependentDamping => effect.shape_or("degree", 3.0) as usize,
-        N::FrictionDrift | N::AsymmetricFriction => 2,
-        N::PositionSpring => 1 + usize::from(effect.shape_or("preload", 0.0) > 0.5),
-        N::CommandDeadband | N::CommandDelay | N::CommandSaturation | N::ElectricalLag => 0,
-        _ => 1,
-    };
+    let coefficients = effect.name.definition().freedom(effect, tracks);
     PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
 }
 
@@ -85,18 +78,6 @@ fn along(
         let found = with(golden(a, b, steps, |x| value(&with(x))));
         (value(&found), found)
     })
-}
-
-/// Effects that change a dry friction, which must be there first.
-fn needs_dry(name: N) -> bool {
-    matches!(
-        name,
-        N::StribeckFriction
-            | N::FrictionDrift
-            | N::PositionDependentFriction
-            | N::PreslidingFriction
-            | N::Backlash
-    )
 }
 
 impl FitContext<'_> {
@@ -139,15 +120,15 @@ impl FitContext<'_> {
         let no_losses = self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0));
         let best_of = |name: &N| -> Option<(Effect, f64)> {
             if there(*name)
-                || (needs_dry(*name) && !dry)
+                || (name.definition().needs_dry() && !dry)
                 || (*name == N::MissedCounts && no_losses)
                 || !wanted(*name)
             {
                 return None;
             }
             let best = match name {
-                N::TorqueRipple if self.nominal.virtual_inertia > 0.0 => None,
-                N::Cogging | N::TorqueRipple => periodic::search(
+                name if !candidates::is_seen(*name, self.nominal) => None,
+                name if name.definition().is_periodic() => periodic::search(
                     *name,
                     &now.fit,
                     &residuals,
@@ -257,7 +238,7 @@ impl FitContext<'_> {
         let effect = model.effects.last().expect("there is an effect to polish");
         let effective = effective_commands(self.tracks, &model.effects);
         let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);
-        if !candidates::is_possible(effect) || effective.is_some_and(ignores) {
+        if !effect.name.definition().is_possible(effect) || effective.is_some_and(ignores) {
             return f64::NEG_INFINITY;
         }
         Fit::new(model, self.nominal, self.tracks, noise).log_likelihood
@@ -266,7 +247,7 @@ impl FitContext<'_> {
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
     pub(crate) fn polish_one(&self, candidate: &FittedModel) -> FittedModel {
         let last = candidate.model.effects.len() - 1;
-        if periodic::is_periodic(candidate.model.effects[last].name) {
+        if candidate.model.effects[last].name.definition().is_periodic() {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();
@@ -275,7 +256,7 @@ impl FitContext<'_> {
         let movable = candidates::movable(&candidate.model.effects[last], self.span);
         // The score test holds the gain and looks near by: delays, drifts and events have optima that lie apart.
         if let (true, Some((key, low, high))) =
-            (candidates::has_optima_apart(candidate.model.effects[last].name), movable.first().copied())
+            (candidate.model.effects[last].name.definition().has_optima_apart(), movable.first().copied())
         {
             for _ in 0..FARTHER {
                 let at = model.effects[last].shape[key];

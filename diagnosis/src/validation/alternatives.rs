@@ -1,5 +1,6 @@
 //! Rivals: every effect found is taken out, others are fitted in its place, and how far they stay behind makes its class.
 
+use crate::effects::definition::Shown;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
@@ -8,7 +9,6 @@ use crate::estimation::noise::Colour;
 use crate::io::rig::Kind;
 use crate::numerics::bootstrap::bootstrap;
 use crate::selection::excitation::Excitation;
-use crate::selection::periodic::is_periodic;
 use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::evidence::{EffectEvidence, Rival, evaluate_all, fit_costs};
 use crate::validation::known_travel::known;
@@ -26,8 +26,6 @@ const BEHIND_PART: f64 = 0.015;
 /// behind, and counts as by this many standard errors.
 const BEHIND_SLOW: f64 = 30.0;
 const BEHIND_SLOW_Z: f64 = 4.0;
-/// Narrowest gap that an encoder sees, counts.
-const SEEN: f64 = 2.0;
 /// Most effects that a class may hold.
 const MOST_IN_CLASS: usize = 3;
 /// Standard errors behind within which a rival's shape is worth polishing.
@@ -57,10 +55,9 @@ pub(crate) fn fit_rivals(
         let name = best.model.effects[i].name;
         let base_fit = Fit::new(&less, context.nominal, context.tracks, &best.noise);
         let base = FittedModel { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
-        let periodic =
-            is_periodic(name) || matches!(name, EffectName::MassImbalance | EffectName::EncoderEccentricity);
+        let periodic = name.definition().has_own_phase();
         let others: Vec<(Effect, f64)> = context
-            .screen(&base, &|other| other != name && (periodic || !is_periodic(other)))
+            .screen(&base, &|other| other != name && (periodic || !other.definition().is_periodic()))
             .into_iter()
             .take(RIVALS)
             .collect();
@@ -116,23 +113,6 @@ pub(crate) fn fit_rivals(
     }
 }
 
-/// What no recording of motion tells from an effect; `count` is one of the encoder's.
-fn twin(effect: &Effect, leaves_much: bool, kind: Kind, count: f64) -> Option<EffectName> {
-    use EffectName as N;
-    match effect.name {
-        // A drive that clips, and a roller that slips at a constant force.
-        N::CommandSaturation => Some(N::RollerSlip),
-        N::RollerSlip => Some(N::CommandSaturation),
-        // A spring that explains little of what it should explain may well have a gap.
-        N::DriveCompliance if leaves_much => Some(N::Backlash),
-        // A gap that the encoder does not see, and the spring that its flanks are.
-        N::Backlash if effect.shape_or("gap", f64::INFINITY) < SEEN * count => Some(N::DriveCompliance),
-        // Waves of once a turn, where nothing that turns need be heavy.
-        N::MassImbalance if kind == Kind::Linear => Some(N::Cogging),
-        _ => None,
-    }
-}
-
 /// Every effect that these recordings cannot tell from the one found, itself first.
 pub(crate) fn class(
     found: &EffectEvidence,
@@ -142,8 +122,17 @@ pub(crate) fn class(
 ) -> Vec<EffectName> {
     let name = found.effect.name;
     let mut class = vec![name];
-    class.extend(twin(&found.effect, leaves_much, context.nominal.rig.kind, context.span.count));
-    class.extend(excitation.twin(name).filter(|twin| !class.contains(twin)));
+    let shown = Shown {
+        leaves_much,
+        linear: context.nominal.rig.kind == Kind::Linear,
+        count: context.span.count,
+        ..excitation.shown()
+    };
+    for twin in name.definition().twins(&found.effect, &shown) {
+        if !class.contains(&twin) {
+            class.push(twin);
+        }
+    }
     let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
     let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
     let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
@@ -169,12 +158,13 @@ mod tests {
     #[test]
     fn an_unseen_gap_may_be_a_spring_and_a_wave_of_a_screw_may_be_of_its_motor() {
         use EffectName as N;
-        let of = |name: N, shape: &[(&str, f64)], kind: Kind| {
-            twin(&Effect::shaped(name, shape), false, kind, 1e-6)
+        let of = |name: N, shape: &[(&str, f64)], linear: bool| {
+            let shown = Shown { linear, count: 1e-6, ..Shown::default() };
+            name.definition().twins(&Effect::shaped(name, shape), &shown)
         };
-        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], Kind::Linear), Some(N::DriveCompliance));
-        assert_eq!(of(N::Backlash, &[("gap", 3e-6)], Kind::Linear), None);
-        assert_eq!(of(N::MassImbalance, &[], Kind::Linear), Some(N::Cogging));
-        assert_eq!(of(N::MassImbalance, &[], Kind::Rotary), None, "there a mass turns");
+        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
+        assert!(of(N::Backlash, &[("gap", 3e-6)], true).is_empty());
+        assert_eq!(of(N::MassImbalance, &[], true), [N::Cogging]);
+        assert!(of(N::MassImbalance, &[], false).is_empty(), "there a mass turns");
     }
 }

@@ -4,7 +4,7 @@
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::{Noise, robust_loss};
 use crate::estimation::fit::{Fit, Prepared};
-use crate::estimation::model::{Key, Model, Nominal, own_phase, total};
+use crate::estimation::model::{Key, Model, Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
 use crate::selection::joint;
@@ -177,7 +177,7 @@ fn evaluate_once(
             let places: Vec<usize> = (0..p)
                 .filter(|i| matches!(one.columns[*i].key, Key::Term { effect: e, .. } if e == effect))
                 .collect();
-            if !own_phase(name) || places.is_empty() {
+            if !name.definition().has_own_phase() || places.is_empty() {
                 continue;
             }
             let shape = pattern(fit, model, effect);

@@ -1,10 +1,10 @@
 //! What held-out recordings may judge: a law of the travel says nothing of travel where no fitted recording has been.
 
 use crate::effects::EffectName as N;
+use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
 use crate::numerics::digits::short_within;
-use crate::selection::candidates::Span;
 use std::borrow::Cow;
 
 /// Part of the fitted travel by which a recording may go beyond it.
@@ -68,6 +68,7 @@ mod tests {
     use crate::estimation::model::Nominal;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
+    use crate::selection::candidates::span_of;
 
     fn slide(to: f64) -> BlockedRecording {
         let time_s: Vec<f64> = (0..401).map(|i| f64::from(i) * 2.5e-3).collect();
@@ -84,7 +85,7 @@ mod tests {
     fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
-        let span = Span::of(&[slide(10.0)], &nominal);
+        let span = span_of(&[slide(10.0)], &nominal);
         let model = |name| Model { effects: vec![Effect::shaped(name, &[])], ..Model::default() };
         let unknown = |to: f64, name| {
             let tracks = [slide(to)];

@@ -1,5 +1,6 @@
 //! The stages one after another: read, null, search, judge, and what is handed on to the report.
 
+use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::Noise;
@@ -12,7 +13,7 @@ use crate::estimation::{quasi_static, refit};
 use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
-use crate::selection::candidates::Span;
+use crate::selection::candidates::span_of;
 use crate::selection::search::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::validation::evidence::{EffectEvidence, evaluate_all, judge_all};
@@ -304,7 +305,7 @@ pub(crate) fn search(
     let (noise, refit) = refit::settle(&mut nominal, &mut tracks);
     let scale = refit::acceleration_scale(&nominal, &tracks);
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
-    let span = Span::of(&tracks, &nominal);
+    let span = span_of(&tracks, &nominal);
     find_steps(&nominal, &span, &mut tracks, &noise, scale, Asked::UNKNOWN);
     let asked = if loses_counts(&tracks) { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);

@@ -1,0 +1,70 @@
+//! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn q̇|)`. Where the nominal model has an
+//! offset the dry part is that offset, and only the viscous part can be told.
+
+use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Reported, Span};
+use super::law::{first_or_both, sign};
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law {
+    viscous_only: bool,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        first_or_both("viscous_difference", "coulomb_difference", !self.viscous_only)
+    }
+    fn terms(&mut self, _state: &State, velocity: f64, out: &mut [f64]) {
+        out[0] = -velocity.abs();
+        if let Some(dry) = out.get_mut(1) {
+            *dry = -sign(velocity).abs();
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that differs with direction"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law { viscous_only: effect.is_set("viscous_only") }))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let known = [("viscous_only", 1.0)];
+        vec![Effect::shaped(name, if span.rig.has_offset { &known } else { &[] })]
+    }
+    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
+        let most = if term == 0 { allowed.viscous } else { allowed.dry };
+        most.map_or(FREE, |most| (-most, most))
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        2
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let mut out = Vec::new();
+        let mut put = |name: &str, term: (f64, f64), friction: f64| {
+            out.push(Reported::new(name, (term.0 / friction, (term.1 / friction).abs()), "1"));
+        };
+        if let Some(viscous) = fitted.viscous.filter(|b| *b != 0.0) {
+            put("viscous_asymmetry", fitted.term(0), viscous);
+        }
+        if let (Some(dry), true) = (fitted.dry.filter(|c| *c != 0.0), fitted.term(1).1 > 0.0) {
+            put("coulomb_asymmetry", fitted.term(1), dry);
+        }
+        out
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.025
+    }
+}

@@ -1,0 +1,96 @@
+//! A gap between motor and load that opens at reversals; the law is in `load`.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
+use super::{Effect, EffectName, State, Subsystem};
+use crate::numerics::golden::logarithmic;
+
+#[derive(Debug, Clone)]
+struct Law(Load);
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["inertia_ratio".into()]
+    }
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        out[0] = self.0.through_gap(state);
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+/// Narrowest gap that an encoder sees, counts.
+const SEEN: f64 = 2.0;
+
+/// Widest gap worth looking for: one that the axis crosses within a moment at its fast speed.
+fn widest(span: &Span) -> f64 {
+    (0.08 * span.speed).max(60.0 * span.count)
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "a gap at reversals"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law(Load::new(effect))))
+    }
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn is_joint(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["gap", "coast", "contact_hz", "ratio"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let mut out = Vec::new();
+        for coast in [0.6, 1.5].map(|part| part * span.rig.dry) {
+            for gap in logarithmic(2.0 * span.count, widest(span), 12) {
+                let shape = [("gap", gap), ("coast", coast), ("contact_hz", 180.0), ("ratio", 1.0)];
+                out.push(Effect::shaped(name, &[shape.as_slice(), &span.rig.machine].concat()));
+            }
+        }
+        out
+    }
+    fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
+        let dry = effect.shape_or("dry", 1.0);
+        vec![
+            ("gap", span.count, 2.0 * widest(span)),
+            ("coast", 0.2 * dry, 4.0 * dry),
+            ("ratio", RATIOS.0, RATIOS.1),
+            ("contact_hz", 30.0, 600.0),
+        ]
+    }
+    fn is_possible(&self, effect: &Effect) -> bool {
+        own_friction(effect) <= MOST_OF_DRY * effect.shape_or("dry", 0.0)
+    }
+    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
+        let gain = allowed.gain;
+        ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.4
+    }
+    fn twins(&self, effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // A gap that the encoder does not see, and the spring that its flanks are.
+        let unseen = effect.shape_or("gap", f64::INFINITY) < SEEN * shown.count;
+        let spring = unseen.then_some(EffectName::DriveCompliance);
+        spring.into_iter().chain(shown.one_length.then_some(EffectName::PreslidingFriction)).collect()
+    }
+}

@@ -1,0 +1,42 @@
+//! Torque periodic in the angle, independent of the command: teeth and poles, or a screw. Its orders are sought in the residual.
+
+use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::waves::{self, Waves};
+use super::{Effect, EffectName, Subsystem};
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "torque periodic in the angle"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Waves::new(effect, false)))
+    }
+    fn has_own_phase(&self) -> bool {
+        true
+    }
+    fn is_periodic(&self) -> bool {
+        true
+    }
+    fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
+        Vec::new()
+    }
+    fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
+        waves::freedom(effect, recordings)
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        waves::report(fitted, false)
+    }
+    fn variable(&self) -> &'static str {
+        "angle"
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::TorqueRipple).then_some(
+            "slow turns with a small and with a large constant load: ripple grows with the command, cogging does not",
+        )
+    }
+}

@@ -1,0 +1,52 @@
+//! Small commands do nothing; larger ones pass whole or lose the width.
+
+use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::{CommandLaw, Effect, EffectName, Subsystem};
+use crate::numerics::golden::logarithmic;
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "small commands do nothing"
+    }
+    fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
+        let half_width = effect.shape_or("half_width", 0.0);
+        Some(CommandLaw::Deadband { half_width, shift: effect.is_set("shift") })
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let at = |shift: f64| {
+            logarithmic(0.01 * span.command, 0.85 * span.dead, 11)
+                .into_iter()
+                .map(move |width| Effect::shaped(name, &[("half_width", width), ("shift", shift)]))
+        };
+        at(0.0).chain(at(1.0)).collect()
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("half_width", 0.001 * span.command, span.dead)]
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        0
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
+    }
+    fn variable(&self) -> &'static str {
+        "command"
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some("a slow triangle of small commands through zero while the axis is kept moving by another load")
+    }
+}

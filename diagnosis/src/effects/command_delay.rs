@@ -1,0 +1,49 @@
+//! A pure transport delay between command and force.
+
+use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
+use crate::numerics::golden::logarithmic;
+use std::collections::VecDeque;
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "the drive applies the command late"
+    }
+    fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
+        let delay = effect.shape_or("delay", 0.0);
+        Some(CommandLaw::Delay { delay, queue: VecDeque::new(), waiting: 0.0 })
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["delay"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let delays = logarithmic((0.2 * span.row).max(1e-5), 0.03, 16);
+        delays.into_iter().map(|delay| Effect::shaped(name, &[("delay", delay)])).collect()
+    }
+    fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
+        vec![("delay", 1e-6, 0.06)]
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        0
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("delay", fitted.shape("delay"), "s")]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.015
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::ElectricalLag).then_some(experiments::PHASE)
+    }
+}

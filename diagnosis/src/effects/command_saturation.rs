@@ -1,0 +1,50 @@
+//! A drive that clips below its declared limit.
+
+use super::definition::{Definition, Fitted, Movable, Reported, Shown, Span};
+use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "the drive clips large commands"
+    }
+    fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
+        Some(CommandLaw::Clip { limit: effect.shape_or("limit", 0.0) })
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["limit"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let part = |i: i32| span.clip + (0.945 - span.clip) / 9.0 * f64::from(i);
+        (0..10).map(|i| Effect::shaped(name, &[("limit", span.command * part(i))])).collect()
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("limit", 0.9 * span.clip * span.command, span.command)]
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        0
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("limit", fitted.shape("limit"), fitted.command.clone())]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.02
+    }
+    fn variable(&self) -> &'static str {
+        "command"
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::RollerSlip).then_some(experiments::BLOCKED)
+    }
+    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
+        // A drive that clips, and a roller that slips at a constant force.
+        vec![EffectName::RollerSlip]
+    }
+}

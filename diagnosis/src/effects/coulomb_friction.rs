@@ -1,0 +1,46 @@
+//! Dry friction, where the nominal model has none: `-coulomb·sgn(q̇)`.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span};
+use super::law::sign;
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law;
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["coulomb".into()]
+    }
+    fn terms(&mut self, _state: &State, velocity: f64, out: &mut [f64]) {
+        out[0] = -sign(velocity);
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction"
+    }
+    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
+        vec![Effect::shaped(name, &[])]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        POSITIVE
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("coulomb", fitted.force.into())
+    }
+}

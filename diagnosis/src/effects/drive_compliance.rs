@@ -1,0 +1,117 @@
+//! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::{Effect, EffectName, State, Subsystem};
+use crate::numerics::golden::logarithmic;
+use std::f64::consts::TAU;
+
+/// Resonance above which a spring holds like a solid shaft, Hz.
+const STIFFEST_HZ: f64 = 400.0;
+
+#[derive(Debug, Clone)]
+struct Law {
+    omega: f64,
+    damping: f64,
+    /// Position and speed of the resonator; none before the first force.
+    state: Option<(f64, f64)>,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["inertia_ratio".into()]
+    }
+    /// Mean over the step of s²/(s² + 2ζωs + ω²) applied to a held force, per unit of the ratio of load to motor inertia.
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        if state.dt <= 0.0 {
+            out[0] = 0.0;
+            return;
+        }
+        let m = transition(self.omega, self.damping, state.dt);
+        // At the start the spring carries the standing force.
+        let (x, v) = self.state.unwrap_or((state.drive / (self.omega * self.omega), 0.0));
+        let next = m[2] * x + m[3] * v + m[5] * state.drive;
+        self.state = Some((m[0] * x + m[1] * v + m[4] * state.drive, next));
+        out[0] = (next - v) / state.dt;
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+/// Exact transition of x″ + 2ζωx′ + ω²x = f over `dt` with `f` held: [a11 a12 a21 a22 b1 b2].
+fn transition(omega: f64, zeta: f64, dt: f64) -> [f64; 6] {
+    let zeta = zeta.clamp(1e-4, 0.99);
+    let decay = zeta * omega;
+    let damped = omega * (1.0 - zeta * zeta).sqrt();
+    let e = (-decay * dt).exp();
+    let (sin, cos) = (damped * dt).sin_cos();
+    let k = decay / damped;
+    let a11 = e * (cos + k * sin);
+    let a12 = e * sin / damped;
+    let a21 = -omega * omega * a12;
+    let a22 = e * (cos - k * sin);
+    [a11, a12, a21, a22, (1.0 - a11) / (omega * omega), -a21 / (omega * omega)]
+}
+
+/// Highest resonance of a load on a spring that still shows in how fast the motor answers, Hz.
+fn highest(span: &Span) -> f64 {
+    (0.5 / span.block).max((0.25 / span.row).min(STIFFEST_HZ))
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "a spring between motor and load"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let omega = TAU * effect.shape_or("resonance_hz", 1.0);
+        Some(Box::new(Law { omega, damping: effect.shape_or("damping", 0.05), state: None }))
+    }
+    fn is_second_mass(&self) -> bool {
+        true
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["resonance_hz", "damping"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let mut out = Vec::new();
+        for damping in [0.02, 0.12] {
+            for hz in logarithmic(5.0, 0.7 * highest(span), 12) {
+                out.push(Effect::shaped(name, &[("resonance_hz", hz), ("damping", damping)]));
+            }
+        }
+        out
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("resonance_hz", 4.0, highest(span)), ("damping", 0.003, 0.7)]
+    }
+    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
+        let gain = allowed.gain;
+        ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0))
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let (f, s) = fitted.shape("resonance_hz");
+        let (x, sd) = fitted.term(0);
+        let load = (x / fitted.ratio).max(0.0);
+        let part = (1.0 + load).sqrt();
+        let sd = ((s / part).powi(2) + (0.5 * f / part.powi(3) * sd / fitted.ratio).powi(2)).sqrt();
+        vec![Reported::new("antiresonance_hz", (f / part, sd), "Hz")]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.035
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // A spring that explains little of what it should explain may well have a gap.
+        shown.leaves_much.then_some(EffectName::Backlash).into_iter().collect()
+    }
+}

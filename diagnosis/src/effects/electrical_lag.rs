@@ -1,0 +1,47 @@
+//! A first-order lag (L/R) between command and force.
+
+use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
+use crate::numerics::golden::logarithmic;
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "a first-order lag between command and torque"
+    }
+    fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
+        Some(CommandLaw::Lag { time_constant: effect.shape_or("time_constant", 0.0), state: None })
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["time_constant"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let times = logarithmic((0.2 * span.row).max(1e-5), 0.05, 9);
+        times.into_iter().map(|time| Effect::shaped(name, &[("time_constant", time)])).collect()
+    }
+    fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
+        vec![("time_constant", 1e-6, 0.2)]
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        0
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("time_constant", fitted.shape("time_constant"), "s")]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.04
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::CommandDelay).then_some(experiments::PHASE)
+    }
+}

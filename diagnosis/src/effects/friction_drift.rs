@@ -1,0 +1,103 @@
+//! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) + viscous·q̇)·(1 - exp(-t/time_constant))`.
+
+use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::law::{first_or_both, sign};
+use super::{Effect, EffectName, State, Subsystem, experiments};
+use crate::numerics::golden::logarithmic;
+
+#[derive(Debug, Clone)]
+struct Law {
+    time_constant: f64,
+    /// What is not there does not drift.
+    dry_only: bool,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        first_or_both("coulomb", "viscous", !self.dry_only)
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        let settled = 1.0 - (-state.time / self.time_constant).exp();
+        out[0] = -sign(velocity) * settled;
+        if let Some(viscous) = out.get_mut(1) {
+            *viscous = -velocity * settled;
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that changes as the recording goes on"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let time_constant = effect.shape_or("time_constant", 1.0);
+        Some(Box::new(Law { time_constant, dry_only: effect.is_set("dry_only") }))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn drifts(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["time_constant"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let at = |time_constant: f64| {
+            let mut drift = Effect::shaped(name, &[("time_constant", time_constant)]);
+            if !span.rig.has_viscous {
+                drift.shape.insert("dry_only".into(), 1.0);
+            }
+            drift
+        };
+        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(at).collect()
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
+    }
+    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
+        // What warms changes both frictions alike; how much of the friction as it is may go or come is judged where that is known.
+        let most = match (term, allowed.viscous, allowed.dry) {
+            (1.., Some(viscous), _) => viscous,
+            (_, _, Some(_)) => allowed.dry_by_uncertainty,
+            _ => return FREE,
+        };
+        (-0.9 * most, 3.0 * most)
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        2
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let (change, sd) = fitted.term(0);
+        let base = fitted.own_dry.abs();
+        let relative = (base > 0.0).then(|| Reported::new("change", (change / base, sd / base), "1"));
+        let time = Reported::new("time_constant", fitted.shape("time_constant"), "s");
+        relative.into_iter().chain([time]).collect()
+    }
+    fn form_sd(&self, value: &str) -> f64 {
+        if value == "time_constant" { 0.06 } else { 0.04 }
+    }
+    fn variable(&self) -> &'static str {
+        "time"
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::GainDrift).then_some(experiments::LATE)
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::GainDrift).into_iter().collect()
+    }
+}

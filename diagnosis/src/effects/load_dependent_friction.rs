@@ -1,0 +1,53 @@
+//! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with `of_drive` the load is the drive's
+//! own force, as a gear loses it, which has no name and speaks only against others.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span};
+use super::law::sign;
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law {
+    of_drive: bool,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["coefficient".into()]
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        let load = if self.of_drive { state.drive } else { state.external };
+        out[0] = -sign(velocity) * load.abs();
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction that grows with the load"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law { of_drive: effect.is_set("of_drive") }))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        if span.force { vec![Effect::shaped(name, &[])] } else { Vec::new() }
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        POSITIVE
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("coefficient", "1".into())
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
+    }
+}

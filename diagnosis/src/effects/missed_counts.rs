@@ -1,0 +1,57 @@
+//! Counts that the encoder loses for good: steps of what it reads. The steps are found before any effect is.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Reported, Span};
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law {
+    names: Vec<String>,
+    times: Vec<f64>,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        self.names.clone()
+    }
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        for (term, time) in out.iter_mut().zip(&self.times) {
+            *term = if state.time >= *time { 1.0 } else { 0.0 };
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Sensor
+    }
+    fn words(&self) -> &'static str {
+        "the encoder loses counts"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
+        let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
+        Some(Box::new(Law { names, times }))
+    }
+    fn in_sensor(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
+        vec![Effect::shaped(name, &[])]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        (0.5, 1.5)
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        // All the counts that were lost in the fitted recordings, whichever way.
+        let sum = fitted.lost * fitted.term(0).0;
+        vec![Reported::new("lost", (sum, ((0.05 * sum).powi(2) + 1.0).sqrt()), "counts")]
+    }
+    fn variable(&self) -> &'static str {
+        "time"
+    }
+}

@@ -1,0 +1,77 @@
+//! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the inertia that follows the travel, which
+//! has no name and speaks only against others.
+
+use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::law::legendre;
+use super::travel_profile::{self, Profile};
+use super::{Effect, EffectName, State, Subsystem, experiments};
+
+#[derive(Debug, Clone)]
+struct Law {
+    profile: Profile,
+    of_inertia: bool,
+}
+
+impl Law {
+    /// What an inertia J(q) takes beside a constant one, J′v²/2 and its part of the acceleration, by Lagrange's equation.
+    fn inertia(&self, state: &State, out: &mut [f64]) {
+        let step = 1e-3 * 0.5 * (self.profile.high - self.profile.low);
+        let mut beyond = vec![0.0; out.len()];
+        legendre(self.profile.along(state.position + step), 1.0, &mut beyond);
+        legendre(self.profile.along(state.position - step), 1.0, out);
+        for (term, beyond) in out.iter_mut().zip(beyond) {
+            let slope = (beyond - *term) / (2.0 * step);
+            *term =
+                -0.5 * (beyond + *term) * state.acceleration - 0.5 * slope * state.velocity * state.velocity;
+        }
+    }
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        self.profile.names()
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        if self.of_inertia {
+            self.inertia(state, out);
+        } else {
+            legendre(self.profile.along(state.position), -velocity, out);
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "damping that changes along the travel"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law { profile: Profile::new(effect), of_inertia: effect.is_set("of_inertia") }))
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        travel_profile::grid(name, span)
+    }
+    fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
+        travel_profile::freedom(effect)
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let unit = format!("{}·s/{}", fitted.force, fitted.length);
+        vec![Reported::new("span", travel_profile::span(fitted), unit)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.13
+    }
+    fn variable(&self) -> &'static str {
+        "travel"
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some(experiments::STROKES)
+    }
+}

@@ -1,0 +1,59 @@
+//! Dry friction that changes along the travel: `-Σ legendre_k·P_k(q)·sgn(q̇)`.
+
+use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::law::{legendre, sign};
+use super::travel_profile::{self, Profile};
+use super::{Effect, EffectName, State, Subsystem, experiments};
+
+#[derive(Debug, Clone)]
+struct Law(Profile);
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        self.0.names()
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        legendre(self.0.along(state.position), -sign(velocity), out);
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction that changes along the travel"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law(Profile::new(effect))))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        travel_profile::grid(name, span)
+    }
+    fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
+        travel_profile::freedom(effect)
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("span", travel_profile::span(fitted), fitted.force)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.13
+    }
+    fn variable(&self) -> &'static str {
+        "travel"
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some(experiments::STROKES)
+    }
+}

@@ -1,0 +1,96 @@
+//! A spring along the travel, a bending needle or elastic tissue: `-stiffness·(q - from)`, or only beyond `from`; with `fades_s` it
+//! creeps, which has no name and speaks only against others.
+
+use super::definition::{
+    Allowed, Definition, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span,
+};
+use super::law::first_or_both;
+use super::{Effect, EffectName, State, Subsystem, experiments};
+
+#[derive(Debug, Clone)]
+struct Law {
+    from: f64,
+    one_sided: bool,
+    preload: bool,
+    /// Time in which the force fades while the spring stays bent, s.
+    fades_s: f64,
+    faded: f64,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        // Where it is at rest is not known: a force that is there at the start.
+        first_or_both("stiffness", "preload", self.preload)
+    }
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        let x = state.position - self.from;
+        // Maxwell's spring and dashpot in series: what has faded is no longer bent.
+        self.faded += (x - self.faded) * (1.0 - (-state.dt / self.fades_s).exp());
+        let bent = x - self.faded;
+        out[0] = if self.one_sided { -bent.max(0.0) } else { -bent };
+        if let Some(preload) = out.get_mut(1) {
+            *preload = 1.0;
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "a spring along the travel"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law {
+            from: effect.shape_or("from", 0.0),
+            one_sided: effect.is_set("one_sided"),
+            preload: effect.is_set("preload"),
+            fades_s: effect.shape_or("fades_s", f64::INFINITY),
+            faded: 0.0,
+        }))
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        if !span.rig.has_stroke {
+            return Vec::new();
+        }
+        // A rig without an offset has no other term for a spring that is not at rest where the recording starts. Where the
+        // inertia is hardly known one more term explains slow motion as well as forces in balance do.
+        let preload = f64::from(u8::from(!span.rig.has_offset && !span.rig.is_anchored));
+        let mut out = vec![Effect::shaped(name, &[("from", 0.0), ("preload", preload)])];
+        for part in [0.25, 0.5, 0.75] {
+            let from = span.low + part * span.travel();
+            out.push(Effect::shaped(name, &[("from", from), ("one_sided", 1.0)]));
+        }
+        out
+    }
+    fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
+        Vec::new()
+    }
+    fn limits(&self, term: usize, _allowed: &Allowed) -> (f64, f64) {
+        if term > 0 { FREE } else { POSITIVE }
+    }
+    fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
+        1 + usize::from(effect.is_set("preload"))
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.13
+    }
+    fn variable(&self) -> &'static str {
+        "travel"
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some(experiments::STROKES)
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()
+    }
+}

@@ -1,0 +1,92 @@
+//! Elastic bristles before sliding: the hysteresis just after a reversal (Dahl 1968; LuGre, Canudas de Wit et al. 1995).
+
+use super::bristles::{Bristles, lengths};
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span};
+use super::law::{first_or_both, sign};
+use super::{Effect, EffectName, State, Subsystem};
+use crate::numerics::golden::logarithmic;
+
+/// Longest over shortest of the lengths over which bristles bend, where they are not all alike: asperities of many sizes.
+const SPREAD: f64 = 10.0;
+
+#[derive(Debug, Clone)]
+struct Law {
+    bristles: Bristles,
+    /// Alike, they are LuGre's, which dampen as they bend.
+    alike: bool,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        first_or_both("coulomb", "damping", self.alike)
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        // Bristles bend on where the sign is too unsure for dry friction, and hold alone there.
+        let (bent, more) = self.bristles.bend(state.velocity * state.dt);
+        out[0] = sign(velocity) - bent;
+        if let Some(damping) = out.get_mut(1) {
+            *damping = if state.dt > 0.0 { -more / state.dt } else { 0.0 };
+        }
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "elastic bristles before sliding"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law { bristles: Bristles::new(effect), alike: effect.shape_or("spread", 1.0) <= 1.0 }))
+    }
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["deflection"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let at = |spread: f64| {
+            logarithmic(2.0 * span.count, 0.03 * span.travel(), 9).into_iter().map(move |deflection| {
+                Effect::shaped(name, &[("deflection", deflection), ("spread", spread)])
+            })
+        };
+        at(1.0).chain(at(SPREAD)).collect()
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("deflection", 0.5 * span.count, 0.1 * span.travel())]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        POSITIVE
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let (c, cs) = fitted.scaled(fitted.term(0));
+        let (d, ds) = fitted.shape("deflection");
+        // From straight, before any slides.
+        let lengths = lengths(fitted.effect);
+        let value = c * lengths.iter().map(|length| length.recip()).sum::<f64>() / lengths.len() as f64;
+        let sd = value.abs() * ((cs / c).powi(2) + (ds / d).powi(2)).sqrt();
+        vec![
+            // How far they bend may be hardly known where how much they hold is.
+            Reported::new("breakaway", (c, cs), fitted.force),
+            Reported::new("stiffness", (value, sd), format!("{}/{}", fitted.force, fitted.length)),
+        ]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.15
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        matches!(other, EffectName::Backlash | EffectName::StribeckFriction).then_some(
+            "a ladder of reversals with amplitudes from a few counts to a turn: bristles give a loop at every amplitude, a gap only above its width",
+        )
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_length.then_some(EffectName::Backlash).into_iter().collect()
+    }
+}

@@ -1,0 +1,48 @@
+//! Drag with the square of speed: `-coefficient·q̇·|q̇|`.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Shown, Span};
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law;
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["coefficient".into()]
+    }
+    fn terms(&mut self, _state: &State, velocity: f64, out: &mut [f64]) {
+        out[0] = -velocity * velocity.abs();
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "drag with the square of speed"
+    }
+    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law))
+    }
+    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
+        vec![Effect::shaped(name, &[])]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        POSITIVE
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("coefficient", format!("{}·s²/{}²", fitted.force, fitted.length))
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some(super::experiments::SPEEDS)
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::StribeckFriction).into_iter().collect()
+    }
+}

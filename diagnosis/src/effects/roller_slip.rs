@@ -1,0 +1,113 @@
+//! A drive that lets go above a force ceiling; the law is in `load`.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
+use super::{Effect, EffectName, State, Subsystem, experiments};
+use crate::numerics::golden::logarithmic;
+
+#[derive(Debug, Clone)]
+struct Law(Load);
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["inertia_ratio".into()]
+    }
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        out[0] = self.0.by_grip(state);
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+/// What a grip carries at the least over its load's own friction, of which the rig tells no more than this.
+const HOLDS: f64 = 0.9;
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "the drive lets go above a force ceiling"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law(Load::new(effect))))
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn is_joint(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["limit", "creep", "coast", "ratio"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let mut out = Vec::new();
+        // What slips under friction alone never held.
+        let least =
+            (span.rig.dry / span.rig.per_command.abs()).clamp(0.02 * span.command, 0.5 * span.command);
+        let own = [("coast", span.rig.dry), ("ratio", 1.0)];
+        for creep in [0.003, 0.02].map(|part| part * span.speed) {
+            for limit in logarithmic(least, 0.945 * span.command, 10) {
+                let shape = [("limit", limit), ("creep", creep)];
+                out.push(Effect::shaped(name, &[shape.as_slice(), &own, &span.rig.machine].concat()));
+            }
+        }
+        out
+    }
+    fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
+        let dry = effect.shape_or("dry", 1.0);
+        vec![
+            // Beyond the largest command: what the load's own friction takes a grip carries too.
+            ("limit", 0.01 * span.command, 2.0 * span.command),
+            ("creep", 1e-4 * span.speed, 0.3 * span.speed),
+            ("coast", 0.35 * dry, 2.5 * dry),
+            ("ratio", RATIOS.0, RATIOS.1),
+        ]
+    }
+    fn is_possible(&self, effect: &Effect) -> bool {
+        // The load's own friction is no more than the machine's, and a grip holds its load against it, or it never held.
+        let get = |key: &str| effect.shape_or(key, 0.0);
+        own_friction(effect) <= MOST_OF_DRY * get("dry")
+            && get("limit") * get("per_command").abs() >= HOLDS * get("coast")
+    }
+    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
+        // A small mass that always slips is a friction of another form, not a drive that lets go.
+        let gain = allowed.gain;
+        ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain))
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        // The load's part of what the drive would need to press as hard.
+        let (limit, s) = fitted.shape("limit");
+        let ((x, x_sd), ratio) = (fitted.term(0), fitted.ratio);
+        let ratio_of_load = (x / ratio).abs();
+        let part = ratio_of_load / (1.0 + ratio_of_load);
+        let part_sd = (x_sd / ratio).abs() / (1.0 + ratio_of_load).powi(2);
+        let drive = limit * fitted.inertia * fitted.effect.shape_or("per_command", ratio).abs();
+        let value = part * drive;
+        let sd = ((part * s / limit * drive).powi(2)
+            + (part_sd * drive).powi(2)
+            + (value * fitted.common).powi(2))
+        .sqrt();
+        vec![Reported::new("ceiling", (value, sd), fitted.force)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.15
+    }
+    fn variable(&self) -> &'static str {
+        "command"
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other == EffectName::CommandSaturation).then_some(experiments::BLOCKED)
+    }
+    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
+        // A drive that clips, and a roller that slips at a constant force.
+        vec![EffectName::CommandSaturation]
+    }
+}

@@ -1,0 +1,75 @@
+//! Friction that falls as speed rises from zero: `-peak·exp(-(|q̇|/speed)^exponent)·sgn(q̇)` (Stribeck 1902; Bo and Pavelescu 1982).
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span};
+use super::law::sign;
+use super::{Effect, EffectName, State, Subsystem};
+use crate::numerics::golden::logarithmic;
+
+#[derive(Debug, Clone)]
+struct Law {
+    speed: f64,
+    exponent: f64,
+}
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["peak".into()]
+    }
+    fn terms(&mut self, _state: &State, velocity: f64, out: &mut [f64]) {
+        out[0] = -sign(velocity) * (-(velocity.abs() / self.speed).powf(self.exponent)).exp();
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that falls as speed rises from zero"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let (speed, exponent) = (effect.shape_or("speed", 1.0), effect.shape_or("exponent", 2.0));
+        Some(Box::new(Law { speed, exponent }))
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["speed"]
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
+        let at = |exponent: f64| {
+            logarithmic(from, 0.4 * span.speed, 8)
+                .into_iter()
+                .map(move |speed| Effect::shaped(name, &[("speed", speed), ("exponent", exponent)]))
+        };
+        at(1.0).chain(at(2.0)).collect()
+    }
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("speed", 0.002 * span.speed, span.speed), ("exponent", 0.7, 2.3)]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        POSITIVE
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![
+            Reported::new("peak", fitted.scaled(fitted.term(0)), fitted.force),
+            Reported::new("speed", fitted.shape("speed"), format!("{}/s", fitted.length)),
+        ]
+    }
+    fn form_sd(&self, value: &str) -> f64 {
+        if value == "peak" { 0.2 } else { 0.18 }
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::QuadraticDrag).into_iter().collect()
+    }
+}

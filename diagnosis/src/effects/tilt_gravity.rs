@@ -1,0 +1,45 @@
+//! A weight that acts through the tilt, where the nominal model has none: `weight·sin(tilt)`.
+
+use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct Law;
+
+impl ForceLaw for Law {
+    fn names(&self) -> Vec<String> {
+        vec!["weight".into()]
+    }
+    fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
+        out[0] = state.tilt.sin();
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "a weight that acts through the tilt"
+    }
+    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law))
+    }
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        if span.tilt { vec![Effect::shaped(name, &[])] } else { Vec::new() }
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("weight", fitted.force.into())
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
+    }
+    fn variable(&self) -> &'static str {
+        "tilt"
+    }
+}

@@ -1,0 +1,52 @@
+//! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought in the residual.
+
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Reported, Span};
+use super::waves::{self, Waves};
+use super::{Effect, EffectName, Subsystem};
+
+pub(super) struct Defined;
+
+impl Definition for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "torque periodic in the angle and proportional to the command"
+    }
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Waves::new(effect, true)))
+    }
+    fn has_own_phase(&self) -> bool {
+        true
+    }
+    fn is_periodic(&self) -> bool {
+        true
+    }
+    fn scales_drive(&self) -> bool {
+        true
+    }
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
+        Vec::new()
+    }
+    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
+        // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
+        // hardly known, a ripple as large explains what cogging does.
+        let part = if allowed.is_anchored { 0.45 } else { 0.9 * allowed.gain_reach };
+        (-part * allowed.gain.abs(), part * allowed.gain.abs())
+    }
+    fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
+        waves::freedom(effect, recordings)
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        waves::report(fitted, true)
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
+    }
+    fn variable(&self) -> &'static str {
+        "command"
+    }
+}
