@@ -7,9 +7,10 @@ use crate::kinematics::{SpeedEstimator, moved};
 use crate::math::scaled;
 use crate::passivity::Observer;
 use crate::plan::Plan;
+use crate::runaway::{self, LOOK_TICKS};
 use crate::safety::Limiter;
-use crate::thermal::Winding;
-use crate::tissue::Tissue;
+use crate::thermal::{WARM_TICKS, Winding};
+use crate::tissue::{Response, Tissue};
 use crate::units::{
     Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
 };
@@ -18,9 +19,6 @@ use serde::{Deserialize, Serialize};
 
 /// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
 const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
-
-/// Where the tissue finds the tip during an excitation: nobody's hand is on the needle then, and nobody feels tissue.
-const OUTSIDE: (Counts, Millimetres) = (Counts(i32::MIN), Millimetres(I16F16::MIN));
 
 /// What the tick reads.
 #[derive(Clone, Copy, Debug, Default)]
@@ -103,6 +101,9 @@ pub struct Controller {
     limiter: Limiter,
     silent_ticks: u32,
     frozen_ticks: u32,
+    runaway: runaway::Watch,
+    /// Ticks, for what is done in one of eight only.
+    turn: u32,
     tripped: Option<Fault>,
 }
 
@@ -124,6 +125,13 @@ impl Mode {
 impl Controller {
     /// Torque off, waiting to be started.
     pub fn new(plan: Plan) -> Self {
+        Self::warm(plan, 0)
+    }
+
+    /// The same, with a motor that has the heat which [`Self::heat`] gave before a reset.
+    pub fn warm(plan: Plan, heat: u32) -> Self {
+        let mut winding = Winding::with_heat(heat);
+        winding.allow(&plan.thermal, plan.torque_limits.torque);
         Self {
             speed: SpeedEstimator::new(plan.config.speed, Counts(0)),
             plan,
@@ -133,10 +141,12 @@ impl Controller {
             previous: None,
             tissue: Tissue::default(),
             observer: Observer::default(),
-            winding: Winding::default(),
+            winding,
             limiter: Limiter::default(),
             silent_ticks: 0,
             frozen_ticks: 0,
+            runaway: runaway::Watch::default(),
+            turn: 0,
             tripped: None,
         }
     }
@@ -144,6 +154,11 @@ impl Controller {
     /// The plan in force.
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// The winding's heat in (mN·m)², in Q16: what must not be forgotten in a reset.
+    pub fn heat(&self) -> u32 {
+        self.winding.heat()
     }
 
     /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
@@ -167,6 +182,7 @@ impl Controller {
                 self.speed = SpeedEstimator::new(plan.config.speed, self.latest_count());
                 self.tissue = Tissue::default();
                 self.plan = plan;
+                self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque);
             }
             Order::Trip(fault) => self.trip(fault),
             Order::Start | Order::Stop | Order::Zero | Order::Configure(_) | Order::Excite(_) => {}
@@ -183,6 +199,7 @@ impl Controller {
         self.observer = Observer::new(self.plan.scale.depth(self.latest_count()));
         self.silent_ticks = 0;
         self.frozen_ticks = 0;
+        self.runaway = runaway::Watch::new(self.latest_count().0);
         self.mode = mode;
     }
 
@@ -191,14 +208,22 @@ impl Controller {
         let count = self.count(input.count);
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
-        let (tip, tip_depth) = if self.mode == Mode::Exciting { OUTSIDE } else { (count, depth) };
-        let tissue = self.tissue.tick(&self.plan.layers, tip, tip_depth, speed);
+        // Nobody's hand is on the needle during an excitation, and nobody feels tissue.
+        let tissue = match self.mode {
+            Mode::Exciting => Response::default(),
+            _ => self.tissue.tick(&self.plan.layers, count, depth, speed),
+        };
         self.watch_host();
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
             Some((wanted, limits)) => self.limit(wanted, limits),
             None => (MillinewtonMetres::default(), Limits::default()),
         };
-        self.winding.tick(&self.plan.thermal, torque);
+        self.winding.tick(torque);
+        // A tick in which walls give way is long enough.
+        let punctures = tissue.transitions.puncture;
+        if punctures & punctures.wrapping_sub(1) == 0 {
+            self.take_turn(count, torque);
+        }
         let dac = self.plan.dac.code(torque);
         let state = match self.mode {
             Mode::Running => tissue.state,
@@ -216,6 +241,25 @@ impl Controller {
             depth,
             speed,
             force: tissue.force,
+        }
+    }
+
+    /// What is slow enough to be done in one tick of eight, each in another one.
+    fn take_turn(&mut self, count: Counts, torque: MillinewtonMetres) {
+        const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8, "the turns below") };
+        self.turn = (self.turn + 1) % 8;
+        let fault = match self.turn {
+            0 => return self.winding.warm(&self.plan.thermal),
+            2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
+            4 => self.runaway.look(&self.plan.runaway, count.0),
+            5 => self.runaway.judge(&self.plan.runaway, torque.0),
+            6 => self.runaway.count_turns(),
+            _ => return,
+        };
+        if let Some(fault) = fault
+            && self.mode.is_powered()
+        {
+            self.trip(fault);
         }
     }
 
@@ -247,9 +291,11 @@ impl Controller {
         count
     }
 
-    /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead.
+    /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead. A count
+    /// up and down again is none: a live channel beside a dead one gives no more.
     fn is_frozen(&mut self, step: i32) -> bool {
-        let is_frozen = step == 0 && self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
+        let is_still = step == 0 || self.runaway.is_back(step);
+        let is_frozen = is_still && self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
         self.frozen_ticks = if is_frozen { self.frozen_ticks.saturating_add(1) } else { 0 };
         self.frozen_ticks > FROZEN_TICKS
     }
@@ -302,7 +348,7 @@ impl Controller {
 
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
         let most = self.plan.torque_limits.torque;
-        let allowed = self.winding.largest(&self.plan.thermal, most);
+        let allowed = self.winding.allowed();
         let held = wanted.0.min(allowed).max(-allowed);
         let mut limits = limits;
         if held != wanted.0 {

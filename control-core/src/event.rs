@@ -67,6 +67,50 @@ pub enum Fault {
     StoredConfig = 9,
     /// The encoder stands still although torque should move the motor.
     EncoderFrozen = 10,
+    /// The needle speeds up against the motor as no hand makes it: the motor's leads or the encoder's channels are swapped.
+    WrongWay = 11,
+    /// The needle is faster than a hand moves it.
+    Overspeed = 12,
+    /// Counts go to and fro and the needle does not get on: one of the encoder's channels is dead.
+    EncoderChannel = 13,
+    /// An encoder wire is off.
+    EncoderWire = 14,
+    /// The amplifier or its enable line is on although it was switched off.
+    AmplifierStuckOn = 15,
+    /// The amplifier says that it is not ready.
+    AmplifierNotReady = 16,
+    /// The motor's current is not the one that was asked for.
+    Current = 17,
+    /// The emergency stop.
+    EmergencyStop = 18,
+    /// The crystal stopped.
+    Clock = 19,
+}
+
+impl Fault {
+    /// All of them, each at the place of its number.
+    pub const ALL: [Self; 20] = [
+        Self::EncoderJump,
+        Self::Travel,
+        Self::HostSilent,
+        Self::Tilt,
+        Self::Overrun,
+        Self::LinkLost,
+        Self::Watchdog,
+        Self::Crash,
+        Self::Brownout,
+        Self::StoredConfig,
+        Self::EncoderFrozen,
+        Self::WrongWay,
+        Self::Overspeed,
+        Self::EncoderChannel,
+        Self::EncoderWire,
+        Self::AmplifierStuckOn,
+        Self::AmplifierNotReady,
+        Self::Current,
+        Self::EmergencyStop,
+        Self::Clock,
+    ];
 }
 
 impl fmt::Display for Fault {
@@ -83,6 +127,17 @@ impl fmt::Display for Fault {
             Fault::Brownout => "the supply dipped",
             Fault::StoredConfig => "the stored configuration was damaged and the default is in use",
             Fault::EncoderFrozen => "the encoder stands still although torque should move the motor",
+            Fault::WrongWay => {
+                "the needle sped up against the motor: the motor's leads or the encoder's channels are swapped"
+            }
+            Fault::Overspeed => "the needle is faster than a hand moves it",
+            Fault::EncoderChannel => "one of the encoder's channels is dead",
+            Fault::EncoderWire => "an encoder wire is off",
+            Fault::AmplifierStuckOn => "the amplifier is on although it was switched off",
+            Fault::AmplifierNotReady => "the amplifier is not ready",
+            Fault::Current => "the motor's current is not the one that was asked for",
+            Fault::EmergencyStop => "the emergency stop was pressed, or its wire is off",
+            Fault::Clock => "the crystal stopped",
         })
     }
 }
@@ -170,20 +225,10 @@ mod tests {
 
     #[test]
     fn each_fault_has_words_of_its_own() {
-        use Fault::*;
-        let faults = [
-            EncoderJump,
-            Travel,
-            HostSilent,
-            Tilt,
-            Overrun,
-            LinkLost,
-            Watchdog,
-            Crash,
-            Brownout,
-            StoredConfig,
-            EncoderFrozen,
-        ];
+        for (number, fault) in Fault::ALL.into_iter().enumerate() {
+            assert_eq!(fault as usize, number);
+        }
+        let faults = Fault::ALL;
         let words: BTreeSet<_> = faults.iter().map(ToString::to_string).collect();
         assert_eq!(words.len(), faults.len());
         assert!(words.iter().all(|word| word.len() > 10), "{words:?}");

@@ -7,6 +7,7 @@ use crate::friction::Law;
 use crate::jog;
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
 use crate::passivity::BounceDamping;
+use crate::runaway;
 use crate::safety::{DacScale, TorqueLimits};
 use crate::thermal::ThermalLimits;
 use crate::tissue::{self, Layers};
@@ -38,6 +39,7 @@ pub struct Plan {
     pub(crate) frozen_torque: U16F16,
     pub(crate) thermal: ThermalLimits,
     pub(crate) bounce_damping: BounceDamping,
+    pub(crate) runaway: runaway::Bounds,
     pub(crate) damping: I2F30,
     pub(crate) dac: DacScale,
     pub(crate) travel_counts: u32,
@@ -205,6 +207,11 @@ impl Plan {
             },
             frozen_torque: config.limits.torque.0.unsigned_abs() / FROZEN_TORQUE_SHARE,
             thermal: ThermalLimits::new(config.limits.continuous_torque, config.limits.winding_time_s),
+            runaway: runaway::Bounds::new(
+                mm_per_count,
+                config.device.roller_radius.0,
+                config.limits.max_counts_per_tick,
+            ),
             bounce_damping: BounceDamping::new(config.passivity_damping),
             damping: I2F30::saturating_from_num(config.damping.0),
             dac: DacScale::new(config.device.dac, config.device.full_scale_torque),

@@ -129,7 +129,7 @@ impl Default for Tissue {
 }
 
 /// What the tissue does to the needle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Response {
     pub(crate) force: Newtons,
     pub(crate) state: State,

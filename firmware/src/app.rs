@@ -39,9 +39,15 @@ mod app {
         let ends = context.local.queues.split();
         let parts = board::init(context.core, context.device, context.local.statics);
         let local = Local {
-            tick: Tick::new(parts.tick_timer, parts.encoder, parts.drive, &parts.plan, ends.tick),
+            tick: Tick::new(parts.tick_timer, parts.encoder, parts.drive, &parts.plan, parts.heat, ends.tick),
             supply: parts.supply,
-            supervisor: Watch::new(parts.watchdog, parts.debug),
+            supervisor: Watch::new(
+                parts.watchdog,
+                parts.debug,
+                parts.supply_level,
+                parts.encoder_lines,
+                parts.drive_lines,
+            ),
             usb: Port::new(parts.usb_device, parts.usb_class, ends.usb),
             telemetry: Telemetry::new(
                 parts.identity,

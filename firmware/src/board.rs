@@ -6,7 +6,10 @@
 //! | PA4 | motor set value, 12 bit (DAC 1) | shared with the audio codec, which is held in reset |
 //! | PD4 | codec reset | low for good |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
-//! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ |
+//! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ; read back |
+//! | PE4 | emergency stop: to ground while it may run | pulled up inside: a jumper where there is no stop |
+//! | PE5 | amplifier ready: low while it is | pulled up inside: a jumper where it has no such output |
+//! | PC2, PE6 | motor current, scaled as PA4 (ADC 2, channel 12); PE6 to ground where it is fitted | read at start-up |
 //! | PA5, PA6, PA7, PE3 | accelerometer: SCK, MISO, MOSI, select | on the board |
 //! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
 //! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
@@ -14,26 +17,28 @@
 //! | PD12 | green LED: running | on the board |
 
 mod crash;
+mod encoder;
 mod flash;
+mod monitors;
 mod outputs;
 pub(crate) mod usb;
 
-use crate::tasks::supply::{PVD_LINE, Supply};
+use crate::tasks::supply::{PVD_LINE, Supply, SupplyLevel};
 use control_core::event::Fault;
-use control_core::units::Counts;
 use control_core::{Config, Plan};
+pub(crate) use encoder::{Encoder, EncoderLines};
 use firmware::drive::{Drive, ParallelDac};
-use firmware::reset::{ResetFlags, cause};
+use firmware::reset::{ResetFlags, Said, cause};
 use firmware::store::{Store, Stored};
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
 use link::device::Identity;
+pub(crate) use monitors::DriveLines;
 use outputs::{InclinometerPin, Lines, OnChipDac};
 use stm32f4xx_hal::gpio::{Output, PD7, PE3};
 use stm32f4xx_hal::otg_fs::USB;
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::qei::Qei;
 use stm32f4xx_hal::rcc::{self, Enable, Rcc, Reset};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
@@ -62,6 +67,8 @@ impl Statics {
 pub(crate) struct Parts {
     pub(crate) tick_timer: TickTimer,
     pub(crate) encoder: Encoder,
+    pub(crate) encoder_lines: EncoderLines,
+    pub(crate) drive_lines: DriveLines,
     pub(crate) drive: BoardDrive,
     pub(crate) tilt: BoardTilt,
     pub(crate) usb_device: UsbDevice<'static, usb::Bus>,
@@ -69,8 +76,10 @@ pub(crate) struct Parts {
     pub(crate) watchdog: IndependentWatchdog,
     pub(crate) debug: pac::DBGMCU,
     pub(crate) supply: Supply,
+    pub(crate) supply_level: SupplyLevel,
     pub(crate) store: BoardStore,
     pub(crate) plan: Plan,
+    pub(crate) heat: u32,
     pub(crate) identity: Identity,
     pub(crate) reset_cause: Option<Fault>,
 }
@@ -83,6 +92,7 @@ pub(crate) fn init(
     statics: &'static mut Statics,
 ) -> Parts {
     let flags = reset_flags(&device.RCC);
+    crash::wait_for_crystal(&device.RCC);
     let mut rcc = device.RCC.freeze(
         rcc::Config::hse(timing::CRYSTAL_HZ.Hz())
             .sysclk(timing::CORE_HZ.Hz())
@@ -107,7 +117,10 @@ pub(crate) fn init(
     let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), &mut rcc));
     let drive = Drive::new(dac, ParallelDac(lines), enable);
 
-    let is_analogue = gpiob.pb1.into_pull_down_input().is_high();
+    let strap = gpiob.pb1.into_pull_down_input();
+    // Whatever charge the pin had, its pull has taken away by then.
+    cortex_m::asm::delay(timing::PULL_SETTLE_CYCLES);
+    let is_analogue = strap.is_high();
     let tilt = if is_analogue {
         BoardTilt::Analogue(Inclinometer::new(InclinometerPin::new(
             device.ADC1,
@@ -121,7 +134,9 @@ pub(crate) fn init(
         BoardTilt::OnBoard(Accelerometer::new(bus, gpioe.pe3.into_push_pull_output()))
     };
 
-    let encoder = Encoder(device.TIM2.qei((gpioa.pa15.into_input(), gpioa.pa1), &mut rcc));
+    let drive_lines =
+        DriveLines::new((gpioe.pe4, gpioe.pe5, gpioe.pe6), (device.ADC2, gpioc.pc2.into_analog()), &mut rcc);
+    let (encoder, encoder_lines) = encoder::init(device.TIM2, gpioa.pa15, gpioa.pa1, &mut rcc);
 
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
@@ -129,10 +144,10 @@ pub(crate) fn init(
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     gpiod.pd12.into_push_pull_output().set_high();
 
-    let (crash, torque_was_on) = crate::tasks::shared::LAST_WORDS.take();
+    let Said { crash, torque, heat } = crate::tasks::shared::LAST_WORDS.take();
     let (store, stored) = Store::open(flash::Sectors::new(device.FLASH));
     let (plan, damage) = plan(&stored);
-    let reset_cause = cause(flags, crash, torque_was_on).or(damage);
+    let reset_cause = cause(flags, crash, torque).or(damage);
     match crash {
         Some(crash) => {
             defmt::warn!("last run ended: kind {}, detail {=u32:#x}", crash.kind as u8, crash.detail)
@@ -150,7 +165,7 @@ pub(crate) fn init(
         &mut statics.usb,
     );
 
-    let supply = supply_warning(device.PWR, device.EXTI, &mut rcc);
+    let (supply, supply_level) = supply_warning(device.PWR, device.EXTI, &mut rcc);
     let mut systick = core.SYST;
     systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
     systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);
@@ -165,6 +180,8 @@ pub(crate) fn init(
     Parts {
         tick_timer: TickTimer::start(device.TIM4, &mut rcc),
         encoder,
+        encoder_lines,
+        drive_lines,
         drive,
         tilt,
         usb_device,
@@ -172,8 +189,10 @@ pub(crate) fn init(
         watchdog,
         debug: device.DBGMCU,
         supply,
+        supply_level,
         store,
         plan,
+        heat,
         identity: Identity { serial: serial_number(), firmware: version() },
         reset_cause,
     }
@@ -209,15 +228,15 @@ fn reset_flags(rcc: &pac::RCC) -> ResetFlags {
 
 /// An interrupt when the supply falls below 2.66 V. This board's rail is a diode below 3.3 V, 2.9 V where people have
 /// measured it: the thresholds above this one would never see it healthy.
-fn supply_warning(pwr: pac::PWR, exti: pac::EXTI, rcc: &mut Rcc) -> Supply {
+fn supply_warning(pwr: pac::PWR, exti: pac::EXTI, rcc: &mut Rcc) -> (Supply, SupplyLevel) {
     const FALLING_2V66: u8 = 4;
     pac::PWR::enable(rcc);
-    // Three bits: any value is one.
-    pwr.cr().modify(|_, w| w.pls().set(FALLING_2V66).pvde().set_bit());
     const { assert!(PVD_LINE == 16) };
     exti.rtsr().modify(|_, w| w.tr16().set_bit());
     exti.imr().modify(|_, w| w.mr16().set_bit());
-    Supply(exti)
+    // Three bits: any value is one.
+    pwr.cr().modify(|_, w| w.pls().set(FALLING_2V66).pvde().set_bit());
+    (Supply(exti), SupplyLevel(pwr))
 }
 
 /// Version of this crate.
@@ -240,16 +259,6 @@ fn serial_number() -> [u8; 12] {
     let lot = uid.lot_num().as_bytes();
     serial[5..].iter_mut().zip(lot).for_each(|(place, &byte)| *place = byte);
     serial
-}
-
-/// TIM2 in encoder mode.
-pub(crate) struct Encoder(Qei<pac::TIM2>);
-
-impl Encoder {
-    /// The count, which wraps with 32 bits.
-    pub(crate) fn count(&self) -> Counts {
-        Counts(self.0.count().cast_signed())
-    }
 }
 
 /// Core cycles of a count of the tick's timer.

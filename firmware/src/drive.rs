@@ -12,10 +12,8 @@ pub trait MotorDac {
     const WIDTH: DacWidth;
 
     /// Puts out `code`, which lies within [`Self::WIDTH`]. Called from the tick: takes a few bus cycles and never waits.
+    /// Where codes wait for an instant set by hardware, one that has missed it gives way to the next tick's.
     fn put(&mut self, code: DacCode);
-
-    /// Where codes wait for an instant set by hardware: the one that missed it goes out now.
-    fn hurry(&mut self) {}
 
     /// Zero torque.
     fn put_zero_torque(&mut self) {
@@ -76,12 +74,6 @@ impl<D12: MotorDac, D8: MotorDac, E: OutputPin> Drive<D12, D8, E> {
         }
     }
 
-    /// The code came too late for the instant at which it was to go out: it goes out now.
-    pub fn hurry(&mut self) {
-        self.twelve.hurry();
-        self.eight.hurry();
-    }
-
     /// Amplifier off, then zero torque.
     pub fn off(&mut self) {
         let _ = self.enable.set_low();
@@ -112,7 +104,6 @@ mod tests {
         Twelve(u16),
         Eight(u8),
         Enable(bool),
-        Hurry,
     }
 
     struct Twelve<'a>(&'a RefCell<Vec<Write>>);
@@ -120,10 +111,6 @@ mod tests {
         const WIDTH: DacWidth = DacWidth::Bits12;
         fn put(&mut self, code: DacCode) {
             self.0.borrow_mut().push(Write::Twelve(code.0));
-        }
-
-        fn hurry(&mut self) {
-            self.0.borrow_mut().push(Write::Hurry);
         }
     }
 
@@ -173,15 +160,6 @@ mod tests {
         drive.apply(DacWidth::Bits12, &output(false, 2060));
         assert_eq!(writes.take(), off);
         assert!(!drive.is_enabled());
-    }
-
-    #[test]
-    fn a_late_code_is_hurried_out_by_the_converter_that_waits() {
-        let writes = RefCell::new(vec![]);
-        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
-        writes.take();
-        drive.hurry();
-        assert_eq!(writes.take(), [Write::Hurry]);
     }
 
     #[test]

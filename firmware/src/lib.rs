@@ -11,6 +11,8 @@
 extern crate std;
 
 pub mod drive;
+pub mod lines;
+pub mod monitor;
 pub mod reset;
 pub mod stages;
 pub mod store;

@@ -29,11 +29,13 @@ pub enum CrashKind {
     StrayInterrupt = 3,
     /// A task hung; the detail is its number.
     HungTask = 4,
+    /// The crystal stopped; the detail is the state of its clock.
+    Clock = 5,
 }
 
 impl CrashKind {
     fn from_code(code: u32) -> Option<Self> {
-        [Self::Panic, Self::HardFault, Self::StrayInterrupt, Self::HungTask]
+        [Self::Panic, Self::HardFault, Self::StrayInterrupt, Self::HungTask, Self::Clock]
             .into_iter()
             .find(|kind| *kind as u32 == code)
     }
@@ -52,6 +54,18 @@ pub struct Crash {
 pub struct LastWords {
     crash: [AtomicU32; 3],
     torque: [AtomicU32; 2],
+    heat: [AtomicU32; 2],
+}
+
+/// What was said before a reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Said {
+    /// Why the program gave up, if it did.
+    pub crash: Option<Crash>,
+    /// Whether torque was on.
+    pub torque: bool,
+    /// The winding's heat as `Controller::heat` gave it; 0 where nobody knows.
+    pub heat: u32,
 }
 
 const CRASH_MARK: u32 = 0x5AFE_C4A5;
@@ -66,7 +80,11 @@ impl Default for LastWords {
 impl LastWords {
     /// Nothing said.
     pub const fn new() -> Self {
-        Self { crash: [const { AtomicU32::new(0) }; 3], torque: [const { AtomicU32::new(0) }; 2] }
+        Self {
+            crash: [const { AtomicU32::new(0) }; 3],
+            torque: [const { AtomicU32::new(0) }; 2],
+            heat: [const { AtomicU32::new(0) }; 2],
+        }
     }
 
     /// Leaves word of a crash. The first one counts: what follows is a consequence.
@@ -99,9 +117,21 @@ impl LastWords {
         word.load(Relaxed) == TORQUE_MARK && inverse.load(Relaxed) == !TORQUE_MARK
     }
 
-    /// What was said before the reset; forgets it.
-    pub fn take(&self) -> (Option<Crash>, bool) {
-        let said = (self.crashed(), self.torque_was_on());
+    /// How warm the motor's winding is, from now on. A motor does not cool in a reset.
+    pub fn heat(&self, heat: u32) {
+        let [word, inverse] = &self.heat;
+        word.store(heat, Relaxed);
+        inverse.store(!heat, Relaxed);
+    }
+
+    fn heat_was(&self) -> u32 {
+        let [word, inverse] = self.heat.each_ref().map(|word| word.load(Relaxed));
+        if inverse == !word { word } else { 0 }
+    }
+
+    /// What was said before the reset; forgets it, but for the heat.
+    pub fn take(&self) -> Said {
+        let said = Said { crash: self.crashed(), torque: self.torque_was_on(), heat: self.heat_was() };
         self.crash[0].store(0, Relaxed);
         self.torque(false);
         said
@@ -113,6 +143,8 @@ pub fn cause(flags: ResetFlags, crash: Option<Crash>, torque_was_on: bool) -> Op
     let hung = crash.is_some_and(|crash| crash.kind == CrashKind::HungTask);
     if hung || (flags.watchdog && crash.is_none()) {
         Some(Fault::Watchdog)
+    } else if crash.is_some_and(|crash| crash.kind == CrashKind::Clock) {
+        Some(Fault::Clock)
     } else if crash.is_some() {
         Some(Fault::Crash)
     } else if flags.software {
@@ -129,42 +161,52 @@ pub fn cause(flags: ResetFlags, crash: Option<Crash>, torque_was_on: bool) -> Op
 mod tests {
     use super::*;
 
+    const NOTHING: Said = Said { crash: None, torque: false, heat: 0 };
     const PANIC: Crash = Crash { kind: CrashKind::Panic, detail: 42 };
 
     #[test]
     fn last_words_survive_and_are_said_once() {
         let words = LastWords::new();
-        assert_eq!(words.take(), (None, false));
+        assert_eq!(words.take(), NOTHING);
         words.crash(PANIC);
         words.torque(true);
+        words.heat(77);
         words.crash(Crash { kind: CrashKind::HardFault, detail: 1 });
-        assert_eq!(words.take(), (Some(PANIC), true));
-        assert_eq!(words.take(), (None, false));
+        assert_eq!(words.take(), Said { crash: Some(PANIC), torque: true, heat: 77 });
+        assert_eq!(words.take(), Said { heat: 77, ..NOTHING }, "a motor does not cool by being asked");
+        words.heat[1].fetch_xor(1, Relaxed);
+        assert_eq!(words.take(), NOTHING);
     }
 
     #[test]
     fn every_kind_of_crash_survives_whole_or_not_at_all() {
-        let kinds = [CrashKind::Panic, CrashKind::HardFault, CrashKind::StrayInterrupt, CrashKind::HungTask];
+        let kinds = [
+            CrashKind::Panic,
+            CrashKind::HardFault,
+            CrashKind::StrayInterrupt,
+            CrashKind::HungTask,
+            CrashKind::Clock,
+        ];
         for crash in kinds.map(|kind| Crash { kind, detail: 0x0800_1235 }) {
             let words = LastWords::new();
             words.crash(crash);
-            assert_eq!(words.take(), (Some(crash), false));
+            assert_eq!(words.take(), Said { crash: Some(crash), ..NOTHING });
             for word in 0..3 {
                 for bit in 0..32 {
                     words.crash(crash);
                     words.crash[word].fetch_xor(1 << bit, Relaxed);
-                    assert_eq!(words.take().0, None, "{crash:?}, bit {bit} of word {word}");
+                    assert_eq!(words.take().crash, None, "{crash:?}, bit {bit} of word {word}");
                 }
             }
         }
         let words = LastWords::new();
         words.torque(true);
         words.torque(false);
-        assert_eq!(words.take(), (None, false));
+        assert_eq!(words.take(), NOTHING);
         for word in 0..2 {
             words.torque(true);
             words.torque[word].fetch_xor(1 << 9, Relaxed);
-            assert_eq!(words.take(), (None, false));
+            assert_eq!(words.take(), NOTHING);
         }
     }
 
@@ -175,7 +217,8 @@ mod tests {
         for noise in [u32::MAX, 0xAAAA_AAAA, 1, CRASH_MARK] {
             words.crash.iter().for_each(|word| word.store(noise, Relaxed));
             words.torque.iter().for_each(|word| word.store(noise, Relaxed));
-            assert_eq!(words.take(), (None, false), "{noise:#x}");
+            words.heat.iter().for_each(|word| word.store(noise, Relaxed));
+            assert_eq!(words.take(), NOTHING, "{noise:#x}");
         }
     }
 
@@ -193,6 +236,8 @@ mod tests {
         assert_eq!(cause(watchdog, None, true), Some(Fault::Watchdog));
         assert_eq!(cause(watchdog, Some(hung), true), Some(Fault::Watchdog));
         assert_eq!(cause(software, Some(PANIC), true), Some(Fault::Crash));
+        let clock = Crash { kind: CrashKind::Clock, detail: 0 };
+        assert_eq!(cause(software, Some(clock), true), Some(Fault::Clock));
         // A crash whose own reset did not come and that the watchdog ended.
         assert_eq!(cause(watchdog, Some(PANIC), true), Some(Fault::Crash));
         assert_eq!(cause(software, None, true), None);

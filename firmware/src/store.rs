@@ -1,7 +1,7 @@
 //! The configuration in flash: two slots (sectors), each a row of cells, a cell for each configuration ever saved. A cell
 //! is written once, its last word last; losing power at any point leaves the configuration that was or the one that
-//! comes, never a mixture. A slot is erased only at start-up, before the tick and the watchdog run: an erasure stops the
-//! processor for a second or two.
+//! comes, never a mixture. A slot is erased at start-up, before the tick and the watchdog run, and where no cell is left:
+//! an erasure stops the processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
 
 use control_core::Config;
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -103,12 +103,16 @@ impl<F: ConfigFlash> Store<F> {
         (store, stored)
     }
 
-    /// Saves `config` unless it is what was saved last. Takes as long as the flash takes for its words.
+    /// Saves `config` unless it is what was saved last. Takes as long as the flash takes for its words; where no cell is
+    /// left, as long as an erasure.
     pub fn save(&mut self, config: &Config) -> Result<(), StoreError> {
         if let Some((cell, _)) = self.newest
             && self.payload(cell) == Some(Stored::Config(config.clone()))
         {
             return Ok(());
+        }
+        if self.next_cell >= F::CELLS {
+            self.make_room()?;
         }
         if self.next_cell >= F::CELLS {
             return Err(StoreError::Full);

@@ -3,6 +3,7 @@
 
 use crate::timing;
 use control_core::event::Fault;
+use control_core::interlock::{Interlock, Interlocks};
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// A task that reports.
@@ -86,27 +87,14 @@ impl Supervisor {
 
 /// Faults that tasks below the tick have found, on their way to it: a bit each.
 #[derive(Default)]
-pub struct Trips(AtomicU16);
+pub struct Trips(AtomicU32);
 
-/// Each fault at the place of its number.
-const FAULTS: [Fault; 11] = [
-    Fault::EncoderJump,
-    Fault::Travel,
-    Fault::HostSilent,
-    Fault::Tilt,
-    Fault::Overrun,
-    Fault::LinkLost,
-    Fault::Watchdog,
-    Fault::Crash,
-    Fault::Brownout,
-    Fault::StoredConfig,
-    Fault::EncoderFrozen,
-];
+const _: () = assert!(Fault::ALL.len() <= 32, "a bit each");
 
 impl Trips {
     /// None.
     pub const fn new() -> Self {
-        Self(AtomicU16::new(0))
+        Self(AtomicU32::new(0))
     }
 
     /// Asks the tick to take torque away.
@@ -122,7 +110,33 @@ impl Trips {
     /// The fault with the lowest number; the others of the same moment follow from it and are forgotten.
     pub fn take(&self) -> Option<Fault> {
         let raised = self.0.swap(0, Relaxed);
-        FAULTS.get(raised.trailing_zeros() as usize).copied()
+        Fault::ALL.get(raised.trailing_zeros() as usize).copied()
+    }
+}
+
+/// The conditions under which no torque is given, as the tasks that see them say; read by the tick and by telemetry.
+#[derive(Default)]
+pub struct Conditions(AtomicU16);
+
+impl Conditions {
+    /// None.
+    pub const fn new() -> Self {
+        Self(AtomicU16::new(0))
+    }
+
+    /// `interlock` is on or off from now on.
+    pub fn set(&self, interlock: Interlock, is_on: bool) {
+        let bit = Interlocks::of(interlock).0;
+        match (self.0.load(Relaxed) & bit != 0, is_on) {
+            (false, true) => drop(self.0.fetch_or(bit, Relaxed)),
+            (true, false) => drop(self.0.fetch_and(!bit, Relaxed)),
+            _ => {}
+        }
+    }
+
+    /// All that are on.
+    pub fn get(&self) -> Interlocks {
+        Interlocks(self.0.load(Relaxed))
     }
 }
 
@@ -161,7 +175,7 @@ mod tests {
 
     #[test]
     fn every_fault_arrives_as_itself() {
-        for fault in FAULTS {
+        for fault in Fault::ALL {
             let trips = Trips::new();
             assert!(trips.is_empty());
             trips.raise(fault);
@@ -170,6 +184,21 @@ mod tests {
             assert!(trips.is_empty());
             assert_eq!(trips.take(), None);
         }
+    }
+
+    #[test]
+    fn a_condition_lasts_until_it_is_taken_back() {
+        let conditions = Conditions::new();
+        assert_eq!(conditions.get().first(), None);
+        for _ in 0..2 {
+            conditions.set(Interlock::EncoderWire, true);
+            conditions.set(Interlock::Supply, true);
+        }
+        assert_eq!(conditions.get().first(), Some(Interlock::Supply));
+        conditions.set(Interlock::Supply, false);
+        assert_eq!(conditions.get().first(), Some(Interlock::EncoderWire));
+        conditions.set(Interlock::EncoderWire, false);
+        assert_eq!(conditions.get().first(), None);
     }
 
     #[test]

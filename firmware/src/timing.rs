@@ -59,6 +59,21 @@ pub const SUPERVISOR_SILENCE_TICKS: u32 = 50;
 /// several periods of the supervisor, and 18.8 ms, still within the 20 ms for a hung task.
 pub const WATCHDOG_MS: u32 = 10;
 
+/// The same while a sector of flash is erased, which stops the processor for up to 2 s: 5 s lie between 3.4 and 9.4 s.
+/// Torque is off then.
+pub const WATCHDOG_ERASE_MS: u32 = 5_000;
+
+/// Longest wait for the watchdog to take another time, in turns of a loop that reads a register: ten cycles of its clock
+/// take 0.6 ms at most. One that does not run has no clock and never takes it: then it is not needed either.
+pub const WATCHDOG_SETTLE_TURNS: u32 = 20_000;
+
+/// A pull of 40 kΩ and a wire of 200 pF: 8 µs to the level at which an input changes. Wait this long, in cycles: 20 µs.
+pub const PULL_SETTLE_CYCLES: u32 = CORE_HZ / 50_000;
+
+/// Filter of the encoder's inputs (RM0090 18.4.7, ICxF): eight samples at a quarter of the timer's clock, 0.38 µs. A glitch from
+/// the motor's PWM leads is shorter; an edge of a needle at 1 m/s lasts 31 µs.
+pub const ENCODER_FILTER: u8 = 0b0111;
+
 /// Readings that fail in a row before the tilt sensor counts as broken: 50 ms. One bad transfer is no reason to drop torque.
 pub const TILT_BAD_READINGS: u32 = 10;
 

@@ -24,6 +24,7 @@ export function words(event, layers) {
     case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
     case "exit": return `Needle out of ${article(name)}`;
     case "fault": return `Fault, torque off: ${event.cause}`;
+    case "not_saved": return capital(event.cause);
     case "started": return "Started, torque fades in";
     case "stopped": return "Stopped, torque off";
     default: return null; // limits have lamps

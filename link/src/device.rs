@@ -4,10 +4,11 @@
 use crate::codec::{self, Decoder, MAX_FRAME};
 use crate::frames::{
     Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
-    PROTOCOL_VERSION, Pose, Rejection, SampleBlock, Timing,
+    PROTOCOL_VERSION, Pose, Rejection, SampleBlock, SaveFailure, Timing,
 };
 use control_core::config::Tissue;
 use control_core::event::{Fault, Limits};
+use control_core::interlock::Interlocks;
 use control_core::{Order, Plan, TICK_HZ, TickOutput};
 use heapless::{Deque, HistoryBuf};
 
@@ -42,6 +43,7 @@ pub struct Endpoint {
     in_session: bool,
     powered: bool,
     start_ordered: bool,
+    interlocks: Interlocks,
     limits: Limits,
     fault: Option<Fault>,
     sequence: u32,
@@ -68,6 +70,7 @@ impl Endpoint {
             in_session: false,
             powered: false,
             start_ordered: false,
+            interlocks: Interlocks::default(),
             limits: Limits::default(),
             fault: reset_cause,
             sequence: 0,
@@ -99,9 +102,11 @@ impl Endpoint {
         self.orders.pop_front()
     }
 
-    /// The PC is gone: nothing waits for it any longer, and half a command is forgotten.
+    /// The PC is gone: nothing waits for it any longer, and what it asked for and was not yet done is forgotten.
     pub fn disconnect(&mut self) {
         self.in_session = false;
+        self.start_ordered = false;
+        self.orders.clear();
         self.decoder = Decoder::default();
         self.forget_waiting();
     }
@@ -109,6 +114,16 @@ impl Endpoint {
     /// Whether a PC has said hello and is listening.
     pub fn in_session(&self) -> bool {
         self.in_session
+    }
+
+    /// What keeps the device from being started, from now on.
+    pub fn set_interlocks(&mut self, interlocks: Interlocks) {
+        self.interlocks = interlocks;
+    }
+
+    /// The configuration in force was not saved.
+    pub fn not_saved(&mut self, tick: u64, cause: SaveFailure) {
+        self.event(tick, EventKind::NotSaved { cause });
     }
 
     /// Takes what a tick gave. `tick` counts from power-on without a gap.
@@ -242,6 +257,7 @@ impl Endpoint {
                 self.order(Order::Stop)
             }
             Command::Start => {
+                self.may_start()?;
                 self.order(Order::Start)?;
                 self.start_ordered = true;
                 self.fault = None;
@@ -251,6 +267,7 @@ impl Endpoint {
             Command::Zero => self.order(Order::Zero),
             Command::Excite(excitation) => {
                 excitation.check(&self.plan).map_err(Rejection::Config)?;
+                self.may_start()?;
                 self.order(Order::Excite(excitation))?;
                 self.start_ordered = true;
                 self.fault = None;
@@ -265,6 +282,14 @@ impl Endpoint {
                 Ok(())
             }
         }
+    }
+
+    /// Torque is given to a PC that listens, and under no interlock.
+    fn may_start(&self) -> Result<(), Rejection> {
+        if !self.in_session {
+            return Err(Rejection::NoSession);
+        }
+        self.interlocks.first().map_or(Ok(()), |interlock| Err(Rejection::Interlocked(interlock)))
     }
 
     fn order(&mut self, order: Order) -> Result<(), Rejection> {

@@ -4,6 +4,7 @@ use control_core::config::{Config, DacWidth};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::excitation::Excitation;
+use control_core::interlock::Interlock;
 use control_core::plan::Refusal;
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
 use fixed::types::I2F30;
@@ -133,6 +134,33 @@ pub enum EventKind {
     Started,
     /// Torque off at a person's wish.
     Stopped,
+    /// The configuration is in force, but will be lost at the next reset.
+    NotSaved { cause: SaveFailure },
+}
+
+/// Why a configuration was not saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SaveFailure {
+    /// The flash did not take what it was given, or did not keep it.
+    Flash,
+    /// No room was left, and none could be made.
+    Full,
+    /// It is longer than what the flash holds of one.
+    TooLong,
+}
+
+impl core::fmt::Display for SaveFailure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            SaveFailure::Flash => {
+                "the configuration was not saved, for the flash did not keep it: send it again, or replace the board"
+            }
+            SaveFailure::Full => {
+                "the configuration was not saved, for there is no room: restart the device and send it again"
+            }
+            SaveFailure::TooLong => "the configuration was not saved, for it is too long: use fewer layers",
+        })
+    }
 }
 
 /// Times of the stages, in cycles of the device's clock.
@@ -197,6 +225,10 @@ pub enum Rejection {
     Version,
     /// The device has no room for another command; send it again.
     Full,
+    /// Nobody has said hello on this line: torque is given only to a PC that listens.
+    NoSession,
+    /// Something keeps the device from being started.
+    Interlocked(Interlock),
 }
 
 impl core::fmt::Display for Rejection {
@@ -208,6 +240,8 @@ impl core::fmt::Display for Rejection {
                 write!(f, "the device speaks protocol {PROTOCOL_VERSION}; update the older side")
             }
             Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
+            Rejection::NoSession => f.write_str("nobody has said hello to the device; connect to it first"),
+            Rejection::Interlocked(interlock) => interlock.fmt(f),
         }
     }
 }

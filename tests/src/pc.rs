@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use control_core::controller::Sample;
 use link::codec::MAX_FRAME;
-use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Timing};
+use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
 use link::host::{Commands, Counts, Reception};
 use link::{Command, DeviceFrame};
 
@@ -135,6 +135,15 @@ impl Pc {
             }
         }
         panic!("no answer to command {id} within {ANSWER_MS} ms");
+    }
+
+    /// Sends a command that the device refuses; why.
+    ///
+    /// # Panics
+    ///
+    /// When it does not refuse or does not answer.
+    pub fn must_not(&mut self, board: &mut Board, command: Command) -> Rejection {
+        self.command(board, command).result.expect_err("the device refuses")
     }
 
     /// Sends a command that the device has to carry out.

@@ -6,8 +6,8 @@ use crate::shell::{self, Failure};
 use crate::stack;
 use std::path::{Path, PathBuf};
 
-/// More is refused: a sector of 128 KiB, the project's own bound.
-const LARGEST_FLASH: u32 = 128 * 1024;
+/// More is refused: 192 KiB, the project's own bound.
+const LARGEST_FLASH: u32 = 192 * 1024;
 /// Where the microcontroller has its memories.
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x2002_0000;
 

@@ -11,6 +11,10 @@ pub(crate) struct Twin {
     anchor: f64,
     given: f64,
     heat: f64,
+    /// Sum of the squared torques of up to eight ticks that have not warmed the winding yet.
+    squared: f64,
+    /// The largest torque that the heat allowed when it was last asked.
+    allowed: f64,
     /// What of the heat the places make that forces lose: half of the last one of each wall, of friction and of damping.
     heat_doubt: f64,
     ticks: u32,
@@ -41,6 +45,8 @@ impl Twin {
             anchor: 0.0,
             given: 0.0,
             heat: 0.0,
+            squared: 0.0,
+            allowed: f64::MAX,
             heat_doubt: 0.0,
             ticks: 0,
             counts: Vec::new(),
@@ -57,14 +63,23 @@ impl Twin {
         let force = force + speed * self.config.damping.0.to_num::<f64>();
         let device = self.config.device;
         let limits = self.config.limits;
-        let largest = self.largest_torque();
+        let largest = self.allowed.min(self.config.limits.torque.0.to_num());
         let wanted = (-force * device.roller_radius.0.to_num::<f64>()).clamp(-largest, largest);
         self.ticks += 1;
         let faded = wanted * (f64::from(self.ticks) / (f64::from(limits.fade_in_ms) * 10.0)).min(1.0);
         let slew = limits.slew_per_tick.0.to_num::<f64>();
         self.given = faded.clamp(self.given - slew, self.given + slew);
         let seconds = f64::from(limits.winding_time_s);
-        self.heat += (self.given * self.given - self.heat) / (seconds * 10_000.0);
+        // In one tick of eight each, as the controller does.
+        self.squared += self.given * self.given;
+        match self.ticks % 8 {
+            0 => {
+                let mean = std::mem::take(&mut self.squared) / 8.0;
+                self.heat += (mean - self.heat) * 8.0 / (seconds * 10_000.0);
+            }
+            2 => self.allowed = self.largest_torque(),
+            _ => {}
+        }
         let lost = 0.5 / 65_536.0 * (self.layers.len() + 2) as f64 * device.roller_radius.0.to_num::<f64>();
         self.heat_doubt += (2.0 * self.given.abs() * lost - self.heat_doubt) / (seconds * 10_000.0);
         let span = f64::from(device.dac.span());
@@ -74,7 +89,7 @@ impl Twin {
     /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat limits. The limit falls over a
     /// fifth of the heat, so that where a weak motor hangs on a strong amplifier the last places of long ago show.
     pub(crate) fn steps_of_heat(&self) -> f64 {
-        let (most, largest) = (self.config.limits.torque.0.to_num::<f64>(), self.largest_torque());
+        let (most, largest) = (self.config.limits.torque.0.to_num::<f64>(), self.allowed);
         if largest >= most {
             return 0.0;
         }

@@ -9,7 +9,7 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use firmware::reset::{Crash, CrashKind};
-use stm32f4xx_hal::pac::{DAC, GPIOD, GPIOE};
+use stm32f4xx_hal::pac::{DAC, GPIOD, GPIOE, RCC};
 
 /// PD7, the amplifier's enable, off.
 const ENABLE_OFF: u32 = 1 << (7 + 16);
@@ -24,9 +24,12 @@ fn safe_state() {
     // are still inputs and the external pull-down holds the amplifier off.
     unsafe {
         (*GPIOD::ptr()).bsrr().write(|w| w.bits(ENABLE_OFF));
-        // Without its trigger the converter takes the code at once.
-        (*DAC::ptr()).cr().write(|w| w.en1().set_bit());
-        (*DAC::ptr()).dhr12r1().write(|w| w.bits(DacWidth::Bits12.mid_scale().into()));
+        // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out (14.3.4).
+        let mid_scale = DacWidth::Bits12.mid_scale().into();
+        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit());
+        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
+        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit().en1().set_bit());
+        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
         (*GPIOE::ptr()).bsrr().write(|w| w.bits(LINES_ZERO_TORQUE));
     }
 }
@@ -40,6 +43,22 @@ fn end(kind: CrashKind, detail: u32) -> ! {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     end(CrashKind::Panic, info.location().map_or(0, |place| place.line()))
+}
+
+/// The crystal has stopped while its clock security (RM0090 7.2.7) watched; the core goes on, on its own oscillator.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    // SAFETY: interrupts cannot mask this one; nobody else runs any more.
+    let state = unsafe { &*RCC::ptr() }.cr().read().bits();
+    end(CrashKind::Clock, state)
+}
+
+/// Has the clock security watch the crystal once it runs. One that never comes leaves the device here, its pins inputs and
+/// the amplifier held off by its pull-down, until a person looks: without the crystal there is neither USB nor a tick.
+pub(crate) fn wait_for_crystal(rcc: &RCC) {
+    rcc.cr().modify(|_, w| w.hseon().set_bit());
+    while rcc.cr().read().hserdy().bit_is_clear() {}
+    rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
 /// An interrupt that no task serves.

@@ -5,7 +5,7 @@ use crate::tasks::shared::REPORTS;
 use firmware::store::{CELL_WORDS, ConfigFlash, Slot, StoreError};
 use firmware::supervision::Task;
 use firmware::timing;
-use stm32f4xx_hal::pac::FLASH;
+use stm32f4xx_hal::pac::{FLASH, IWDG, RCC};
 
 /// Words of a sector: 128 KiB.
 const SECTOR_WORDS: usize = 128 * 1024 / 4;
@@ -59,6 +59,39 @@ impl Sectors {
     }
 }
 
+/// A time of the independent watchdog: the code of its prescaler, the divider that it stands for, and ms.
+type WatchdogTime = (u8, u32, u32);
+/// While the flash is written word by word, and always else.
+const ALERT: WatchdogTime = (0b000, 4, timing::WATCHDOG_MS);
+/// While a sector is erased.
+const PATIENT: WatchdogTime = (0b100, 64, timing::WATCHDOG_ERASE_MS);
+
+/// Gives the independent watchdog another time and feeds it. Its registers cross into the domain of its slow clock, which
+/// takes five cycles of it; until then they take no other value (RM0090 21.4.4).
+fn watchdog((prescaler, divider, ms): WatchdogTime) {
+    const OPEN: u16 = 0x5555;
+    const FEED: u16 = 0xAAAA;
+    const SLOW_CLOCK_KHZ: u32 = 32;
+    // SAFETY: two reads, and writes to registers that the watchdog's owner, who only feeds it, leaves alone.
+    let (iwdg, rcc) = unsafe { (&*IWDG::ptr(), &*RCC::ptr()) };
+    // Before the watchdog is started there is nothing to change: its clock runs from then on (RM0090 7.2.9).
+    if rcc.csr().read().lsirdy().bit_is_clear() {
+        return;
+    }
+    let settle = || (0..timing::WATCHDOG_SETTLE_TURNS).any(|_| iwdg.sr().read().bits() == 0);
+    settle();
+    // A feed in between would close the registers again: four writes, less than a microsecond.
+    cortex_m::interrupt::free(|_| {
+        // SAFETY: the key and a prescaler of the manual.
+        iwdg.kr().write(|w| unsafe { w.key().bits(OPEN) });
+        iwdg.pr().write(|w| unsafe { w.pr().bits(prescaler) });
+        iwdg.rlr().write(|w| w.rl().set((ms * SLOW_CLOCK_KHZ / divider - 1) as u16));
+    });
+    settle();
+    // SAFETY: a key of the manual.
+    iwdg.kr().write(|w| unsafe { w.key().bits(FEED) });
+}
+
 impl ConfigFlash for Sectors {
     const CELLS: usize = SECTOR_WORDS / CELL_WORDS;
 
@@ -82,12 +115,20 @@ impl ConfigFlash for Sectors {
 
     fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
         defmt::info!("erasing a sector of the configuration's flash");
-        self.operate(timing::FLASH_ERASE_TURNS, |flash| {
+        watchdog(PATIENT);
+        let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
+            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7): whatever came after
+            // would be lost without a word.
             // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
-            flash
-                .cr()
-                .write(|w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(SECTORS[slot as usize]) });
-            flash.cr().modify(|_, w| w.strt().set_bit());
-        })
+            flash.cr().write(|w| unsafe {
+                w.lock().clear_bit().psize().psize32().ser().set_bit().snb().bits(SECTORS[slot as usize])
+            });
+            flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
+        });
+        watchdog(ALERT);
+        for task in Task::ALL {
+            REPORTS.alive(task);
+        }
+        done
     }
 }

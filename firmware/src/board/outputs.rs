@@ -6,8 +6,8 @@ use control_core::units::DacCode;
 use firmware::drive::{ByteBus, MotorDac};
 use firmware::tilt::ReadCode;
 use stm32f4xx_hal::adc::Adc;
-use stm32f4xx_hal::adc::config::{AdcConfig, SampleTime};
-use stm32f4xx_hal::dac::{C1, DacOut, DacPin};
+use stm32f4xx_hal::adc::config::{AdcConfig, Clock, SampleTime};
+use stm32f4xx_hal::dac::{C1, DacOut};
 use stm32f4xx_hal::gpio::outport::OutPort8;
 use stm32f4xx_hal::gpio::{Analog, PC1, PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
 use stm32f4xx_hal::pac::{ADC1, DAC, GPIOE};
@@ -19,18 +19,20 @@ use stm32f4xx_hal::rcc::Rcc;
 pub(crate) struct OnChipDac(C1);
 
 impl OnChipDac {
-    /// At zero torque from the first moment that it is on.
+    /// At zero torque from the first moment that it is on. The buffer is off: it would end 0.2 V from either rail (DS8626,
+    /// DAC characteristics), where full torque is; a follower stands outside (`docs/hardware.md`).
     pub(crate) fn new(mut channel: C1) -> Self {
-        channel.set_value(DacWidth::Bits12.mid_scale());
-        channel.enable();
-        let mut dac = Self(channel);
-        dac.wait_for_timer(true);
-        dac
-    }
-
-    fn wait_for_timer(&mut self, wait: bool) {
         // SAFETY: `C1` stands for channel 1, whose bits alone are changed; channel 2 is not used.
-        unsafe { &*DAC::ptr() }.cr().modify(|_, w| w.tsel1().tim4trgo().ten1().bit(wait));
+        let control = unsafe { &*DAC::ptr() }.cr();
+        // RM0090 14.3.6: which trigger cannot be changed while the channel is enabled.
+        control.modify(|_, w| w.boff1().set_bit().tsel1().tim4trgo().ten1().clear_bit().en1().clear_bit());
+        let mid_scale = DacWidth::Bits12.mid_scale();
+        channel.set_value(mid_scale);
+        control.modify(|_, w| w.en1().set_bit());
+        // 14.3.4: without a trigger the code is at the pin one bus clock later; from then on codes wait for the timer.
+        channel.set_value(mid_scale);
+        control.modify(|_, w| w.ten1().set_bit());
+        Self(channel)
     }
 }
 
@@ -39,12 +41,6 @@ impl MotorDac for OnChipDac {
 
     fn put(&mut self, code: DacCode) {
         self.0.set_value(code.0);
-    }
-
-    fn hurry(&mut self) {
-        // Without a trigger the code goes out one bus cycle later.
-        self.wait_for_timer(false);
-        self.wait_for_timer(true);
     }
 }
 
@@ -90,7 +86,9 @@ pub(crate) struct InclinometerPin {
 impl InclinometerPin {
     /// On ADC 1.
     pub(crate) fn new(adc: ADC1, pin: PC1<Analog>, rcc: &mut Rcc) -> Self {
-        Self { converter: Adc::new(adc, true, AdcConfig::default(), rcc), pin }
+        // 84 MHz by 4: by 2, as the HAL would have it, is more than the converter's 36 MHz (DS8626, ADC characteristics).
+        let config = AdcConfig::default().clock(Clock::Pclk2_div_4);
+        Self { converter: Adc::new(adc, true, config, rcc), pin }
     }
 }
 

@@ -13,12 +13,14 @@ pub(crate) type Packet = Vec<u8, PACKET_BYTES>;
 /// An order in a byte: what a tick moves without noticing.
 #[derive(Clone, Copy)]
 pub(crate) enum SmallOrder {
-    Start,
+    /// In the session of this number.
+    Start(u8),
     Stop,
     Zero,
     Heartbeat,
-    /// Take the large one that waits: a plan or an excitation, which are rare and only for a device whose torque is off.
-    Large,
+    /// Take the large one that waits: a plan or an excitation, which are rare and only for a device whose torque is off;
+    /// in the session of this number.
+    Large(u8),
 }
 
 /// What a tick gave, with its number.

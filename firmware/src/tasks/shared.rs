@@ -1,15 +1,23 @@
 //! The single words that tasks share. Each has one writer, or is a set of bits.
 
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering::Relaxed};
+use control_core::config::DacWidth;
+use control_core::units::DacCode;
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 use firmware::reset::LastWords;
 use firmware::stages::Stages;
-use firmware::supervision::{Reports, Trips};
+use firmware::supervision::{Conditions, Reports, Trips};
 
 /// Who is alive. Written by every task, taken by the supervisor.
 pub(crate) static REPORTS: Reports = Reports::new();
 
 /// Faults on their way to the tick.
 pub(crate) static TRIPS: Trips = Trips::new();
+
+/// What keeps the device from being started.
+pub(crate) static CONDITIONS: Conditions = Conditions::new();
+
+/// Which session's orders the tick carries out: those of a PC that went are none of the next one's. Written by telemetry.
+pub(crate) static SESSION: AtomicU8 = AtomicU8::new(0);
 
 /// Times of the stages.
 pub(crate) static STAGES: Stages = Stages::new();
@@ -19,6 +27,23 @@ pub(crate) static SUPERVISED_MS: AtomicU32 = AtomicU32::new(0);
 
 /// Whether the amplifier is on. Written by the tick.
 pub(crate) static POWERED: AtomicBool = AtomicBool::new(false);
+
+/// The code that was given out last, of 12 bits. Written by the tick.
+static GIVEN: AtomicU16 = AtomicU16::new(DacWidth::Bits12.mid_scale());
+
+/// Gives the supervisor the code that a converter of this width was given.
+pub(crate) fn set_given(width: DacWidth, code: DacCode) {
+    let code = match width {
+        DacWidth::Bits12 => code.0,
+        DacWidth::Bits8 => code.0 << 4,
+    };
+    GIVEN.store(code, Relaxed);
+}
+
+/// The code that was given out last, of 12 bits.
+pub(crate) fn given() -> DacCode {
+    DacCode(GIVEN.load(Relaxed))
+}
 
 /// Ticks that came late or not at all. Written by the tick.
 pub(crate) static MISSED_TICKS: AtomicU32 = AtomicU32::new(0);

@@ -2,9 +2,14 @@
 //! what a debugger may stop.
 
 use super::shared;
+use super::supply::SupplyLevel;
+use crate::board::{DriveLines, EncoderLines};
 use control_core::event::Fault;
+use control_core::interlock::Interlock;
 use core::sync::atomic::Ordering::Relaxed;
 use cortex_m::peripheral::DWT;
+use firmware::lines::WireWatch;
+use firmware::monitor::{Asked, DriveMonitor};
 use firmware::reset::{Crash, CrashKind};
 use firmware::supervision::Supervisor;
 use firmware::timing::{SUPERVISOR_HZ, TILT_PERIOD_MS};
@@ -18,6 +23,9 @@ const _: () = assert!(SUPERVISOR_HZ == 1_000, "what follows counts its runs as m
 pub(crate) struct Watch {
     watchdog: IndependentWatchdog,
     debug: DBGMCU,
+    supply: SupplyLevel,
+    encoder: (EncoderLines, WireWatch),
+    drive: (DriveLines, DriveMonitor),
     supervisor: Supervisor,
     ms: u32,
     said: bool,
@@ -25,8 +33,37 @@ pub(crate) struct Watch {
 
 impl Watch {
     /// Feeds `watchdog`, which runs already.
-    pub(crate) fn new(watchdog: IndependentWatchdog, debug: DBGMCU) -> Self {
-        Self { watchdog, debug, supervisor: Supervisor::new(), ms: 0, said: false }
+    pub(crate) fn new(
+        watchdog: IndependentWatchdog,
+        debug: DBGMCU,
+        supply: SupplyLevel,
+        encoder: EncoderLines,
+        drive: DriveLines,
+    ) -> Self {
+        let (encoder, drive) = ((encoder, WireWatch::new()), (drive, DriveMonitor::new()));
+        Self { watchdog, debug, supply, encoder, drive, supervisor: Supervisor::new(), ms: 0, said: false }
+    }
+
+    /// What keeps the device from being started ends a run too.
+    fn look_at_conditions(&mut self) {
+        self.supply.look();
+        let (lines, watch) = &mut self.encoder;
+        shared::CONDITIONS.set(Interlock::EncoderWire, watch.look(lines));
+        let (lines, monitor) = &mut self.drive;
+        let powered = shared::POWERED.load(Relaxed);
+        let verdict = monitor.look(&lines.read(), Asked { powered, code: shared::given() });
+        for (interlock, is_on) in verdict.conditions() {
+            shared::CONDITIONS.set(interlock, is_on);
+        }
+        if powered && let Some(fault) = verdict.fault {
+            shared::TRIPS.raise(fault);
+        }
+        if powered
+            && let Some(interlock) = shared::CONDITIONS.get().first()
+            && interlock != Interlock::Saving
+        {
+            shared::TRIPS.raise(interlock.fault());
+        }
     }
 
     /// One millisecond.
@@ -34,6 +71,7 @@ impl Watch {
         let entered = DWT::cycle_count();
         self.ms = self.ms.wrapping_add(1);
         shared::SUPERVISED_MS.store(self.ms, Relaxed);
+        self.look_at_conditions();
         match self.supervisor.look(&shared::REPORTS) {
             Ok(()) => self.watchdog.feed(),
             Err(task) => {

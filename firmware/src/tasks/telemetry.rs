@@ -6,6 +6,7 @@ use super::shared::{self, LINK_CONFIGURED, LINK_READY};
 use crate::board::BoardStore;
 use crate::board::usb::resume_interrupt;
 use control_core::event::Fault;
+use control_core::interlock::Interlock;
 use control_core::{Config, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use cortex_m::peripheral::DWT;
@@ -14,7 +15,7 @@ use firmware::supervision::Task;
 use firmware::timing;
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
-use link::frames::{Stage, Timing};
+use link::frames::{SaveFailure, Stage, Timing};
 use stm32f4xx_hal::pac::Interrupt;
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
@@ -22,6 +23,9 @@ const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
 
 /// The byte at which every frame ends.
 const FRAME_END: u8 = 0;
+
+/// The configuration is saved later.
+struct TorqueIsOn;
 
 /// Telemetry's own state.
 pub(crate) struct Telemetry {
@@ -79,10 +83,13 @@ impl Telemetry {
         let is_open = link & LINK_CONFIGURED != 0;
         if (self.was_open && !is_open) || was_closed {
             defmt::info!("the PC is gone");
+            // Nothing that it asked for outlives it: neither what has not been read yet, nor a start that the tick has not
+            // seen yet.
+            while self.ends.from_pc.dequeue().is_some() {}
             self.endpoint.disconnect();
             self.filling.clear();
             shared::DISCARD.store(true, Relaxed);
-            // A start that the tick has not seen yet must not outlive the PC that asked for it.
+            shared::SESSION.store(self.session().wrapping_add(1), Relaxed);
             self.held = Some(Order::Stop);
             self.forward_orders();
             if shared::POWERED.load(Relaxed) {
@@ -93,7 +100,13 @@ impl Telemetry {
         self.was_ready = is_ready;
     }
 
+    /// The number of the session.
+    fn session(&self) -> u8 {
+        shared::SESSION.load(Relaxed)
+    }
+
     fn take_commands(&mut self) {
+        self.endpoint.set_interlocks(shared::CONDITIONS.get());
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             self.forward_orders();
@@ -113,7 +126,7 @@ impl Telemetry {
     fn forward_orders(&mut self) {
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
             let small = match order {
-                Order::Start => SmallOrder::Start,
+                Order::Start => SmallOrder::Start(self.session()),
                 Order::Stop => SmallOrder::Stop,
                 Order::Zero => SmallOrder::Zero,
                 Order::Heartbeat => SmallOrder::Heartbeat,
@@ -126,36 +139,47 @@ impl Telemetry {
                         self.held = Some(large);
                         return;
                     }
-                    if let Order::Configure(plan) = &large {
-                        self.save(plan.config());
+                    if let Order::Configure(plan) = &large
+                        && self.save(plan.config()).is_err()
+                    {
+                        self.held = Some(large);
+                        return;
                     }
                     // There is room: just seen.
                     let _ = self.ends.large_orders.enqueue(large);
-                    SmallOrder::Large
+                    SmallOrder::Large(self.session())
                 }
             };
             if let Err(small) = self.ends.orders.enqueue(small) {
                 self.held = match small {
-                    SmallOrder::Start => Some(Order::Start),
+                    SmallOrder::Start(_) => Some(Order::Start),
                     SmallOrder::Stop => Some(Order::Stop),
                     SmallOrder::Zero => Some(Order::Zero),
                     SmallOrder::Heartbeat => Some(Order::Heartbeat),
                     // Its room was seen above.
-                    SmallOrder::Large => None,
+                    SmallOrder::Large(_) => None,
                 };
                 return;
             }
         }
     }
 
-    /// The configuration outlives a reset. Torque is off: the link takes no configuration otherwise.
-    fn save(&mut self, config: &Config) {
-        match self.store.save(config) {
-            Ok(()) => {}
-            Err(StoreError::Full) => defmt::warn!("no room to save the configuration until a restart"),
-            Err(StoreError::Flash) => defmt::warn!("the configuration was not saved: flash refused it"),
-            Err(StoreError::TooLong) => defmt::warn!("the configuration was not saved: it is too long"),
-        }
+    /// The configuration outlives a reset. The link takes none while torque is on; a start and a stop may still be on
+    /// their way to the tick, though, and an erasure would stop the processor with the amplifier on: not before it is off.
+    fn save(&mut self, config: &Config) -> Result<(), TorqueIsOn> {
+        shared::CONDITIONS.set(Interlock::Saving, true);
+        let is_off = !shared::POWERED.load(Relaxed);
+        let saved = if is_off { self.store.save(config) } else { Ok(()) };
+        shared::CONDITIONS.set(Interlock::Saving, false);
+        let failure = match saved {
+            Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
+            Err(StoreError::Full) => SaveFailure::Full,
+            Err(StoreError::Flash) => SaveFailure::Flash,
+            Err(StoreError::TooLong) => SaveFailure::TooLong,
+        };
+        defmt::warn!("the configuration was not saved: {}", failure as u8);
+        self.endpoint.not_saved(self.next_tick, failure);
+        Ok(())
     }
 
     fn take_samples(&mut self) {

@@ -3,7 +3,6 @@
 use super::messages::{self, Bucket, Device, Range, Timing};
 use crate::session::{Batch, Happening, state_name};
 use control_core::config::DacWidth;
-use control_core::event::Fault;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
 
@@ -120,10 +119,11 @@ impl Condenser {
             EventKind::Puncture { layer } => ("puncture", Some(layer), None, None),
             EventKind::Vessel { layer } => ("vessel", Some(layer), None, None),
             EventKind::Exit { layer } => ("exit", Some(layer), None, None),
-            EventKind::Fault { cause } => ("fault", None, Some(cause), None),
+            EventKind::Fault { cause } => ("fault", None, Some(cause.to_string()), None),
             EventKind::Limits { in_force } => ("limits", None, None, Some(in_force.0)),
             EventKind::Started => ("started", None, None, None),
             EventKind::Stopped => ("stopped", None, None, None),
+            EventKind::NotSaved { cause } => ("not_saved", None, Some(cause.to_string()), None),
         };
         messages::Event {
             t_s: self.seconds(event.tick),
@@ -131,7 +131,7 @@ impl Condenser {
             layer,
             depth_mm: before.map(|pose| fine(pose.depth.0.to_num())),
             force_n: before.map(|pose| fine(pose.force.0.to_num())),
-            cause: cause.map(|cause: Fault| cause.to_string()),
+            cause,
             limits,
         }
     }

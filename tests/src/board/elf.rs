@@ -36,6 +36,21 @@ fn sections(bytes: &[u8]) -> Option<Vec<[u32; 5]>> {
         .collect()
 }
 
+/// Where the code holds an instruction whose first four bytes `is_it` knows, by address.
+#[must_use]
+pub fn instructions(bytes: &[u8], is_it: impl Fn([u8; 4]) -> bool) -> Vec<u32> {
+    const PROGRAM: u32 = 1;
+    let code = sections(bytes).unwrap_or_default().into_iter().filter(|section| section[0] == PROGRAM);
+    code.flat_map(|[_, address, offset, size, _]| {
+        let code = bytes.get(offset as usize..(offset + size) as usize).unwrap_or_default();
+        let words = (address..).step_by(2).zip(code.windows(4).step_by(2));
+        let is_it = &is_it;
+        let found = words.filter(move |(_, word)| (*word).try_into().is_ok_and(is_it));
+        found.map(|(address, _)| address).collect::<Vec<u32>>()
+    })
+    .collect()
+}
+
 /// Every function and object of the file; none for a file that is no such ELF.
 #[must_use]
 pub fn symbols(bytes: &[u8]) -> Vec<Symbol> {

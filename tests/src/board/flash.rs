@@ -1,8 +1,11 @@
 //! The sectors of flash that a firmware writes to, which the emulator keeps read only.
 //!
-//! Words are programmed and sectors erased under the rules of RM0090 section 3.6: unlocked, `PG`
-//! or `SER` set, and a bit goes from one to zero only. The interface's registers stay the
-//! emulator's; this model watches what is written to them. Timing is the emulator's `BSY`.
+//! Words are programmed and sectors erased under the rules of RM0090 section 3.6: both keys in their order, `PG` or
+//! `SER` set with words of 32 bits (3.6.2), and a bit goes from one to zero only. `LOCK` is set out of reset and a write
+//! with it set locks whatever else it says (3.9.7); `STRT` in a locked register does nothing and reports nothing. While
+//! a sector is erased the core gets no instruction from the flash (3.6: "any attempt to read … causes the bus to
+//! stall"): for its whole time nothing runs, the watchdog excepted. The interface's registers stay the emulator's; this
+//! model watches what is written to them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,7 +17,13 @@ const PG: u32 = 1;
 const SER: u32 = 1 << 1;
 const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
+const KEY1: u32 = 0x4567_0123;
 const KEY2: u32 = 0xCDEF_89AB;
+/// `PSIZE`, and its value for words of 32 bits.
+const PSIZE: u32 = 0b11 << 8;
+const WORDS: u32 = 0b10 << 8;
+/// A sector of 128 KiB takes a second, 32 bits at a time (data sheet DS8626, flash memory programming; at most 2 s).
+pub(super) const ERASE_NANOS: u64 = 1_000_000_000;
 /// The first sector of 128 KiB and the number it has; smaller ones hold the program.
 const FIRST_LARGE: u64 = 0x0802_0000;
 const FIRST_LARGE_NUMBER: u64 = 5;
@@ -29,11 +38,17 @@ pub struct Array {
     /// Every word that is not erased, by address.
     words: BTreeMap<u64, u32>,
     control: u32,
+    /// The last word written to the key register.
+    key: u32,
+    /// Sectors erased since the board was switched on, each with the instant in nanoseconds.
+    pub erased: Vec<(u64, u64)>,
     /// Words programmed and sectors erased since the board was switched on.
     pub operations: u64,
     /// The supply goes right before this operation, and the core is reset.
     pub cut_before: Option<u64>,
     pub(super) cut: bool,
+    /// Whether it no longer takes what is programmed: an array at the end of its life.
+    pub worn: bool,
     /// What the firmware did against the rules.
     pub violations: Vec<String>,
 }
@@ -43,9 +58,12 @@ impl Default for Array {
         Self {
             words: BTreeMap::new(),
             control: LOCK,
+            key: 0,
+            erased: Vec::new(),
             operations: 0,
             cut_before: None,
             cut: false,
+            worn: false,
             violations: Vec::new(),
         }
     }
@@ -82,18 +100,18 @@ impl Array {
 
     /// The core starts again, with the supply back.
     pub(super) fn restarted(&mut self) {
-        self.control = LOCK;
+        (self.control, self.key) = (LOCK, 0);
         self.cut = false;
     }
 
     /// A store of the firmware to the array.
     pub(super) fn store(&mut self, address: u64, bytes: u32, value: u32) {
-        if bytes != 4 || !address.is_multiple_of(4) || self.control & (LOCK | PG) != PG {
+        if bytes != 4 || !address.is_multiple_of(4) || self.control & (LOCK | PG | PSIZE) != PG | WORDS {
             self.violations
                 .push(format!("a store of {bytes} bytes to {address:#010x} with CR {:#x}", self.control));
             return;
         }
-        if !self.powered() {
+        if !self.powered() || self.worn {
             return;
         }
         let before = self.word(address);
@@ -103,24 +121,35 @@ impl Array {
         self.words.insert(address, before & value);
     }
 
-    /// A write of the firmware to a register, which may be the interface's.
-    pub(super) fn register_written(&mut self, address: u64, value: u32) {
+    /// A write of the firmware to a register, which may be the interface's, at the instant `at`. The time for which the
+    /// core then stands still, in nanoseconds.
+    pub(super) fn register_written(&mut self, address: u64, value: u32, at: u64) -> u64 {
         match address {
-            FLASH_KEYR if value == KEY2 => self.control &= !LOCK,
+            FLASH_KEYR => {
+                if value == KEY2 && self.key == KEY1 {
+                    self.control &= !LOCK;
+                }
+                self.key = value;
+                0
+            }
             FLASH_CR if self.control & LOCK == 0 => {
                 self.control = value;
-                if value & (SER | STRT) == SER | STRT && self.powered() {
-                    let sector = u64::from(value >> 3 & 0x1F);
-                    let base = FIRST_LARGE + sector.saturating_sub(FIRST_LARGE_NUMBER) * LARGE;
-                    if WRITABLE.contains(&base) && sector >= FIRST_LARGE_NUMBER {
-                        self.words.retain(|address, _| !(base..base + LARGE).contains(address));
-                    } else {
-                        self.violations.push(format!("sector {sector} holds the program"));
-                    }
-                }
+                let starts = value & (LOCK | SER | STRT) == SER | STRT;
+                if starts && self.powered() { self.erase(u64::from(value >> 3 & 0x1F), at) } else { 0 }
             }
-            _ => {}
+            _ => 0,
         }
+    }
+
+    fn erase(&mut self, sector: u64, at: u64) -> u64 {
+        let base = FIRST_LARGE + sector.saturating_sub(FIRST_LARGE_NUMBER) * LARGE;
+        if !WRITABLE.contains(&base) || sector < FIRST_LARGE_NUMBER || self.control & PSIZE != WORDS {
+            self.violations.push(format!("sector {sector} erased with CR {:#x}", self.control));
+            return 0;
+        }
+        self.words.retain(|address, _| !(base..base + LARGE).contains(address));
+        self.erased.push((sector, at));
+        ERASE_NANOS
     }
 }
 
@@ -143,8 +172,9 @@ mod tests {
 
     fn unlocked() -> Array {
         let mut array = Array::default();
-        array.register_written(FLASH_KEYR, KEY2);
-        array.register_written(FLASH_CR, PG);
+        array.register_written(FLASH_KEYR, KEY1, 0);
+        array.register_written(FLASH_KEYR, KEY2, 0);
+        array.register_written(FLASH_CR, PG | WORDS, 0);
         array
     }
 
@@ -157,16 +187,27 @@ mod tests {
         assert!(array.violations.is_empty(), "{:?}", array.violations);
         array.store(CELL, 4, 0xFFFF_FFFF);
         assert_eq!(array.violations.len(), 1);
-        array.register_written(FLASH_CR, SER | STRT | 10 << 3);
-        assert_eq!(array.word(CELL), ERASED);
+        assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 7), ERASE_NANOS);
+        assert_eq!((array.word(CELL), &array.erased[..]), (ERASED, &[(10, 7)][..]));
     }
 
     #[test]
     fn a_locked_array_keeps_its_words() {
         let mut array = unlocked();
-        array.register_written(FLASH_CR, LOCK);
+        array.register_written(FLASH_CR, LOCK, 0);
         array.store(CELL, 4, 0);
         assert_eq!((array.word(CELL), array.violations.len()), (ERASED, 1));
+    }
+
+    #[test]
+    fn a_write_that_locks_erases_nothing_and_says_nothing() {
+        let mut array = unlocked();
+        array.store(CELL, 4, 0);
+        array.register_written(FLASH_CR, LOCK | WORDS | SER | 10 << 3, 0);
+        assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0);
+        assert_eq!((array.word(CELL), array.violations.len()), (0, 0));
+        array.register_written(FLASH_KEYR, KEY2, 0);
+        assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0, "one key is none");
     }
 
     #[test]

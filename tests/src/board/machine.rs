@@ -27,7 +27,7 @@ use super::usb_port::{self, UsbPort};
 
 /// The crystal and the rail of the board.
 const CRYSTAL_HZ: u64 = 8_000_000;
-const RAIL_MILLIVOLTS: u32 = 3_300;
+pub(super) const RAIL_MILLIVOLTS: u32 = 3_300;
 /// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
 /// count a time.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
@@ -36,19 +36,22 @@ const MCU: &str = "stm32f407";
 /// The strap that says that an analogue inclinometer is fitted: PB1.
 const STRAP: (usize, u8) = (1, 1);
 
+/// PE4, the emergency stop's loop, PE5, the amplifier's ready output, and PE6, the strap of its current monitor.
+pub(super) const DRIVE_LINES: (usize, [u8; 3]) = (4, [4, 5, 6]);
+
 /// The board.
 #[derive(Debug)]
 pub(super) struct Machine {
     pub(super) mcu: Wired<Wired<Wired<Stm32f427, UsbPort>, Dac>, Exti>,
     probe: Probe,
-    flash: Flash,
+    pub(super) flash: Flash,
 }
 
 impl Machine {
     pub(super) fn new(wiring: &Wiring, probe: Probe, flash: Flash) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
         part.rcc.attach_crystals(CRYSTAL_HZ, 0);
-        part.set_supply(RAIL_MILLIVOLTS);
+        part.set_supply(wiring.supply);
         for converter in &mut part.adc {
             converter.set_reference(RAIL_MILLIVOLTS);
         }
@@ -56,11 +59,10 @@ impl Machine {
             let select = Select { port: "GPIOE", pin: pin(3), active: Level::Low };
             part.spi[0].attach_selected(Accelerometer::new(model), select);
         }
-        if wiring.inclinometer {
-            part.drive_port(VirtualNanos(0), STRAP.0, |gpio, registers, context| {
-                gpio.drive(pin(STRAP.1), Some(Level::High), registers, context);
-            });
-        }
+        // Where no strap holds it up, the pin is charged all the same until a pull has emptied it.
+        part.drive_port(VirtualNanos(0), STRAP.0, |gpio, registers, context| {
+            gpio.drive(pin(STRAP.1), Some(Level::High), registers, context);
+        });
         let size = |bytes| NonZeroU64::new(bytes).expect("not zero");
         let usb = Window::new("USB", OTG.2, size(OTG.1))
             .gated(Gate::by("RCC", "AHB2ENR", "OTGFSEN"))
@@ -74,6 +76,18 @@ impl Machine {
 
     pub(super) fn part(&mut self) -> &mut Stm32f427 {
         &mut self.mcu.part.part.part
+    }
+
+    /// Shorts the amplifier's enable line to the supply, which the part then reads back, or takes the short away.
+    pub(super) fn short_enable(&mut self, shorted: bool) {
+        self.probe.tally().enable_shorted = shorted;
+    }
+
+    /// The charge on the strap's pin has gone.
+    pub(super) fn release_strap(&mut self, at: u64) {
+        self.part().drive_port(VirtualNanos(at), STRAP.0, |gpio, registers, context| {
+            gpio.drive(pin(STRAP.1), None, registers, context);
+        });
     }
 
     pub(super) fn usb(&mut self) -> &mut UsbPort {

@@ -5,6 +5,7 @@
 //! virtual time. The clock is one instruction a cycle at 168 MHz: it proves order, rates and
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
+mod amplifier;
 mod dac;
 pub mod elf;
 mod exti;
@@ -17,6 +18,7 @@ mod rtt;
 mod run;
 pub mod tilt;
 mod usb_port;
+pub mod wires;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -28,6 +30,7 @@ use rigless::session::Session;
 use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
+pub use amplifier::Amplifier;
 pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
 pub use processor::{Effect, HandlerRun, Probe, Upset};
@@ -90,6 +93,10 @@ pub struct Wiring {
     pub tilt: Option<tilt::Model>,
     /// Whether the strap for an analogue inclinometer is there; its voltage is [`Stopped::set_analogue`].
     pub inclinometer: bool,
+    /// Whether the motor's current is measured.
+    pub current_monitor: bool,
+    /// The part's supply when it is switched on, in millivolts.
+    pub supply: u32,
     /// How often the plant moves, in nanoseconds.
     pub plant_period: Nanos,
 }
@@ -103,6 +110,8 @@ impl Default for Wiring {
             set_value: SetValue::OnChip,
             tilt: Some(tilt::Model::Lis3dsh),
             inclinometer: false,
+            current_monitor: false,
+            supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,
         }
     }

@@ -57,6 +57,23 @@ pub fn path(points: Vec<(Nanos, i64)>) -> impl PlantSide {
     }
 }
 
+/// The same, with every leg begun and ended as gently as a hand does: half a period of a cosine.
+#[must_use]
+pub fn eased(points: Vec<(Nanos, i64)>) -> impl PlantSide {
+    let mut straight = path(points.clone());
+    move |at: Nanos, drive: Drive| {
+        let after = points.partition_point(|&(time, _)| time <= at);
+        let (Some(&(from, _)), Some(&(to, _))) =
+            (after.checked_sub(1).and_then(|before| points.get(before)), points.get(after))
+        else {
+            return straight.step(at, drive);
+        };
+        let done = (at - from) as f64 / (to - from) as f64;
+        let eased = 0.5 - 0.5 * (std::f64::consts::PI * done).cos();
+        straight.step(from + ((to - from) as f64 * eased) as Nanos, drive)
+    }
+}
+
 /// A living hand: `plant` with a tremor of 10 Hz, two counts to either side.
 #[must_use]
 pub fn by_hand(mut plant: impl PlantSide) -> impl PlantSide {
@@ -138,6 +155,15 @@ mod tests {
             let changed = usize::from(pair[0].0 != pair[1].0) + usize::from(pair[0].1 != pair[1].1);
             assert_eq!(changed, 1, "{pair:?}");
         }
+    }
+
+    #[test]
+    fn an_eased_path_meets_its_points_and_leaves_them_slowly() {
+        let mut path = eased(vec![(1_000, 0), (2_000, 1_000)]);
+        let drive = Drive { code: None, enabled: false };
+        let angles: Vec<i64> = [0, 1_000, 1_100, 1_500, 2_000, 9_000].map(|at| path.step(at, drive)).to_vec();
+        assert_eq!((angles[0], angles[1], angles[4], angles[5]), (0, 0, 1_000, 1_000));
+        assert!((20..30).contains(&angles[2]) && (495..=500).contains(&angles[3]), "{angles:?}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
 use super::flash::{Flash, WRITABLE};
+use super::machine::INSTRUCTIONS_PER_SECOND;
 
 /// Where the manual puts the USB core, how much of it there is, and where its window is.
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
@@ -33,6 +34,9 @@ fn window(address: u64) -> u64 {
 
 /// The number the architecture gives external interrupt 0.
 pub const FIRST_EXTERNAL: u32 = 16;
+/// Where the part reads its enable line back.
+const GPIOD_IDR: u64 = 0x4002_0C10;
+const ENABLE_PIN: u32 = 7;
 const REGISTER_PC: usize = 15;
 const REGISTER_XPSR: usize = 16;
 
@@ -75,6 +79,17 @@ pub struct Tally {
     pub runs: Vec<HandlerRun>,
     /// How often each of its instructions ran, by address.
     pub places: BTreeMap<u32, u64>,
+    /// Where the image masks all interrupts (PRIMASK, `true`) and puts back what was before, by address. While there are
+    /// any, the core goes an instruction at a time.
+    pub masks: BTreeMap<u32, bool>,
+    /// The instruction count at which interrupts were masked, and how many times one in the other.
+    masked_since: u64,
+    masked_depth: u32,
+    /// The most instructions between the two, and where they began.
+    pub longest_masked: (u64, u32),
+    masked_at: u32,
+    /// Whether the amplifier's enable line is shorted to the supply.
+    pub(super) enable_shorted: bool,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -144,8 +159,11 @@ impl Probed {
     fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
-            let upset = self.probe.tally().upset.is_some();
-            bus.stepping = upset || self.counting.is_some();
+            let (upset, masks) = {
+                let tally = self.probe.tally();
+                (tally.upset.is_some(), !tally.masks.is_empty())
+            };
+            bus.stepping = upset || masks || self.counting.is_some();
             let place = self.core.pc() as u32;
             let left = if bus.stepping { 1 } else { budget - retired as u32 };
             let (exit, did) = self.core.run(left, bus);
@@ -155,6 +173,12 @@ impl Probed {
                 let run = HandlerRun { from: self.retired(), instructions: 0 };
                 self.counting = Some((self.exception(), run));
                 continue;
+            }
+            if bus.standstill > 0 {
+                return (Exit::Returned, retired);
+            }
+            if did > 0 && masks {
+                self.note_mask(place);
             }
             if did > 0 && bus.stepping {
                 self.count(place);
@@ -187,6 +211,28 @@ impl Probed {
         }
     }
 
+    /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is one of those.
+    fn note_mask(&mut self, place: u32) {
+        let now = self.retired();
+        let mut tally = self.probe.tally();
+        match tally.masks.get(&place) {
+            Some(true) => {
+                tally.masked_depth += 1;
+                if tally.masked_depth == 1 {
+                    (tally.masked_since, tally.masked_at) = (now, place);
+                }
+            }
+            Some(false) if tally.masked_depth > 0 => {
+                tally.masked_depth -= 1;
+                if tally.masked_depth == 0 {
+                    let masked = (now - tally.masked_since, tally.masked_at);
+                    tally.longest_masked = tally.longest_masked.max(masked);
+                }
+            }
+            _ => {}
+        }
+    }
+
     /// Does what goes wrong now; the instructions' time that it took.
     fn upset(&mut self) -> u64 {
         let exception = self.exception();
@@ -216,10 +262,26 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let mut bus = Rerouted { bus, flash: &flash, stalled: self.stalled, stepping: false };
+        let enable_shorted = self.probe.tally().enable_shorted;
+        let mut bus = Rerouted {
+            bus,
+            flash: &flash,
+            stalled: self.stalled,
+            standstill: 0,
+            enable_shorted,
+            stepping: false,
+        };
         self.settle_breakpoint();
-        let watched = self.breakpoint.is_some() || self.probe.tally().upset.is_some();
-        if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) }
+        let watched = {
+            let tally = self.probe.tally();
+            self.breakpoint.is_some() || tally.upset.is_some() || !tally.masks.is_empty()
+        };
+        let (exit, retired) =
+            if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) };
+        // What kept the core from its instructions is time that has passed.
+        let standstill = bus.standstill;
+        self.stalled += standstill;
+        (exit, retired + standstill)
     }
 
     fn reset(&mut self) {
@@ -317,6 +379,9 @@ struct Rerouted<'a> {
     bus: &'a mut dyn CoreBus,
     flash: &'a Flash,
     stalled: u64,
+    /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
+    standstill: u64,
+    enable_shorted: bool,
     /// Whether the core is looked at after every instruction.
     stepping: bool,
 }
@@ -335,14 +400,18 @@ impl CoreBus for Rerouted<'_> {
             return Some(word >> (8 * (address & 3)) & access.width.mask());
         }
         if written {
-            self.flash.array().register_written(access.address, access.value as u32);
+            let at = self.bus.time(access.instruction_count + self.stalled).0;
+            let stall = self.flash.array().register_written(access.address, access.value as u32, at);
+            self.standstill += stall * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000;
         }
         access.address = window(access.address);
         if self.stalled > 0 {
             access.instruction_count += self.stalled;
             access.virtual_time = self.bus.time(access.instruction_count);
         }
-        self.bus.access(access, from_code)
+        let value = self.bus.access(access, from_code)?;
+        let is_enable = !written && access.address == GPIOD_IDR && self.enable_shorted;
+        Some(if is_enable { value | 1 << ENABLE_PIN } else { value })
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {
@@ -354,7 +423,7 @@ impl CoreBus for Rerouted<'_> {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        if self.stepping {
+        if self.stepping || self.standstill > 0 {
             return None;
         }
         self.bus.carry_on(instructions + self.stalled, event)

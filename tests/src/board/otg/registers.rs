@@ -75,6 +75,7 @@ pub(super) mod global {
     /// The pseudo FIFO number that flushes every transmit FIFO.
     pub(in crate::board::otg) const TXFNUM_ALL: u32 = 0x10;
     pub(in crate::board::otg) const GCCFG_PWRDWN: u32 = 1 << 16;
+    pub(in crate::board::otg) const GCCFG_NOVBUSSENS: u32 = 1 << 21;
 
     pub(in crate::board::otg) const SOF: u32 = 1 << 3;
     pub(in crate::board::otg) const RXFLVL: u32 = 1 << 4;

@@ -8,7 +8,7 @@ const SETUP: [u8; 8] = [0x80, 6, 0, 1, 0, 0, 64, 0];
 /// A core as a driver leaves it after a bus reset: FIFOs cut, endpoints 0 and 1 on.
 fn ready() -> Core {
     let mut core = Core::default();
-    core.write(GCCFG, GCCFG_PWRDWN);
+    core.write(GCCFG, GCCFG_PWRDWN | GCCFG_NOVBUSSENS);
     core.write(GAHBCFG, GAHBCFG_GINT);
     core.write(GRXFSIZ, 64);
     core.write(DIEPTXF0, 16 << 16 | 64);

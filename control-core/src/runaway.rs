@@ -1,0 +1,246 @@
+//! Whether the needle moves as a hand and a motor that is wired as it should be move it. Three looks, each every 0.8 ms,
+//! none at the force law: what a fault of the wiring does shows in the counts alone.
+//!
+//! **Against the motor.** Where the motor's leads or the encoder's channels are swapped, what should hold the needle back
+//! drives it on: a needle that nobody holds speeds up against the torque by `torque/(radius·mass)`. That is looked for, with
+//! a mass of 13 to 60 g, and from 10 m/s² on: a hand that pushes against the torque carries its own mass along and takes
+//! its time (a stab that reaches 300 mm/s in 50 ms makes 6 m/s²). A wall that gives way leaves the hand's force over and
+//! the needle leaps as well, but there the torque falls first: while it is less than three quarters of what it was, no leap
+//! counts.
+//!
+//! **Too fast.** Whatever drives it.
+//!
+//! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again.
+
+use crate::TICK_HZ;
+use crate::event::Fault;
+use fixed::types::{I2F30, I16F16};
+
+/// Ticks from one look to the next: 0.8 ms.
+pub(crate) const LOOK_TICKS: u32 = 8;
+/// Looks over which a speed is taken: 2.4 ms. Two of them make an acceleration.
+const SPAN_LOOKS: usize = 3;
+/// Looks that are remembered.
+const LOOKS: usize = 8;
+/// Looks after which one turn to and fro is forgotten: 4.8 ms. A tremor turns 20 times a second.
+const FORGET_LOOKS: u32 = 6;
+/// Turns to and fro without getting on: more than a tremor or a rattle makes.
+const TURNS: u32 = 5;
+/// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
+const LEAST_COUNTS: i32 = 5;
+
+/// Ready for the tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    /// The least counts that an acceleration against the motor adds to a span.
+    least: i32,
+    /// Counts that a mN·m adds to a span of the lightest and of the heaviest needle, in Q8.
+    per_mnm_q8: (i32, i32),
+    /// The most counts in a span.
+    fastest: u32,
+}
+
+impl Bounds {
+    /// Of counts of this length in mm, a roller of this radius in mm, and a needle that moves so many counts in a tick at the
+    /// most.
+    pub(crate) fn new(mm_per_count: I2F30, roller_radius: I16F16, max_counts_per_tick: u16) -> Self {
+        /// Ticks of a span.
+        const SPAN: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
+        /// mm for each m/s² in a span, squared as (2.4 ms)², in Q30.
+        const MM_Q30: i64 = (1000 * SPAN * SPAN << 30) / (TICK_HZ as i64 * TICK_HZ as i64);
+        /// m/s²: the least that is looked for.
+        const LEAST: i64 = 10;
+        /// m/s² for a newton: of 13 g and of 60 g.
+        const PER_NEWTON: (i64, i64) = (75, 17);
+        let per_count = i64::from(mm_per_count.to_bits().max(1));
+        let radius = i64::from(roller_radius.to_bits().max(1));
+        let counts = |acceleration: i64| acceleration * MM_Q30 / per_count;
+        // N for a mN·m is 1/mm.
+        let per_mnm_q8 = |per_newton: i64| {
+            let q8 = (per_newton * MM_Q30 << 8) / per_count * (1 << 16) / radius;
+            i32::try_from(q8).unwrap_or(i32::MAX)
+        };
+        Self {
+            least: i32::try_from(counts(LEAST)).unwrap_or(i32::MAX).max(LEAST_COUNTS),
+            per_mnm_q8: (per_mnm_q8(PER_NEWTON.0), per_mnm_q8(PER_NEWTON.1)),
+            // A sixth of what an encoder that works may count in a tick: 0.4 m/s where it is 16 counts of 16 µm.
+            fastest: u32::from(max_counts_per_tick) * (SPAN as u32) / 6,
+        }
+    }
+
+    /// Whether `against`, counts that a span has gained against `torque`, are what a needle without a hand gains.
+    fn is_driven(&self, against: i32, torque: I16F16) -> bool {
+        // Torques stay below 512 mN·m, counts of them below 2^24.
+        let counts = |per_mnm_q8: i32| ((i64::from(torque.to_bits()) * i64::from(per_mnm_q8)) >> 24) as i32;
+        against >= self.least && against <= counts(self.per_mnm_q8.0) && against >= counts(self.per_mnm_q8.1)
+    }
+}
+
+/// The watch with its memory.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Watch {
+    counts: [i32; LOOKS],
+    /// Torque at each look, without its sign.
+    torques: [I16F16; LOOKS],
+    next: usize,
+    /// Counts that the last span has more than the one before it.
+    gained: i32,
+    turns: u32,
+    /// Looks until a turn is forgotten.
+    forget: u32,
+    last_step: i32,
+}
+
+impl Watch {
+    /// From where the needle is.
+    pub(crate) fn new(count: i32) -> Self {
+        Self { counts: [count; LOOKS], ..Self::default() }
+    }
+
+    /// A step of the needle that is none: back to where the one before came from. Called in every tick.
+    pub(crate) fn is_back(&mut self, step: i32) -> bool {
+        let is_back = step == self.last_step.wrapping_neg();
+        self.turns = if is_back { self.turns.wrapping_add(1) } else { 0 };
+        self.last_step = step;
+        is_back
+    }
+
+    /// A look at `count`: too fast. What the needle has gained is kept for [`Self::judge`].
+    pub(crate) fn look(&mut self, bounds: &Bounds, count: i32) -> Option<Fault> {
+        let at =
+            |looks: usize| self.counts.get(self.next.wrapping_sub(looks) % LOOKS).copied().unwrap_or(count);
+        let (middle, first) = (at(SPAN_LOOKS), at(2 * SPAN_LOOKS));
+        let speed = count.wrapping_sub(middle);
+        self.gained = speed.wrapping_sub(middle.wrapping_sub(first));
+        if let Some(place) = self.counts.get_mut(self.next % LOOKS) {
+            *place = count;
+        }
+        (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)
+    }
+
+    /// The same look's other half, a tick later, under `torque` in mN·m: against the motor.
+    pub(crate) fn judge(&mut self, bounds: &Bounds, torque: I16F16) -> Option<Fault> {
+        let strength = torque.saturating_abs();
+        let first = self.next.wrapping_sub(2 * SPAN_LOOKS) % LOOKS;
+        let before = self.torques.get(first).copied().unwrap_or(strength);
+        if let Some(place) = self.torques.get_mut(self.next % LOOKS) {
+            *place = strength;
+        }
+        self.next = self.next.wrapping_add(1);
+        let against = if torque.is_negative() { self.gained } else { self.gained.wrapping_neg() };
+        // A wall that has just given way: three quarters.
+        let has_fallen = strength < before - (before >> 2);
+        (!has_fallen && bounds.is_driven(against, strength)).then_some(Fault::WrongWay)
+    }
+
+    /// The look's last part: to and fro.
+    pub(crate) fn count_turns(&mut self) -> Option<Fault> {
+        if self.turns > TURNS {
+            return Some(Fault::EncoderChannel);
+        }
+        self.forget += 1;
+        if self.forget >= FORGET_LOOKS {
+            self.forget = 0;
+            self.turns = self.turns.saturating_sub(1);
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_arithmetic, reason = "a test")]
+mod tests {
+    use super::*;
+
+    fn bounds() -> Bounds {
+        Bounds::new(I2F30::from_num(0.0157), I16F16::from_num(10), 16)
+    }
+
+    /// Seconds until the watch finds something, of a needle whose depth in mm and torque in mN·m are these at each look.
+    fn found(mut at: impl FnMut(f64) -> (f64, f64), seconds: f64) -> Option<(f64, Fault)> {
+        let (bounds, mut watch) = (bounds(), Watch::new(0));
+        let mut last = 0;
+        let ticks = (seconds * 1e4) as u32;
+        (0..ticks).find_map(|tick| {
+            let time = f64::from(tick) / 1e4;
+            let (depth, torque) = at(time);
+            let count = (depth / 0.0157) as i32;
+            let step = count - core::mem::replace(&mut last, count);
+            if step != 0 {
+                watch.is_back(step);
+            }
+            let is_look = tick % LOOK_TICKS == 0;
+            let fault = is_look.then(|| {
+                let fast = watch.look(&bounds, count);
+                let driven = watch.judge(&bounds, I16F16::from_num(torque));
+                fast.or(driven).or(watch.count_turns())
+            });
+            fault.flatten().map(|fault| (time, fault))
+        })
+    }
+
+    /// From rest, after 20 ms.
+    fn driven(acceleration: f64, torque: f64) -> Option<(f64, Fault)> {
+        let moved = move |time: f64| acceleration / 2.0 * (time - 0.02).max(0.0).powi(2) * 1e3;
+        found(move |time| (moved(time), torque), 0.028).map(|(time, fault)| (time - 0.02, fault))
+    }
+
+    #[test]
+    fn a_needle_that_its_motor_drives_the_wrong_way_is_found_within_5_ms() {
+        for (newtons, mass) in [(0.5, 0.03), (0.7, 0.03), (1.0, 0.03), (2.8, 0.03), (1.0, 0.05), (0.5, 0.02)]
+        {
+            for sign in [-1.0, 1.0] {
+                let found = driven(sign * newtons / mass, -sign * 10.0 * newtons);
+                let (time, fault) = found.unwrap_or((1.0, Fault::Travel));
+                assert!(fault == Fault::WrongWay && time < 0.005, "{newtons} N, {mass} kg: {found:?}");
+                let along = driven(sign * newtons / mass, sign * 10.0 * newtons);
+                let is_fast = along.is_none_or(|(_, fault)| fault == Fault::Overspeed);
+                assert!(is_fast, "along with the motor: {along:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_hand_does_is_left_alone() {
+        // A stab: 300 mm/s in 50 ms, against any torque.
+        for torque in [-28.0, -10.0, -3.0, -0.5, 0.0] {
+            assert_eq!(driven(6.0, torque), None, "{torque} mN·m");
+        }
+        // A tremor of 10 Hz and a rattle of 60 Hz.
+        for (hertz, mm) in [(10.0, 0.1), (60.0, 0.012)] {
+            let swing = move |time: f64| mm * (core::f64::consts::TAU * hertz * time).sin();
+            assert_eq!(found(move |time| (swing(time), -7.0), 2.0), None, "{hertz} Hz");
+        }
+    }
+
+    /// 1 N gives way to 0.4 N under a hand that holds 30 g with 1.5 N/mm: a leap of 20 m/s² against the motor.
+    #[test]
+    fn a_wall_that_gives_way_is_left_alone() {
+        let leap = |time: f64| {
+            let since = time - 0.02;
+            if since < 0.0 {
+                return (0.0, -10.0);
+            }
+            let swing = (-80.0 * since).exp() * (223.0 * since).cos();
+            (0.4 * (1.0 - swing), -4.0)
+        };
+        assert_eq!(found(leap, 0.1), None);
+    }
+
+    #[test]
+    fn too_fast_is_too_fast_whoever_drives_it() {
+        let at = |speed: f64| found(move |time| (speed * (time - 0.02).max(0.0), 0.0), 0.1);
+        assert_eq!(at(380.0), None);
+        let (time, fault) = at(450.0).unwrap_or((1.0, Fault::Travel));
+        assert!(fault == Fault::Overspeed && time < 0.0235, "{time}");
+    }
+
+    #[test]
+    fn counts_that_go_to_and_fro_are_a_dead_channel() {
+        // An edge every 1.5 ms: 20 mm/s where two counts are 31 µm.
+        let dither = |apart: f64| move |time: f64| (0.016 * ((time / apart) as i64 % 2) as f64, -5.0);
+        let (time, fault) = found(dither(0.0015), 0.1).unwrap_or((1.0, Fault::Travel));
+        assert!(fault == Fault::EncoderChannel && time < 0.02, "{time}");
+        assert_eq!(found(dither(0.025), 5.0), None, "a tremor of half a count");
+    }
+}

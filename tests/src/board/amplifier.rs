@@ -1,0 +1,43 @@
+//! The servo amplifier at the board's pins, and what goes wrong with it.
+
+use super::plant::Drive;
+
+/// What is wrong with it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Amplifier {
+    /// Nothing.
+    #[default]
+    Sound,
+    /// Its enable line is shorted high.
+    LineHigh,
+    /// It stays on, whatever its enable line says.
+    StuckOn,
+    /// It gives no current, and says that all is well.
+    Dead,
+    /// Its power stage is broken through: full current one way, whatever it is asked for.
+    Full,
+}
+
+impl Amplifier {
+    /// What the motor gets where the board puts out `asked`.
+    pub(super) fn drive(self, asked: Drive) -> Drive {
+        match self {
+            Self::Sound => asked,
+            Self::LineHigh | Self::StuckOn => Drive { enabled: true, ..asked },
+            Self::Dead => Drive { enabled: false, ..asked },
+            Self::Full => Drive { code: Some(4_095), enabled: true },
+        }
+    }
+
+    /// Whether the enable line is high, where the board drives it to `level`.
+    pub(super) fn line(self, level: bool) -> bool {
+        level || self == Self::LineHigh
+    }
+
+    /// The voltage of its current monitor in mV, of a full scale of `full_scale`: as the set value, mid-scale is none.
+    pub(super) fn monitor(self, asked: Drive, full_scale: u32) -> u32 {
+        let drive = self.drive(asked);
+        let code = if drive.enabled { drive.code.unwrap_or(2_048) } else { 2_048 };
+        u32::from(code) * full_scale / 4_096
+    }
+}
