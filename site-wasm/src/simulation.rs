@@ -5,7 +5,7 @@ use crate::driver::{Driver, Request};
 use crate::failure::Failure;
 use crate::procedure::Procedure;
 use crate::profile::Profile;
-use crate::session::{self, Control, LinkStatus, Publisher, Session, Source, Subscription};
+use crate::session::{self, Control, Publisher, Session, Source, Subscription};
 use crate::visualizer::condense::Condenser;
 use crate::visualizer::messages::{FromPage, Hand, ToPage};
 use link::codec::MAX_FRAME;
@@ -101,16 +101,13 @@ impl Simulation {
         let now = Duration::from_micros(self.device.ticks() * 100);
         let counts = self.driver.counts();
         self.publisher.link(|status| {
-            *status = LinkStatus {
-                connected: self.driver.is_ready(now),
-                frames: counts.frames,
-                lost_frames: counts.lost_frames,
-                samples: counts.samples,
-                lost_samples: counts.lost_samples,
-                garbage: counts.garbage,
-                recording: None,
-                notice: self.driver.notice().map(str::to_owned),
-            };
+            status.connected = self.driver.is_ready(now);
+            status.frames = counts.frames;
+            status.lost_frames = counts.lost_frames;
+            status.samples = counts.samples;
+            status.lost_samples = counts.lost_samples;
+            status.garbage = counts.garbage;
+            status.notice = self.driver.notice().map(str::to_owned);
         });
     }
 
@@ -129,8 +126,10 @@ impl Simulation {
                 Control::Script
             }
             FromPage::Tilt { rad } => Control::Tilt { rad },
-            // A lifted pointer leaves the hand where it is.
-            _ => Control::Release,
+            FromPage::Release => Control::Release,
+            // What only a program beside the page can do.
+            #[allow(unreachable_patterns)]
+            _ => return Ok(()),
         };
         self.session.control(control);
         Ok(())
