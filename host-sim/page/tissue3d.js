@@ -48,8 +48,8 @@ void main() {
     vec2 walls = mix(lumen[low], lumen[low + 1], slot - float(low));
     if (lumen[low].y > lumen[low].x && lumen[low + 1].y > lumen[low + 1].x) {
       bool open = at.z > walls.x && at.z < walls.y;
-      // Within the block one sees the hollow vessel, beyond it its blood.
-      if (open && at.x > along.x + 0.8 && at.x < along.y - 0.8) discard;
+      // Within the block one sees the hollow vessel, towards its ends and beyond its blood.
+      if (open && at.x > along.x + 2.5 && at.x < along.y - 2.5) discard;
       if (open) base = blood;
       else if (at.z > walls.x - edge && at.z < walls.y + edge) base = wall;
     }
