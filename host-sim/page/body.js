@@ -20,6 +20,13 @@ export class BodyView {
     if (location.hash === "#body") this.show(true);
   }
 
+  /** Whose needle the slider moves. */
+  setHand(hand) {
+    this.hand = hand;
+    this.depth = byId("needle-depth");
+    this.depth.addEventListener("input", () => hand.want(Number(this.depth.value)));
+  }
+
   /** Goes to this view or back to the section. */
   show(open) {
     this.open = open;
@@ -65,6 +72,9 @@ export class BodyView {
   draw(view) {
     if (!this.open || !this.picture?.built) return;
     const angle = view.angle ?? view.tilt - (this.scene.skin_tilt_rad ?? 0);
+    this.depth.disabled = !view.canDrag;
+    // While a person holds the slider it says where the hand wants to be, else where the needle is.
+    if (!view.person || document.activeElement !== this.depth) this.depth.value = view.depth.toFixed(1);
     const begin = performance.now();
     // A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up.
     this.picture.step(Math.min(Math.max(view.seconds, 1 / 120), 1 / 20), view.depth, angle);

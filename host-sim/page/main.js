@@ -85,6 +85,7 @@ function happen(event) {
 
 const link = new Link((message) => receive[message.type]?.(message));
 const hand = new Hand(byId("section"), section, link);
+body.setHand(hand);
 
 /** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
 const stats = { fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN };
