@@ -87,8 +87,8 @@ impl Definition for Defined {
     fn variable(&self) -> &'static str {
         "travel"
     }
-    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
-        Some(experiments::STROKES)
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other != EffectName::MassImbalance).then_some(experiments::STROKES)
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()

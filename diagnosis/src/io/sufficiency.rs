@@ -43,8 +43,9 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
     let seconds = recording.duration_s();
     let rate = recording.rate_hz();
     if !(SLOWEST_HZ..FASTEST_HZ).contains(&rate) {
+        let unit = if rate < SLOWEST_HZ { "milliseconds" } else { "minutes" };
         return Some(format!(
-            "{file} has {rate:.1} rows a second where 20 to 20000 are read (are its times in seconds?)"
+            "{file} has {rate:.3} rows a second where 20 to 20000 are read (are its times in {unit}?)"
         ));
     }
     if seconds < LEAST_S || recording.len() < LEAST_ROWS {
@@ -59,6 +60,10 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
         high - low
     };
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+    // None at all is a free motion; one that never changes is told from no offset.
+    if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
+        return Some(format!("the command of {file} is constant"));
+    }
     let counts = spread(&recording.position_counts);
     if counts < FEWEST_COUNTS {
         return Some(format!(
