@@ -32,7 +32,7 @@ export function words(event, layers) {
 }
 
 /** Seconds of the device's clock as minutes and seconds. */
-function clock(t) {
+export function clock(t) {
   const minutes = Math.floor(t / 60);
   return `${minutes}:${(t - 60 * minutes).toFixed(1).padStart(4, "0")}`;
 }

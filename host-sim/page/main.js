@@ -7,6 +7,7 @@ import { Hand } from "./hand.js";
 import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
+import { Scrub } from "./scrub.js";
 import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
 import { Clock, Trace } from "./trace.js";
@@ -32,17 +33,16 @@ const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, state: "idle",
   hand: 0, person: false, canDrag: false, seconds: 0,
 };
+/** How often a recording that is played had jumped when this was drawn. */
+let jumps = 0;
 
 const receive = {
   scene(message) {
     scene = message;
-    tissue = new Tissue(scene.layers);
     view.known = false;
     view.tilt = scene.tilt_rad;
     view.canDrag = scene.hand;
-    trace.clear();
-    timePlot.clear();
-    events.clear();
+    forget();
     hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm);
     panel.scene(scene);
     body.setScene(scene);
@@ -52,12 +52,18 @@ const receive = {
   },
   frame(message) {
     linkStatus = message.link;
+    scrub.follow(linkStatus.replay);
+    const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
+    if (jumped) {
+      jumps = linkStatus.replay.jumps;
+      forget();
+    }
     for (const event of message.events) happen(event);
     for (const bucket of message.trace) trace.push(bucket);
     if (message.timing) panel.timing(message.timing);
     const pose = message.pose;
     if (!pose) return;
-    clock.hear(pose.t_s, performance.now());
+    clock.hear(pose.t_s, performance.now(), jumped);
     view.known = true;
     view.depth = pose.depth_mm;
     view.force = pose.force_n;
@@ -73,6 +79,14 @@ const receive = {
   },
 };
 
+/** Nothing has happened yet: another scene, or another place in a recording. */
+function forget() {
+  tissue = new Tissue(scene.layers);
+  trace.clear();
+  timePlot.clear();
+  events.clear();
+}
+
 function happen(event) {
   tissue.happen(event);
   body.happen(event);
@@ -86,6 +100,7 @@ function happen(event) {
 const link = new Link((message) => receive[message.type]?.(message));
 const hand = new Hand(byId("section"), section, link);
 body.setHand(hand);
+const scrub = new Scrub(link);
 
 /** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
 const stats = { fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN };
@@ -97,11 +112,12 @@ let lastPanel = -Infinity;
 
 function draw(nowMs) {
   hand.tell();
+  scrub.tell();
   view.seconds = Math.min(0.1, (nowMs - lastDrawn) / 1000);
   lastDrawn = nowMs;
   view.hand = hand.depth;
   view.person = hand.person;
-  const condition = link.condition;
+  const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
   tissue.move(view.depth, view.force, view.seconds);
   if (!body.open) section.draw(view, tissue);

@@ -46,6 +46,11 @@ export function number(value, digits) {
 
 const whole = new Intl.NumberFormat("en-GB");
 
+function stateWords(view, condition) {
+  if (condition === "paused") return ["Recording paused", "off"];
+  return condition === "live" && view.known ? STATES[view.state] ?? STATES.unknown : ["No data", "warn"];
+}
+
 export class Panel {
   constructor() {
     this.lit = LIMITS.map(() => -Infinity);
@@ -96,10 +101,11 @@ export class Panel {
         lamp.setAttribute("aria-label", `${LIMITS[i][1]}: ${tone === "warn" ? "in force" : "not in force"}`);
       }
     });
-    const [state, tone] = condition === "live" && known ? STATES[view.state] ?? STATES.unknown : ["No data", "warn"];
+    const [state, tone] = stateWords(view, condition);
     chip("state", state, tone);
     const powered = condition === "live" && view.state !== "idle" && view.state !== "fault";
-    byId("start").disabled = byId("zero").disabled = condition !== "live" || powered;
+    byId("start").disabled = condition !== "paused" && (condition !== "live" || powered);
+    byId("zero").disabled = condition !== "live" || powered;
     if (link) this.link(link, condition);
   }
 

@@ -63,12 +63,12 @@ export class Clock {
     this.newest = NaN;
   }
 
-  /** A pose of `t` seconds has just arrived. */
-  hear(t, nowMs) {
+  /** A pose of `t` seconds has just arrived, after a jump or in its turn. */
+  hear(t, nowMs, jumped) {
     this.newest = t;
     const offset = t - nowMs / 1000;
     // A replay, a faster-than-life run or a restart jumps; the jitter of messages is smoothed away.
-    if (!(Math.abs(offset - this.offset) < 0.25)) this.offset = offset;
+    if (jumped || !(Math.abs(offset - this.offset) < 0.25)) this.offset = offset;
     else this.offset += 0.05 * (offset - this.offset);
   }
 

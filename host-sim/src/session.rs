@@ -140,6 +140,21 @@ pub struct LinkStatus {
     pub recording: Option<RecordingStatus>,
     /// What a person should know: why there is no connection, why a command was refused, why recording ended.
     pub notice: Option<String>,
+    /// Where a recording that is played stands.
+    pub replay: Option<ReplayStatus>,
+}
+
+/// Where a recording that is played stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ReplayStatus {
+    /// Time into the recording, s.
+    pub at_s: f64,
+    /// How long it is, s.
+    pub length_s: f64,
+    /// Whether it goes on by itself.
+    pub playing: bool,
+    /// How often it has jumped: what a page has drawn of another place is no longer true.
+    pub jumps: u64,
 }
 
 /// A recording in progress.
@@ -193,6 +208,11 @@ pub enum Control {
         /// In rad.
         rad: f64,
     },
+    /// A recording goes on from here, or stays here where it is paused.
+    Seek {
+        /// Time into the recording, s.
+        at_s: f64,
+    },
 }
 
 /// A running device as the visualizer sees it. Cheap to clone.
@@ -227,6 +247,7 @@ struct HubState {
     last_pose: Option<Pose>,
     events: VecDeque<Happening>,
     link: LinkStatus,
+    jumps: u64,
 }
 
 #[derive(Default)]
@@ -237,6 +258,7 @@ struct Buffer {
     events: VecDeque<Happening>,
     timing: Option<Timing>,
     skipped_samples: u64,
+    jumps: u64,
 }
 
 /// A session and the end that feeds it.
@@ -272,6 +294,7 @@ impl Session {
             hello: state.hello.clone(),
             timing: state.timing,
             events: state.events.clone(),
+            jumps: state.jumps,
             ..Buffer::default()
         }));
         state.subscribers.push(Arc::downgrade(&buffer));
@@ -293,14 +316,21 @@ impl Session {
 impl Subscription {
     /// All since the last drain; never blocks for long. A slow looker loses the oldest, and the loss is counted.
     pub fn drain(&mut self) -> Batch {
-        let taken = std::mem::take(&mut *lock(&self.buffer));
+        let taken = {
+            let mut buffer = lock(&self.buffer);
+            let jumps = buffer.jumps;
+            std::mem::replace(&mut *buffer, Buffer { jumps, ..Buffer::default() })
+        };
+        let mut link = lock(&self.hub.state).link.clone();
+        // With the samples of the new place, not with the last ones of the old.
+        link.replay.iter_mut().for_each(|replay| replay.jumps = taken.jumps);
         Batch {
             hello: taken.hello,
             samples: taken.samples.into(),
             poses: taken.poses.into(),
             events: taken.events.into(),
             timing: taken.timing,
-            link: lock(&self.hub.state).link.clone(),
+            link,
             skipped_samples: taken.skipped_samples,
         }
     }
@@ -350,6 +380,25 @@ impl Publisher {
     pub fn hello(&self, hello: &Hello) {
         lock(&self.hub.state).hello = Some(hello.clone());
         self.each(|buffer| buffer.hello = Some(hello.clone()));
+    }
+
+    /// Time has jumped: what waits for lookers, and what happened, is that of another place; this comes instead, however long.
+    pub fn jump(&self, samples: &[(u64, Sample)], poses: &[Pose], events: &[Event]) {
+        let mut happenings: VecDeque<_> =
+            events.iter().map(|event| Happening { event: *event, before: None }).collect();
+        poses.iter().for_each(|pose| teach(&mut happenings, pose));
+        {
+            let mut state = lock(&self.hub.state);
+            state.events = happenings.clone();
+            state.last_pose = poses.last().copied();
+            state.jumps += 1;
+        }
+        self.each(|buffer| {
+            buffer.jumps += 1;
+            buffer.samples = samples.iter().copied().collect();
+            buffer.poses = poses.iter().copied().collect();
+            buffer.events = happenings.clone();
+        });
     }
 
     /// Times of the stages.

@@ -99,6 +99,7 @@ impl Outlets {
                 garbage: counts.garbage,
                 recording,
                 notice,
+                replay: None,
             };
         });
     }

@@ -65,6 +65,7 @@ fn visit() -> Result<(), Failure> {
     let told = page.text(FIRST_PUNCTURE)?;
     drop(page);
     phone(&browser, &program.url, &told, &scratch)?;
+    scrub(&browser, &places.program, &recording)?;
     let report = json!({ "rows": rows });
     let file = places.target.join("page.json");
     fs::write(&file, format!("{report:#}\n")).map_err(|e| format!("cannot write {}: {e}", file.display()))?;
@@ -363,6 +364,39 @@ fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<()
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
 
+/// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
+fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failure> {
+    let file = recording.to_str().ok_or("the target folder has a plain name")?;
+    let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
+    let mut page = Page::open(browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
+    page.wait(
+        "the slider",
+        SOON,
+        "!document.getElementById('scrub').hidden && !isNaN(__stats.firstFrameMs)",
+    )?;
+    page.click("stop")?;
+    page.wait("a pause", SOON, "document.getElementById('state').textContent === 'Recording paused'")?;
+    // Into the first insertion's hold, before it, and into it again.
+    let punctures = "document.querySelectorAll('#events [data-kind=puncture]').length";
+    for (at_s, place, given) in
+        [(4.2, "__stats.depthMm > 6", 2), (0.4, "__stats.depthMm < -3", 0), (4.2, "__stats.depthMm > 6", 2)]
+    {
+        page.evaluate(&format!(
+            "(() => {{ const place = document.getElementById('scrub-place'); place.value = '{at_s}'; \
+             place.dispatchEvent(new Event('input')); }})()"
+        ))?;
+        page.wait(&format!("the needle at {at_s} s"), SOON, &format!("{place} && {punctures} === {given}"))?;
+    }
+    let paused = page.number("__stats.depthMm")?;
+    std::thread::sleep(Duration::from_millis(600));
+    let still = page.number("__stats.depthMm")?;
+    check("a pause that stands still", paused == still, (paused, still))?;
+    page.click("start")?;
+    page.wait("the recording to go on", SOON, "__stats.depthMm < 0")?;
+    let complaints = page.complaints()?;
+    check("no errors in the console", complaints.is_empty(), &complaints)
+}
+
 fn check(what: &str, holds: bool, seen: impl std::fmt::Debug) -> Result<(), Failure> {
     if holds { Ok(()) } else { Err(format!("{what}: not so, but {seen:?}")) }
 }
@@ -401,11 +435,17 @@ struct Program {
 impl Program {
     /// Starts it and reads the address that it prints.
     fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Failure> {
+        let port = port.to_string();
+        let record =
+            record.map(|file| file.to_str().ok_or("the target folder has a plain name")).transpose()?;
+        let mut arguments = vec!["run", "--port", &port];
+        arguments.extend(record.into_iter().flat_map(|file| ["--record", file]));
+        Self::start_with(path, &arguments)
+    }
+
+    fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Failure> {
         let mut command = Command::new(path);
-        command.args(["run", "--port", &port.to_string()]);
-        if let Some(file) = record {
-            command.arg("--record").arg(file);
-        }
+        command.args(arguments);
         let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
         let mut process = spawned.map_err(|e| format!("cannot start {}: {e}", path.display()))?;
         let stdout = BufReader::new(process.stdout.take().ok_or("no standard output")?);

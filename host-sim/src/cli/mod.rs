@@ -3,6 +3,7 @@
 mod characterise;
 mod diagnose;
 mod export;
+mod fit_force;
 mod import;
 mod progress;
 mod recordings;
@@ -33,6 +34,7 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     Import(import::Import),
     Simulate(simulate::Simulate),
+    FitForce(fit_force::FitForce),
 }
 
 impl Cli {
@@ -48,6 +50,7 @@ impl Cli {
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),
             Some(Command::Simulate(command)) => command.run(),
+            Some(Command::FitForce(command)) => command.run(),
         }
     }
 }

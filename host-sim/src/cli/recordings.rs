@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Show a recording in the visualizer, again and again; Stop and Start in the page pause it.
+/// Show a recording in the visualizer, again and again; Stop and Start in the page pause it, a slider under the picture moves it.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim replay session.mcap --port 8711"))]
 pub(crate) struct Replay {

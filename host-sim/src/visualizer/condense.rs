@@ -20,6 +20,7 @@ pub struct Condenser {
     last_motor_n: f64,
     last_torque_mnm: f64,
     skipped_samples: u64,
+    jumps: u64,
 }
 
 /// A bucket that is still being filled.
@@ -64,11 +65,13 @@ impl Condenser {
         device
     }
 
-    /// Ticks that begin again are another run: what is half done of the old one is dropped.
+    /// Ticks that begin again are another run, or another place of a recording: what is half done of the old one is dropped.
     fn notice_restart(&mut self, batch: &Batch) {
+        let jumps = batch.link.replay.map_or(0, |replay| replay.jumps);
+        let jumped = std::mem::replace(&mut self.jumps, jumps) != jumps;
         let first =
             batch.poses.first().map(|p| p.tick).into_iter().chain(batch.samples.first().map(|s| s.0)).min();
-        if first.is_some_and(|first| first + u64::from(DEFAULT_TICK_HZ) < self.last_tick) {
+        if jumped || first.is_some_and(|first| first + u64::from(DEFAULT_TICK_HZ) < self.last_tick) {
             self.open.clear();
             self.last_tick = 0;
         }

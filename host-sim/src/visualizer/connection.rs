@@ -102,6 +102,7 @@ fn carry_out(message: FromPage, shared: &Shared) {
             Control::Script
         }
         FromPage::Tilt { rad } => Control::Tilt { rad },
+        FromPage::Seek { at_s } => Control::Seek { at_s },
     };
     shared.session.control(control);
 }

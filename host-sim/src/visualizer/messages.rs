@@ -173,6 +173,11 @@ pub enum FromPage {
         /// Inclination below the horizontal in rad, 0 to π/2.
         rad: f64,
     },
+    /// A recording is to go on from here.
+    Seek {
+        /// Time into the recording in s, 0 or more.
+        at_s: f64,
+    },
 }
 
 impl FromPage {
@@ -185,6 +190,9 @@ impl FromPage {
             }
             Self::Tilt { rad } if !(0.0..=std::f64::consts::FRAC_PI_2).contains(&rad) => {
                 Err(format!("tilt {rad} rad is not within 0 to pi/2"))
+            }
+            Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
+                Err(format!("time {at_s} s is not within 0 to 1e9 s"))
             }
             message => Ok(message),
         }
@@ -210,6 +218,7 @@ mod tests {
             r#"{"do":"drag","depth_mm":1e9}"#,
             r#"{"do":"drag","depth_mm":null}"#,
             r#"{"do":"tilt","rad":2}"#,
+            r#"{"do":"seek","at_s":-1}"#,
         ] {
             let error = FromPage::parse(bad).unwrap_err();
             assert!(!error.contains('\n'), "{error}");

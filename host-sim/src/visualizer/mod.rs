@@ -15,7 +15,7 @@ mod server;
 pub use server::{ServeError, Server, serve};
 
 #[cfg(test)]
-fn test_scene() -> crate::session::Scene {
+pub(crate) fn test_scene() -> crate::session::Scene {
     crate::session::Scene {
         source: crate::session::Source::Virtual,
         profile: "adult".into(),

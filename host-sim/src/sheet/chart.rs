@@ -1,0 +1,296 @@
+//! Curves in a frame with scales, as SVG that takes its colours from the page.
+
+use super::{decimal, safe};
+use std::fmt::Write as _;
+
+/// Drawing units: on a phone two thirds of them are a pixel, so that 14 stay readable.
+const WIDE: f64 = 520.0;
+const HIGH: f64 = 300.0;
+const LEFT: f64 = 52.0;
+const RIGHT: f64 = 10.0;
+const BOTTOM: f64 = 44.0;
+/// A legend's line.
+const LINE: f64 = 20.0;
+/// Columns of a curve: more are not seen.
+const COLUMNS: usize = 600;
+
+/// One curve.
+#[derive(Clone, Debug, Default)]
+pub struct Curve {
+    /// What the legend calls it; nothing for one that needs no name.
+    pub name: String,
+    /// Which colour: 0 to 5.
+    pub colour: u8,
+    /// Drawn in dashes.
+    pub dashed: bool,
+    /// In their order; a gap where a number is not finite.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A frame with curves.
+#[derive(Clone, Debug, Default)]
+pub struct Chart {
+    /// Over the frame.
+    pub title: String,
+    /// Under it, with the unit.
+    pub x_label: String,
+    /// Beside it, with the unit.
+    pub y_label: String,
+    /// What is drawn, the last on top.
+    pub curves: Vec<Curve>,
+    /// Places along x that have a name.
+    pub marks: Vec<(f64, String)>,
+    /// Values of y that are always shown; 0 is.
+    pub y_includes: Vec<f64>,
+}
+
+impl Chart {
+    /// The drawing.
+    pub fn svg(&self) -> String {
+        let (x, y) = (self.x_range(), self.y_range());
+        let named: Vec<&Curve> = self.curves.iter().filter(|c| !c.name.is_empty()).collect();
+        let legend = legend_rows(&named);
+        let top = 26.0 + LINE * legend.len() as f64 + if self.marks.is_empty() { 0.0 } else { 18.0 };
+        let total = top + HIGH + BOTTOM;
+        let mut out = format!("<svg viewBox=\"0 0 {WIDE} {total}\" role=img>");
+        let _ = write!(out, "<title>{}</title>", safe(&self.title));
+        let _ = write!(out, "<text class=title x={LEFT} y=16>{}</text>", safe(&self.title));
+        draw_legend(&mut out, &legend);
+        let to_x = |v: f64| LEFT + (v - x.low) / (x.high - x.low) * (WIDE - LEFT - RIGHT);
+        let to_y = |v: f64| top + (y.high - v) / (y.high - y.low) * HIGH;
+        for value in y.ticks() {
+            let at = to_y(value);
+            let _ = write!(
+                out,
+                "<line class=grid x1={LEFT} x2={:.1} y1={at:.1} y2={at:.1} /><text x={:.1} y={:.1} text-anchor=end>{}</text>",
+                WIDE - RIGHT,
+                LEFT - 6.0,
+                at + 5.0,
+                decimal(value, y.decimals)
+            );
+        }
+        for value in x.ticks() {
+            let at = to_x(value);
+            let _ = write!(
+                out,
+                "<line class=grid x1={at:.1} x2={at:.1} y1={top:.1} y2={:.1} /><text x={at:.1} y={:.1} text-anchor=middle>{}</text>",
+                top + HIGH,
+                top + HIGH + 18.0,
+                decimal(value, x.decimals)
+            );
+        }
+        let zero = to_y(0.0_f64.clamp(y.low, y.high));
+        let _ = write!(out, "<line class=axis x1={LEFT} x2={:.1} y1={zero:.1} y2={zero:.1} />", WIDE - RIGHT);
+        self.draw_marks(&mut out, &to_x, top);
+        for curve in &self.curves {
+            let dash = if curve.dashed { " dash" } else { "" };
+            let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
+            draw_curve(&mut out, &thinned(&curve.points), &to_x, &to_y);
+            out.push_str("\"/>");
+        }
+        let _ = write!(
+            out,
+            "<text x={:.1} y={:.1} text-anchor=end>{}</text><text x=12 y={:.1} text-anchor=middle transform=\"rotate(-90 12 {:.1})\">{}</text></svg>",
+            WIDE - RIGHT,
+            total - 6.0,
+            safe(&self.x_label),
+            top + HIGH / 2.0,
+            top + HIGH / 2.0,
+            safe(&self.y_label)
+        );
+        out
+    }
+
+    fn draw_marks(&self, out: &mut String, to_x: &impl Fn(f64) -> f64, top: f64) {
+        let mut free = LEFT;
+        for (value, name) in &self.marks {
+            let at = to_x(*value);
+            let _ = write!(out, "<line class=mark x1={at:.1} x2={at:.1} y1={top:.1} y2={:.1} />", top + HIGH);
+            // A name that would run into the one before it is left out; the line stays.
+            let half = 3.7 * name.chars().count() as f64;
+            let middle = at.clamp(LEFT + half, WIDE - RIGHT - half);
+            if middle - half >= free {
+                let _ = write!(
+                    out,
+                    "<text x={middle:.1} y={:.1} text-anchor=middle>{}</text>",
+                    top - 5.0,
+                    safe(name)
+                );
+                free = middle + half + 6.0;
+            }
+        }
+    }
+
+    fn x_range(&self) -> Scale {
+        let xs = self.curves.iter().flat_map(|c| c.points.iter().map(|p| p.0));
+        let (low, high) = extremes(xs.chain(self.marks.iter().map(|m| m.0)));
+        Scale::exact(low, high)
+    }
+
+    fn y_range(&self) -> Scale {
+        let ys = self.curves.iter().flat_map(|c| c.points.iter().map(|p| p.1));
+        let (low, high) = extremes(ys.chain(self.y_includes.iter().copied()).chain([0.0]));
+        Scale::rounded(low, high)
+    }
+}
+
+fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    if low < high {
+        (low, high)
+    } else if low.is_finite() {
+        (low - 0.5, low + 0.5)
+    } else {
+        (0.0, 1.0)
+    }
+}
+
+/// From where to where, and the ticks between.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    low: f64,
+    high: f64,
+    step: f64,
+    decimals: usize,
+}
+
+impl Scale {
+    fn exact(low: f64, high: f64) -> Self {
+        let step = round_step((high - low) / 6.0);
+        let decimals = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
+        Self { low, high, step, decimals }
+    }
+
+    fn rounded(low: f64, high: f64) -> Self {
+        let scale = Self::exact(low, high);
+        let step = scale.step;
+        Self { low: (low / step + 1e-9).floor() * step, high: (high / step - 1e-9).ceil() * step, ..scale }
+    }
+
+    fn ticks(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { low, high, step, .. } = *self;
+        let first = (low / step - 1e-9).ceil();
+        (0..20).map(move |n| (first + f64::from(n)) * step).take_while(move |v| *v <= high + 1e-9 * step)
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, not below `wanted`.
+fn round_step(wanted: f64) -> f64 {
+    let power = 10_f64.powf(wanted.max(1e-12).log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|s| *s >= wanted * 0.999)
+        .unwrap_or(10.0 * power)
+}
+
+/// Names in rows that fit, each with its place.
+fn legend_rows<'a>(named: &[&'a Curve]) -> Vec<Vec<(f64, &'a Curve)>> {
+    let mut rows: Vec<Vec<(f64, &Curve)>> = Vec::new();
+    let mut at = f64::INFINITY;
+    for curve in named {
+        let width = 38.0 + 7.3 * curve.name.chars().count() as f64;
+        if at + width > WIDE {
+            rows.push(Vec::new());
+            at = LEFT;
+        }
+        rows.last_mut().into_iter().for_each(|row| row.push((at, curve)));
+        at += width + 10.0;
+    }
+    rows
+}
+
+fn draw_legend(out: &mut String, rows: &[Vec<(f64, &Curve)>]) {
+    for (index, row) in rows.iter().enumerate() {
+        let y = 36.0 + LINE * index as f64;
+        for (x, curve) in row {
+            let dash = if curve.dashed { " dash" } else { "" };
+            let _ = write!(
+                out,
+                "<path class=\"s s{}{dash}\" d=\"M{x:.1} {:.1}h24\"/><text x={:.1} y={y:.1}>{}</text>",
+                curve.colour,
+                y - 5.0,
+                x + 30.0,
+                safe(&curve.name)
+            );
+        }
+    }
+}
+
+/// No more points than are seen: of each column the first, the least and the greatest.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    if points.len() <= 4 * COLUMNS {
+        return points.to_vec();
+    }
+    let mut kept = Vec::new();
+    for part in points.chunks(points.len().div_ceil(COLUMNS)) {
+        let order = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let mut some: Vec<(f64, f64)> = part.first().into_iter().copied().collect();
+        some.extend(part.iter().min_by(order));
+        some.extend(part.iter().max_by(order));
+        some.extend(part.last());
+        // In their order in time, so that a curve that turns back still does.
+        let place = |p: &(f64, f64)| part.iter().position(|q| q == p).unwrap_or(0);
+        some.sort_by_key(place);
+        some.dedup();
+        kept.extend(some);
+    }
+    kept
+}
+
+fn draw_curve(
+    out: &mut String,
+    points: &[(f64, f64)],
+    to_x: &impl Fn(f64) -> f64,
+    to_y: &impl Fn(f64) -> f64,
+) {
+    let mut pen = 'M';
+    for (x, y) in points {
+        if x.is_finite() && y.is_finite() {
+            let _ = write!(out, "{pen}{:.1} {:.1}", to_x(*x), to_y(*y));
+            pen = 'L';
+        } else {
+            pen = 'M';
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_lie_within() {
+        let scale = Scale::rounded(-0.13, 2.9);
+        assert_eq!((scale.low, scale.decimals), (-1.0, 0));
+        assert_eq!(scale.ticks().collect::<Vec<_>>(), [-1.0, 0.0, 1.0, 2.0, 3.0]);
+        let scale = Scale::rounded(0.0, 60.0);
+        assert_eq!((scale.low, scale.high), (0.0, 60.0), "a round range stays what it is");
+        let scale = Scale::exact(0.0, 0.7);
+        assert!(scale.ticks().zip([0.0, 0.2, 0.4, 0.6]).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert_eq!(scale.decimals, 1);
+    }
+
+    #[test]
+    fn a_spike_survives_thinning_and_a_gap_stays_one() {
+        let mut points: Vec<(f64, f64)> = (0..50_000).map(|i| (f64::from(i), 0.0)).collect();
+        points[31_234].1 = 7.0;
+        let kept = thinned(&points);
+        assert!(kept.len() < 4 * COLUMNS && kept.contains(&(31_234.0, 7.0)));
+        let curve =
+            Curve { points: vec![(0.0, 0.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, 1.0)], ..Curve::default() };
+        let svg = Chart { curves: vec![curve], ..Chart::default() }.svg();
+        let path = svg.rsplit_once("class=\"s s0\" d=\"").expect("a curve").1;
+        assert_eq!(path.split('"').next().expect("its path").matches('M').count(), 2);
+    }
+
+    #[test]
+    fn an_empty_chart_is_a_frame() {
+        for curves in [vec![], vec![Curve { points: vec![(1.0, f64::NAN)], ..Curve::default() }]] {
+            let svg = Chart { curves, ..Chart::default() }.svg();
+            assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        }
+    }
+}
