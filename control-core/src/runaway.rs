@@ -47,7 +47,7 @@ impl Bounds {
         /// Ticks of a span.
         const SPAN: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
         /// mm for each m/s² in a span, squared as (2.4 ms)², in Q30.
-        const MM_Q30: i64 = (1000 * SPAN * SPAN << 30) / (TICK_HZ as i64 * TICK_HZ as i64);
+        const MM_Q30: i64 = ((1000 * SPAN * SPAN) << 30) / (TICK_HZ as i64 * TICK_HZ as i64);
         /// m/s²: the least that is looked for.
         const LEAST: i64 = 10;
         /// m/s² for a newton: of 13 g and of 60 g.
@@ -57,7 +57,7 @@ impl Bounds {
         let counts = |acceleration: i64| acceleration * MM_Q30 / per_count;
         // N for a mN·m is 1/mm.
         let per_mnm_q8 = |per_newton: i64| {
-            let q8 = (per_newton * MM_Q30 << 8) / per_count * (1 << 16) / radius;
+            let q8 = ((per_newton * MM_Q30) << 8) / per_count * (1 << 16) / radius;
             i32::try_from(q8).unwrap_or(i32::MAX)
         };
         Self {

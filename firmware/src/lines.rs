@@ -62,9 +62,12 @@ fn floating(lines: &mut impl PulledLines) -> u8 {
 mod tests {
     use super::*;
 
-    /// Two lines: what drives each, if anything, reading by reading.
+    /// What drives a line, if anything, reading by reading.
+    type Driver = Option<fn(usize) -> bool>;
+
+    /// Two lines.
     struct Two {
-        driven: [Option<fn(usize) -> bool>; 2],
+        driven: [Driver; 2],
         pull: Pull,
         readings: usize,
         settled: bool,
@@ -87,7 +90,7 @@ mod tests {
         }
     }
 
-    fn trips(driven: [Option<fn(usize) -> bool>; 2], looks: usize) -> Option<usize> {
+    fn trips(driven: [Driver; 2], looks: usize) -> Option<usize> {
         let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true };
         let mut watch = WireWatch::new();
         (1..=looks).find(|_| {

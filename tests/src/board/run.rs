@@ -507,11 +507,14 @@ impl Driver<Machine> for World {
                         self.latch_at = self.trigger_due(session, at);
                         self.pause(session);
                     }
-                    address if write && address == STRAP_PULL.0 && !self.wiring.inclinometer => {
-                        if value >> STRAP_PULL.1 & 0b11 == STRAP_PULL.2 {
-                            self.strap_settles = Some(at + STRAP_SETTLES);
-                            self.pause(session);
-                        }
+                    address
+                        if write
+                            && address == STRAP_PULL.0
+                            && !self.wiring.inclinometer
+                            && (value >> STRAP_PULL.1) & 0b11 == STRAP_PULL.2 =>
+                    {
+                        self.strap_settles = Some(at + STRAP_SETTLES);
+                        self.pause(session);
                     }
                     TRACK_PULLS if write => self.hold_floating(session, at),
                     GPIO_FIRST..=GPIO_LAST if write => {
