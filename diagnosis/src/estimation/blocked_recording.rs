@@ -315,13 +315,11 @@ impl BlockedRecording {
 /// The command behind the delay and the lag that the rig already knows. A known filter of the reading is one of all that
 /// moves the axis, for both are linear: the command passes it too.
 fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<f64> {
-    let law = |name, key: &str, value: Option<f64>| {
-        value.filter(|x| *x > 0.0).and_then(|x| CommandLaw::new(&Effect::shaped(name, &[(key, x)])))
-    };
-    let lag = |value| law(EffectName::ElectricalLag, "time_constant", value);
-    let delay = law(EffectName::CommandDelay, "delay", rig.actuator.delay_s);
-    let mut laws: Vec<CommandLaw> =
-        [delay, lag(rig.actuator.lag_s), lag(rig.encoder.filter_s)].into_iter().flatten().collect();
+    let filter =
+        rig.encoder.filter_s.filter(|x| *x > 0.0).and_then(|x| {
+            CommandLaw::new(&Effect::shaped(EffectName::ElectricalLag, &[("time_constant", x)]))
+        });
+    let mut laws: Vec<CommandLaw> = rig.known_command_laws().into_iter().chain(filter).collect();
     command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, *h))).collect()
 }
 

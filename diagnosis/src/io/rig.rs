@@ -2,7 +2,7 @@
 //!
 //! A patched rig is the same file with refitted values and an `[[effect]]` table per effect found.
 
-use crate::effects::Effect;
+use crate::effects::{CommandLaw, Effect, EffectName};
 use crate::io::error::InputError;
 use crate::io::known_keys;
 use serde::{Deserialize, Serialize};
@@ -268,6 +268,17 @@ impl Rig {
     /// Travel per turn of the motor where known: rad or m.
     pub fn turn(&self) -> Option<f64> {
         self.encoder.turn.or((self.kind == Kind::Rotary).then_some(std::f64::consts::TAU))
+    }
+
+    /// The delay and the lag between command and force that the rig already knows.
+    pub(crate) fn known_command_laws(&self) -> Vec<CommandLaw> {
+        let law = |name, key: &str, value: Option<f64>| {
+            let value = value.filter(|x| *x > 0.0)?;
+            CommandLaw::new(&Effect::shaped(name, &[(key, value)]))
+        };
+        let delay = law(EffectName::CommandDelay, "delay", self.actuator.delay_s);
+        let lag = law(EffectName::ElectricalLag, "time_constant", self.actuator.lag_s);
+        [delay, lag].into_iter().flatten().collect()
     }
 
     /// Relative standard deviation of the inertia.

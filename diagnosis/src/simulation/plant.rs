@@ -28,7 +28,8 @@ pub struct Plant {
 impl Plant {
     /// A plant at rest at position zero.
     pub fn new(rig: &Rig) -> Self {
-        let commands = rig.effects.iter().filter_map(CommandLaw::new).collect();
+        let of_effects = rig.effects.iter().filter_map(CommandLaw::new);
+        let commands = rig.known_command_laws().into_iter().chain(of_effects).collect();
         let laws: Vec<(Law, Vec<f64>)> = rig
             .effects
             .iter()
@@ -78,8 +79,8 @@ impl Plant {
             ..State::default()
         };
         let mut dry = coulomb;
-        let mut free = push - model.viscous.unwrap_or(0.0) * self.velocity
-            + model.offset.unwrap_or(0.0)
+        let mut free = push - model.viscous.unwrap_or(0.0) * self.velocity + model.offset.unwrap_or(0.0)
+            - model.gravity.unwrap_or(0.0) * (self.position - model.gravity_zero.unwrap_or(0.0)).sin()
             + model.weight.unwrap_or(0.0) * around.tilt.sin();
         self.sensor = 0.0;
         for (law, coefficients) in &mut self.laws {
@@ -145,5 +146,34 @@ impl Plant {
     /// What the encoder reads, whole counts.
     pub fn counts(&self) -> f64 {
         (self.reading() * self.rig.encoder.counts_per_unit).floor()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_rig_knows_of_delay_and_gravity_is_run() {
+        let mut rig = Rig::of_values(0.01, 0.1, 0.0);
+        rig.actuator.delay_s = Some(0.05);
+        let mut plant = Plant::new(&rig);
+        let mut run = |seconds: f64, command: f64| {
+            for _ in 0..(seconds / 1e-4) as usize {
+                plant.step(command, Surroundings::default(), 1e-4);
+            }
+            plant.velocity()
+        };
+        run(0.01, 0.0);
+        assert_eq!(run(0.04, 1.0), 0.0, "the command is under way");
+        assert!(run(0.1, 1.0) > 0.1);
+        let mut rig = Rig::of_values(0.01, 0.1, 0.0);
+        rig.encoder.absolute = true;
+        (rig.model.gravity, rig.model.gravity_zero) = (Some(1.0), Some(0.4));
+        let mut plant = Plant::new(&rig);
+        for _ in 0..50_000 {
+            plant.step(0.0, Surroundings::default(), 1e-4);
+        }
+        assert!((plant.position() - 0.4).abs() < 1e-3, "it hangs at its zero: {}", plant.position());
     }
 }
