@@ -2,20 +2,56 @@
 //! whether it is safe: only [`crate::plan::Plan::new`] does.
 
 use crate::units::{
-    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians, Newtons,
+    Stiffness,
 };
 use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+/// What is left of an indentation when a wall gives way, where nobody knows better: 0.3, an assumption.
+pub const SPRING_BACK: I16F16 = I16F16::from_bits(19_661);
+
 /// Layers of a tissue at the most.
 pub const MAX_LAYERS: usize = 6;
 
-/// All that the control law needs to know.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// All that the control law needs to know: the two parts, which are sent and stored apart. Neither holds the other's keys.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Config {
-    /// Roller, encoder and converter.
+    /// What was found when the device was commissioned; it changes rarely.
     pub device: Device,
+    /// Whom the needle goes into; every session sends it.
+    pub patient: Patient,
+}
+
+impl Config {
+    /// Both parts checked, ready to run.
+    pub fn plan(&self) -> Result<crate::Plan, crate::Refusal> {
+        crate::Plan::new(&self.device, &self.patient)
+    }
+}
+
+/// The device as it was built and commissioned: roller, encoder, converter, and what it never exceeds, whoever the patient
+/// is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Device {
+    /// Radius of the roller on the motor shaft, 4–25 mm.
+    pub roller_radius: Millimetres,
+    /// Encoder counts a turn after quadrature, 256–65,535.
+    pub counts_per_turn: u16,
+    /// The encoder counts down where the needle goes in.
+    pub encoder_reversed: bool,
+    /// Torque at the converter's full scale, from the amplifier's gain and the motor's torque constant. A calibration value.
+    pub full_scale_torque: MillinewtonMetres,
+    /// The converter.
+    pub dac: DacWidth,
+    /// Where the amplifier stands still, in codes past mid-scale: at most a sixteenth of the converter's span.
+    pub dac_zero: i16,
+    /// A code above zero drives the needle outwards.
+    pub motor_reversed: bool,
+    /// What the needle's tilt reads when it is laid on the skin: −1,571 to 1,571 mrad. Measured tilt less this is the angle
+    /// to the skin.
+    pub skin_tilt: Milliradians,
     /// What the device never exceeds.
     pub limits: SafetyConfig,
     /// How speed is estimated.
@@ -24,23 +60,20 @@ pub struct Config {
     pub damping: Damping,
     /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
     pub passivity_damping: Damping,
+}
+
+/// Whom the needle goes into: tissue, its law of force, and limits of its own, which may be narrower than the device's and
+/// never wider.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Patient {
+    /// Largest force at the roller, where it is to be less than what the device gives.
+    pub largest_force: Option<Newtons>,
     /// The law of friction inside tissue.
     pub friction: FrictionLaw,
     /// The tissue, outermost layer first.
     pub layers: Vec<Layer, MAX_LAYERS>,
-}
-
-/// Roller, encoder and converter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Device {
-    /// Radius of the roller on the motor shaft, 4–25 mm.
-    pub roller_radius: Millimetres,
-    /// Encoder counts a turn after quadrature, 256–65,535.
-    pub counts_per_turn: u16,
-    /// Torque at the converter's full scale, from the amplifier's gain and the motor's torque constant. A calibration value.
-    pub full_scale_torque: MillinewtonMetres,
-    /// The converter.
-    pub dac: DacWidth,
+    /// What is to be known of the vessel beyond its layers; without it, the needle goes through its axis.
+    pub vessel: Option<Vessel>,
 }
 
 /// Resolution of the converter that drives the amplifier.
@@ -70,7 +103,7 @@ impl DacWidth {
 /// What the device never exceeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SafetyConfig {
-    /// Largest torque.
+    /// Largest torque: the ceiling that no patient raises.
     pub torque: MillinewtonMetres,
     /// Torque that the motor bears for ever, 3–180 mN·m.
     pub continuous_torque: MillinewtonMetres,
@@ -80,7 +113,7 @@ pub struct SafetyConfig {
     pub slew_per_tick: MillinewtonMetres,
     /// Time over which torque fades in after a start, 10–5,000 ms.
     pub fade_in_ms: u16,
-    /// Largest movement in one tick, in counts; more is an encoder fault. 2–1,000.
+    /// Largest movement in one tick, in counts: the ceiling of speed; more is an encoder fault. 2–1,000.
     pub max_counts_per_tick: u16,
     /// Largest depth; beyond it is a fault. 1–500 mm.
     pub travel: Millimetres,
@@ -122,13 +155,24 @@ pub enum FrictionLaw {
     },
 }
 
+/// A vessel among the layers, the one whose near wall is of [`Tissue::Vessel`]: a tube with its axis level with the skin and
+/// along the way that the needle points, oval across. Its depth and its vertical diameter are those of its two walls' layers
+/// over the axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Vessel {
+    /// Horizontal diameter, 0.2–30 mm.
+    pub width: Millimetres,
+    /// How far the needle's plane passes beside the axis; half the width and more is past the vessel.
+    pub offset: Millimetres,
+}
+
 /// One layer of tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Layer {
     /// What it is, for events and pictures.
     pub tissue: Tissue,
-    /// Depth of its outer face along the needle.
-    pub top: Millimetres,
+    /// Depth of its outer face, perpendicular to the skin.
+    pub depth: Millimetres,
     /// Its wall, where it has one that gives way.
     pub wall: Option<Wall>,
     /// Friction limit gained for each mm of needle inside it.
@@ -149,6 +193,14 @@ pub enum Tissue {
     Vessel = 3,
     /// Anything else.
     Other = 4,
+    /// The bursa of a joint.
+    Bursa = 5,
+    /// Tendon.
+    Tendon = 6,
+    /// Cartilage.
+    Cartilage = 7,
+    /// The far wall of the vessel above it, and what lies under that: its puncture is a mistake.
+    FarWall = 8,
 }
 
 /// The jog effect of a wall: it rises along one parabola and, once punctured, falls along another.
@@ -163,6 +215,8 @@ pub struct Wall {
     pub relief: Parabola,
     /// Slope with which the relief force lets go when the needle is drawn back.
     pub unload: Stiffness,
+    /// Part of the indentation that is left when the wall has just given way, 0–1; it goes as far as the relief goes.
+    pub spring_back: I16F16,
 }
 
 /// `f(T) = (T − vertex)²/compliance + base` (seed 001, eq. 1).
@@ -176,9 +230,43 @@ pub struct Parabola {
     pub base: Newtons,
 }
 
-impl Default for Config {
-    /// An adult's antecubital vein at a 10 mm roller and a 12-bit converter, as `force-models` in the design notes gives
-    /// it: skin 9 mm²/N to 1.0 N at 3 mm, vein 4 mm²/N to 0.56 N at 1.5 mm, 4.8 mm deep along the needle.
+impl Default for Device {
+    /// A 10 mm roller on the motor and encoder of seed 001, a 12-bit converter.
+    fn default() -> Self {
+        let mm = |whole: i32| Millimetres(I16F16::from_bits(whole << 16));
+        // 28.8 mN·m.
+        let torque = MillinewtonMetres(I16F16::from_bits(1_887_437));
+        Self {
+            roller_radius: mm(10),
+            counts_per_turn: 4000,
+            encoder_reversed: false,
+            full_scale_torque: torque,
+            dac: DacWidth::Bits12,
+            dac_zero: 0,
+            motor_reversed: false,
+            skin_tilt: Milliradians(0),
+            limits: SafetyConfig {
+                torque,
+                continuous_torque: torque,
+                winding_time_s: 12,
+                slew_per_tick: MillinewtonMetres(I16F16::from_bits(65_536)),
+                fade_in_ms: 300,
+                max_counts_per_tick: 16,
+                travel: mm(60),
+                stiffness: Stiffness(I16F16::from_bits(2 << 16)),
+                heartbeat_ms: 200,
+            },
+            speed: SpeedMethod::Window,
+            damping: Damping::default(),
+            // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
+            passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
+        }
+    }
+}
+
+impl Default for Patient {
+    /// An adult's antecubital vein, as `force-models` in the design notes gives it: skin 9 mm²/N to 1.0 N at 3 mm, vein
+    /// 4 mm²/N to 0.56 N at 1.5 mm, 4.8 mm deep and 3.0 mm across, perpendicular to the skin.
     fn default() -> Self {
         let mm = |bits: i32| Millimetres(I16F16::from_bits(bits));
         let wall = |compliance: i32, puncture: i32, vertex: i32, relief: i32| Wall {
@@ -194,10 +282,11 @@ impl Default for Config {
                 base: Newtons::default(),
             },
             unload: Stiffness(I16F16::from_bits(65_536)),
+            spring_back: SPRING_BACK,
         };
         let layer = |tissue, top: i32, wall, friction: i32| Layer {
             tissue,
-            top: mm(top),
+            depth: mm(top),
             wall,
             friction: FrictionPerMillimetre(I16F16::from_bits(friction)),
         };
@@ -206,31 +295,32 @@ impl Default for Config {
             layer(Tissue::Skin, 0, Some(wall(9 << 16, 3 << 16, 4 << 16, 163_840)), 1_311),
             layer(Tissue::Muscle, 2 << 16, None, 1_311),
             layer(Tissue::Vessel, 314_573, Some(wall(4 << 16, 98_304, 147_456, 147_456)), 1_311),
+            layer(Tissue::FarWall, 511_181, Some(wall(4 << 16, 98_304, 147_456, 147_456)), 1_311),
         ];
         Self {
-            device: Device {
-                roller_radius: mm(10 << 16),
-                counts_per_turn: 4000,
-                full_scale_torque: MillinewtonMetres(I16F16::from_bits(1_887_437)),
-                dac: DacWidth::Bits12,
-            },
-            limits: SafetyConfig {
-                torque: MillinewtonMetres(I16F16::from_bits(1_887_437)),
-                continuous_torque: MillinewtonMetres(I16F16::from_bits(1_887_437)),
-                winding_time_s: 12,
-                slew_per_tick: MillinewtonMetres(I16F16::from_bits(65_536)),
-                fade_in_ms: 300,
-                max_counts_per_tick: 16,
-                travel: mm(60 << 16),
-                stiffness: Stiffness(I16F16::from_bits(2 << 16)),
-                heartbeat_ms: 200,
-            },
-            speed: SpeedMethod::Window,
-            damping: Damping::default(),
-            // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
-            passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
+            largest_force: None,
             friction: FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(65_536)) },
             layers: layers.into_iter().collect(),
+            vessel: None,
+        }
+    }
+}
+
+impl Patient {
+    /// Nobody: the needle meets nothing and feels nothing. Any device bears it.
+    pub fn nobody() -> Self {
+        let nothing = Layer {
+            tissue: Tissue::Other,
+            depth: Millimetres::default(),
+            wall: None,
+            friction: FrictionPerMillimetre::default(),
+        };
+        Self {
+            largest_force: None,
+            // The softest hold that there may be: any limit of stiffness bears it.
+            friction: FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(3_276)) },
+            layers: core::iter::once(nothing).collect(),
+            vessel: None,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The tick: strings the stages together and holds the operating mode. The device and the simulator call this and
 //! nothing else.
 
-use crate::event::{Fault, Limits, State, Transitions};
+use crate::anatomy::Insertion;
+use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
 use crate::math::scaled;
@@ -50,6 +51,10 @@ pub struct TickOutput {
     pub speed: MillimetresPerSecond,
     /// The force that the law asked for, before limits.
     pub force: Newtons,
+    /// The angle to the skin that the layers were met at.
+    pub angle: Milliradians,
+    /// Where the tip is as seen from the vessel.
+    pub vessel: VesselState,
 }
 
 /// One tick as it is streamed and recorded.
@@ -57,7 +62,8 @@ pub struct TickOutput {
 pub struct Sample {
     /// Counts past the zero.
     pub count: i32,
-    /// What was written to the converter.
+    /// The torque as the code of a converter of the same width whose zero is mid-scale, on a motor whose sign is right:
+    /// without the commissioned zero and sign, so that a recording needs no device to be read.
     pub dac: u16,
     /// [`State`] as a number.
     pub state: u8,
@@ -95,6 +101,7 @@ pub struct Controller {
     origin: Counts,
     previous: Option<Counts>,
     speed: SpeedEstimator,
+    insertion: Insertion,
     tissue: Tissue,
     observer: Observer,
     winding: Winding,
@@ -133,7 +140,8 @@ impl Controller {
         let mut winding = Winding::with_heat(heat);
         winding.allow(&plan.thermal, plan.torque_limits.torque);
         Self {
-            speed: SpeedEstimator::new(plan.config.speed, Counts(0)),
+            speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
+            insertion: Insertion::new(&plan.anatomy),
             plan,
             mode: Mode::Idle,
             player: None,
@@ -164,24 +172,27 @@ impl Controller {
     /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
     pub fn order(&mut self, order: Order) {
         match order {
-            Order::Start if !self.mode.is_powered() => self.power_up(Mode::Running),
+            Order::Start if !self.mode.is_powered() => {
+                self.insertion.begin();
+                self.power_up(Mode::Running);
+            }
             Order::Excite(excitation) if !self.mode.is_powered() => {
                 let depth = self.plan.scale.depth(self.latest_count());
                 self.player = Some(Player::new(&excitation, depth));
-                self.tissue = Tissue::default();
+                self.withdraw();
                 self.power_up(Mode::Exciting);
             }
             Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
             Order::Zero if !self.mode.is_powered() => {
                 self.origin = self.previous.unwrap_or_default();
-                self.tissue = Tissue::default();
-                self.speed = SpeedEstimator::new(self.plan.config.speed, Counts(0));
+                self.withdraw();
+                self.speed = SpeedEstimator::new(self.plan.config.device.speed, Counts(0));
             }
             Order::Heartbeat => self.heartbeat(),
             Order::Configure(plan) if !self.mode.is_powered() => {
-                self.speed = SpeedEstimator::new(plan.config.speed, self.latest_count());
-                self.tissue = Tissue::default();
+                self.speed = SpeedEstimator::new(plan.config.device.speed, self.latest_count());
                 self.plan = plan;
+                self.withdraw();
                 self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque);
             }
             Order::Trip(fault) => self.trip(fault),
@@ -192,6 +203,12 @@ impl Controller {
     /// [`Order::Heartbeat`], the one that comes while the needle moves.
     pub fn heartbeat(&mut self) {
         self.silent_ticks = 0;
+    }
+
+    /// As if the needle had never been in this tissue.
+    fn withdraw(&mut self) {
+        self.insertion = Insertion::new(&self.plan.anatomy);
+        self.tissue = Tissue::default();
     }
 
     fn power_up(&mut self, mode: Mode) {
@@ -205,26 +222,21 @@ impl Controller {
 
     /// One tick, 100 µs after the one before.
     pub fn tick(&mut self, input: TickInput) -> TickOutput {
-        let count = self.count(input.count);
+        let count = self.count(Counts(input.count.0.wrapping_mul(self.plan.encoder_sign)));
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
-        // Nobody's hand is on the needle during an excitation, and nobody feels tissue.
-        let tissue = match self.mode {
-            Mode::Exciting => Response::default(),
-            _ => self.tissue.tick(&self.plan.layers, count, depth, speed),
-        };
+        let (transitions, tissue) = self.meet(input.tilt, depth, speed);
         self.watch_host();
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
             Some((wanted, limits)) => self.limit(wanted, limits),
             None => (MillinewtonMetres::default(), Limits::default()),
         };
         self.winding.tick(torque);
-        // A tick in which walls give way is long enough.
-        let punctures = tissue.transitions.puncture;
-        if punctures & punctures.wrapping_sub(1) == 0 {
+        // A tick in which a wall gives way is long enough.
+        if transitions.puncture == 0 {
             self.take_turn(count, torque);
         }
-        let dac = self.plan.dac.code(torque);
+        let codes = self.plan.dac.codes(torque);
         let state = match self.mode {
             Mode::Running => tissue.state,
             Mode::Exciting => State::Excitation,
@@ -232,15 +244,22 @@ impl Controller {
             Mode::Faulted => State::Fault,
         };
         TickOutput {
-            dac,
+            dac: codes.written,
             enable: self.mode.is_powered(),
-            sample: Sample { count: count.0, dac: dac.0, state: state as u8, tilt_mrad: input.tilt.0 },
-            transitions: tissue.transitions,
+            sample: Sample {
+                count: count.0,
+                dac: codes.plain.0,
+                state: state as u8,
+                tilt_mrad: input.tilt.0,
+            },
+            transitions,
             limits,
             tripped: self.tripped.take(),
             depth,
             speed,
             force: tissue.force,
+            angle: self.insertion.angle(),
+            vessel: self.insertion.vessel(),
         }
     }
 
@@ -263,6 +282,20 @@ impl Controller {
         }
     }
 
+    /// What the tip at `depth` meets and feels. During an excitation nobody's hand is on the needle, and nobody feels tissue.
+    fn meet(
+        &mut self,
+        tilt: Milliradians,
+        depth: Millimetres,
+        speed: MillimetresPerSecond,
+    ) -> (Transitions, Response) {
+        if self.mode == Mode::Exciting {
+            return (Transitions::default(), Response::NONE);
+        }
+        let transitions = self.insertion.tick(&self.plan.anatomy, tilt, depth);
+        (transitions, self.tissue.tick(&self.plan.forces, &self.insertion, depth, speed))
+    }
+
     /// Counts past the zero in the tick before.
     fn latest_count(&self) -> Counts {
         self.previous.map_or(Counts(0), |previous| moved(self.origin, previous))
@@ -281,7 +314,7 @@ impl Controller {
             }
             Mode::Idle | Mode::Faulted => return count,
         };
-        if step.unsigned_abs() > u32::from(self.plan.config.limits.max_counts_per_tick) {
+        if step.unsigned_abs() > u32::from(self.plan.config.device.limits.max_counts_per_tick) {
             self.trip(Fault::EncoderJump);
         } else if is_beyond {
             self.trip(Fault::Travel);

@@ -169,6 +169,31 @@ impl Limits {
     }
 }
 
+/// Where the tip is as seen from a vessel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum VesselState {
+    /// Above it, or there is none.
+    #[default]
+    Outside = 0,
+    /// Pushing in the near wall.
+    Touching = 1,
+    /// Inside: blood shows in the hub.
+    InLumen = 2,
+    /// Through the far wall.
+    Through = 3,
+    /// As deep as the vessel, and beside it.
+    Beside = 4,
+}
+
+impl VesselState {
+    /// The state behind its number on the wire.
+    pub fn from_code(code: u8) -> Option<Self> {
+        use VesselState::*;
+        [Outside, Touching, InLumen, Through, Beside].get(usize::from(code)).copied()
+    }
+}
+
 /// What changed in the tissue in one tick: a bit a layer, bit 0 the outermost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transitions {
@@ -178,6 +203,8 @@ pub struct Transitions {
     pub puncture: u8,
     /// The tip has left the layer, which is whole again.
     pub exit: u8,
+    /// The tip has come into a vessel's lumen, from either side: blood shows in the hub.
+    pub flashback: bool,
 }
 
 impl Transitions {
@@ -221,6 +248,14 @@ mod tests {
             assert_eq!(state.is_powered(), (1..=6).contains(&code), "{state:?}");
         }
         assert_eq!(State::from_code(8), None);
+    }
+
+    #[test]
+    fn a_vessels_state_is_its_number() {
+        for code in 0..5 {
+            assert_eq!(VesselState::from_code(code).map(|state| state as u8), Some(code));
+        }
+        assert_eq!(VesselState::from_code(5), None);
     }
 
     #[test]

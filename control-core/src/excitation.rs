@@ -92,7 +92,7 @@ pub enum Signal {
 impl Excitation {
     /// Whether the device may play it under `plan`.
     pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
-        let limits = &plan.config().limits;
+        let limits = &plan.device().limits;
         let thousandth = |t: i64| I16F16::from_num(t) / 1000;
         let seconds = I16F16::saturating_from_num(I32F32::from_num(self.duration_ms) / 1000);
         within(Field::DurationSeconds, seconds, thousandth(10), I16F16::from_num(600))?;
@@ -101,7 +101,8 @@ impl Excitation {
         within(Field::Damping, I16F16::from_num(self.servo.damping.0), I16F16::ZERO, thousandth(20))?;
         let speed =
             |s: MillimetresPerSecond| within(Field::Speed, s.0, thousandth(10), I16F16::from_num(2000));
-        let torque = |t: MillinewtonMetres| within(Field::TorqueLimit, t.0, I16F16::ZERO, limits.torque.0);
+        let torque =
+            |t: MillinewtonMetres| within(Field::TorqueLimit, t.0, I16F16::ZERO, plan.torque_limits.torque);
         let length = |l: Millimetres| within(Field::Travel, l.0, thousandth(10), self.travel.0);
         let ratio = |r: I16F16| within(Field::Ratio, r, I16F16::ONE, I16F16::from_num(4));
         let steps =
@@ -454,7 +455,7 @@ mod tests {
 
     #[test]
     fn what_would_leave_the_travel_or_the_torque_is_refused() {
-        let plan = Plan::new(&Config::default()).unwrap();
+        let plan = Config::default().plan().unwrap();
         let servo = Servo { stiffness: Stiffness(I16F16::from_num(0.1)), damping: Damping::default() };
         let travel = Millimetres(I16F16::from_num(100));
         let sound = Excitation { signal: staircase(), duration_ms: 10_000, servo, travel };

@@ -1,7 +1,7 @@
 //! What the device computes ten thousand times a second: encoder count in, DAC code out.
 //!
-//! A tick, as data: count → [`kinematics`] (depth, speed) → [`tissue`] (layers, their state, the force law) → torque →
-//! [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
+//! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → [`tissue`] (the
+//! force law) → torque → [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
 //! operating mode; [`config`] is what a person writes and [`plan`] what may run, or the reason why not.
 //!
 //! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board and the simulator run
@@ -16,6 +16,7 @@
     clippy::indexing_slicing
 )]
 
+pub mod anatomy;
 pub mod config;
 pub mod controller;
 pub mod event;
@@ -33,7 +34,7 @@ mod thermal;
 pub mod tissue;
 pub mod units;
 
-pub use config::Config;
+pub use config::{Config, Device, Patient};
 pub use controller::{Controller, Order, TickInput, TickOutput};
 pub use plan::{Plan, Refusal};
 

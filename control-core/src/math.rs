@@ -1,7 +1,8 @@
 //! Fixed-point helpers that the laws share. A product here is one multiplication and a handful of moves on the board; the
 //! general conversions of `fixed` take forty instructions.
 
-use fixed::types::{I2F30, I16F16};
+use crate::units::Milliradians;
+use fixed::types::{I2F30, I8F24, I16F16};
 
 /// log2(e).
 const LOG2_E: I2F30 = I2F30::from_bits(1_549_082_005);
@@ -20,6 +21,36 @@ pub(crate) fn exp(x: I16F16) -> I16F16 {
     // 2^whole · mantissa: Q30 to Q16 is a shift by 14, of which `whole` is taken back.
     let shift = 14 - whole;
     I16F16::from_bits((mantissa_q30 + (1 << (shift - 1))) >> shift)
+}
+
+/// The sine of an angle from 0 to 1,571 mrad, to 1e-7.
+pub(crate) fn sine(angle: Milliradians) -> I2F30 {
+    /// A milliradian in Q29.
+    const MRAD_Q29: i32 = 536_870;
+    /// What is left of it in Q45.
+    const REST_Q45: i32 = 59_768;
+    /// 1/(2k(2k + 1)) of x·(1 − x²/6·(1 − x²/20·(1 − …))), innermost first, in Q32.
+    const SHARES_Q32: [i32; 5] = [39_045_157, 59_652_324, 102_261_126, 214_748_365, 715_827_883];
+    let mrad = i32::from(angle.0.clamp(0, 1_571));
+    // Q29, below 1.571.
+    let x = mrad * MRAD_Q29 + ((mrad * REST_Q45) >> 16);
+    // Q28, below 2.47, so that a product with a share in Q32 stays in Q28.
+    let square = upper_half(x, x) << 2;
+    let one_q30 = 1 << 30;
+    let series = SHARES_Q32.iter().fold(one_q30, |series, &share| {
+        let term = upper_half(square, share);
+        one_q30 - (((i64::from(term) * i64::from(series)) >> 28) as i32)
+    });
+    I2F30::from_bits(((i64::from(x) * i64::from(series)) >> 29) as i32)
+}
+
+/// `1/x` for x from 0.08 to 1, to 3e-7.
+pub(crate) fn reciprocal(x: I2F30) -> I8F24 {
+    let x = x.to_bits().max(85_899_346);
+    // 12 bits and more by the division of 32 bits, twice as many after a step of Newton's.
+    let rough_q16 = ((1_u32 << 31) / (x >> 15) as u32) as i32;
+    let error_q30 = (1 << 30) - scaled(x, rough_q16, 16);
+    I8F24::from_bits((rough_q16 << 8) + scaled(rough_q16, error_q30, 22))
 }
 
 /// `a · b`, saturating, with `b` in [−2, 2) and fine steps.
@@ -71,6 +102,22 @@ mod tests {
         }
         assert_eq!(exp(I16F16::MAX), exp(I16F16::from_bits(8 << 16)));
         assert_eq!(exp(I16F16::MIN), I16F16::ONE);
+    }
+
+    #[test]
+    fn sine_and_its_reciprocal_follow_their_twins() {
+        for mrad in 0..=1_571_i16 {
+            let exact = (f64::from(mrad) * 1e-3).sin();
+            let got = sine(Milliradians(mrad));
+            assert!((got.to_num::<f64>() - exact).abs() < 1e-7, "sin({mrad} mrad) = {got}, not {exact}");
+            if exact > 0.08 {
+                let inverse = reciprocal(got).to_num::<f64>();
+                assert!((inverse * exact - 1.0).abs() < 4e-7, "1/sin({mrad} mrad) = {inverse}");
+            }
+        }
+        assert_eq!(reciprocal(I2F30::ONE), I8F24::ONE);
+        let straight = reciprocal(sine(Milliradians(1_571)));
+        assert!(straight.abs_diff(I8F24::ONE).to_bits() <= 1, "straight in: {straight}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The last stage before the motor: limits that may reduce torque and never turn it round, and the step to a DAC code.
 
-use crate::config::DacWidth;
+use crate::config::Device;
 use crate::event::Limits;
 use crate::math::scaled;
 use crate::units::{DacCode, MillinewtonMetres};
@@ -61,49 +61,90 @@ impl Limiter {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DacScale {
     codes_per_mnm: I16F16,
-    mid_scale: u16,
-    span: u16,
+    mid_scale: i32,
+    /// The code of zero torque.
+    zero: i32,
+    /// −1 where a code above zero drives the needle outwards.
+    sign: i32,
+    span: i32,
+}
+
+/// A torque as codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Codes {
+    /// For this converter.
+    pub(crate) written: DacCode,
+    /// For a converter whose zero is mid-scale, on a motor whose sign is right: what is streamed.
+    pub(crate) plain: DacCode,
 }
 
 impl DacScale {
-    /// For a converter whose full scale is `full_scale` torque.
-    pub(crate) fn new(width: DacWidth, full_scale: MillinewtonMetres) -> Self {
-        let span = width.span();
-        Self { codes_per_mnm: I16F16::from_num(span) / full_scale.0, mid_scale: width.mid_scale(), span }
+    /// For the converter, the zero and the sign of `device`.
+    pub(crate) fn new(device: &Device) -> Self {
+        let span = device.dac.span();
+        let mid_scale = i32::from(device.dac.mid_scale());
+        Self {
+            codes_per_mnm: I16F16::from_num(span) / device.full_scale_torque.0,
+            mid_scale,
+            zero: mid_scale + i32::from(device.dac_zero),
+            sign: if device.motor_reversed { -1 } else { 1 },
+            // As far both ways, wherever zero lies.
+            span: i32::from(span) - i32::from(device.dac_zero).abs(),
+        }
     }
 
     /// The nearest code; never beyond the converter's span.
-    pub(crate) fn code(&self, torque: MillinewtonMetres) -> DacCode {
+    pub(crate) fn codes(&self, torque: MillinewtonMetres) -> Codes {
         let steps_q32 = i64::from(torque.0.to_bits()) * i64::from(self.codes_per_mnm.to_bits());
         let nearest = ((steps_q32 + (1 << 31)) >> 32) as i32;
-        let span = i32::from(self.span);
+        let steps = nearest.min(self.span).max(-self.span);
         // Mid-scale is a step more than the span: never below 1 and never above the width.
-        DacCode((i32::from(self.mid_scale) + nearest.min(span).max(-span)) as u16)
+        Codes {
+            written: DacCode((self.zero + self.sign * steps) as u16),
+            plain: DacCode((self.mid_scale + steps) as u16),
+        }
     }
 
     /// The code of zero torque.
     pub(crate) fn zero(&self) -> DacCode {
-        DacCode(self.mid_scale)
+        DacCode(self.zero as u16)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::DacWidth;
 
     fn mnm(torque: f64) -> MillinewtonMetres {
         MillinewtonMetres(I16F16::from_num(torque))
     }
 
+    fn device(dac: DacWidth, full_scale: f64) -> Device {
+        Device { dac, full_scale_torque: mnm(full_scale), ..Device::default() }
+    }
+
     #[test]
     fn the_code_is_the_nearest_and_stays_within_the_span() {
         // A step a mN·m.
-        let scale = DacScale::new(DacWidth::Bits8, mnm(127.0));
-        let codes = [0.0, 0.49, 0.51, -0.49, -0.51, 126.4, 127.0, 200.0, -127.0, -200.0];
+        let scale = DacScale::new(&device(DacWidth::Bits8, 127.0));
+        let torques = [0.0, 0.49, 0.51, -0.49, -0.51, 126.4, 127.0, 200.0, -127.0, -200.0];
         let wanted = [128, 128, 129, 128, 127, 254, 255, 255, 1, 1];
-        assert_eq!(codes.map(|torque| scale.code(mnm(torque)).0), wanted);
+        assert_eq!(torques.map(|torque| scale.codes(mnm(torque)).written.0), wanted);
+        assert_eq!(torques.map(|torque| scale.codes(mnm(torque)).plain.0), wanted);
         assert_eq!(scale.zero(), DacCode(128));
-        assert_eq!(DacScale::new(DacWidth::Bits12, mnm(20.47)).code(mnm(-20.47)), DacCode(1));
+        let wide = DacScale::new(&device(DacWidth::Bits12, 20.47));
+        assert_eq!(wide.codes(mnm(-20.47)).written, DacCode(1));
+    }
+
+    #[test]
+    fn a_zero_beside_mid_scale_and_a_reversed_motor_are_for_the_converter_alone() {
+        let beside = Device { dac_zero: 5, motor_reversed: true, ..device(DacWidth::Bits8, 127.0) };
+        let scale = DacScale::new(&beside);
+        let torques = [0.0, 10.0, -10.0, 200.0, -200.0].map(|torque| scale.codes(mnm(torque)));
+        assert_eq!(torques.map(|codes| codes.written.0), [133, 123, 143, 11, 255]);
+        assert_eq!(torques.map(|codes| codes.plain.0), [128, 138, 118, 250, 6]);
+        assert_eq!(scale.zero(), DacCode(133));
     }
 
     #[test]

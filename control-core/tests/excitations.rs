@@ -2,9 +2,14 @@
 
 use control_core::excitation::{Excitation, Reference, Servo, Signal, Target};
 use control_core::plan::Field;
-use control_core::units::{Counts, Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use control_core::{Config, Controller, Order, Plan, Refusal, TickInput};
+use control_core::units::{
+    Counts, Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Stiffness,
+};
+use control_core::{Config, Controller, Order, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
+
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
 
 const TICKS_PER_S: f64 = 10_000.0;
 
@@ -117,7 +122,7 @@ fn played(signal: Signal) -> Excitation {
 }
 
 fn refused(excitation: &Excitation) -> Option<Field> {
-    match excitation.check(&Plan::new(&Config::default()).expect("sound")) {
+    match excitation.check(&Config::default().plan().expect("sound")) {
         Ok(()) => None,
         Err(Refusal::OutOfRange { field, .. }) => Some(field),
         Err(other) => panic!("{other:?}"),
@@ -178,7 +183,7 @@ fn the_last_step_of_a_series_is_what_has_to_fit() {
 #[test]
 fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
     let servo = Servo { stiffness: Stiffness(q(0.2)), damping: Damping(I8F24::from_num(0.002)) };
-    let plan = Plan::new(&Config::default()).expect("sound");
+    let plan = Config::default().plan().expect("sound");
     let mnm_per_step = 28.8 / 2047.0;
     let mm_per_count = plan.mm_per_count().to_num::<f64>();
     let zero = f64::from(plan.zero_torque_code().0);
@@ -186,7 +191,7 @@ fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
     let excitation = Excitation { servo, duration_ms: 2_000, ..played(Signal::Hold) };
     // Longer than the speed window.
     for _ in 0..200 {
-        c.tick(TickInput { count: Counts(300), ..TickInput::default() });
+        c.tick(TickInput { count: Counts(300), tilt: STRAIGHT });
     }
     c.order(Order::Excite(excitation));
     // Held where it began until torque has faded in, then moved on at a count every four ticks.
@@ -194,7 +199,7 @@ fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
     for tick in 0..9_000 {
         c.order(Order::Heartbeat);
         let count = 300 + ((tick - 5_000) / 4).clamp(0, 400);
-        let output = c.tick(TickInput { count: Counts(count), ..TickInput::default() });
+        let output = c.tick(TickInput { count: Counts(count), tilt: STRAIGHT });
         window.push_back(count);
         let moved = count - window.pop_front().expect("never empty");
         let speed = f64::from(moved) * mm_per_count * TICKS_PER_S / 128.0;

@@ -1,10 +1,15 @@
 //! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
 
-use control_core::config::{FrictionLaw, Layer, Parabola, SpeedMethod, Tissue, Wall};
+use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall};
 use control_core::event::{Fault, State};
-use control_core::units::{Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
-use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
+use control_core::units::{
+    Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Milliradians, Newtons, Stiffness,
+};
+use control_core::{Config, Controller, Device, Order, Patient, TickInput, TickOutput};
 use fixed::types::I16F16;
+
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
 
 fn paper() -> FrictionLaw {
     FrictionLaw::Paper {
@@ -17,8 +22,8 @@ fn paper() -> FrictionLaw {
 }
 
 fn started(config: &Config) -> Controller {
-    let mut controller = Controller::new(Plan::new(config).expect("the configuration is sound"));
-    controller.tick(TickInput::default());
+    let mut controller = Controller::new(config.plan().expect("the configuration is sound"));
+    controller.tick(TickInput { tilt: STRAIGHT, ..TickInput::default() });
     controller.order(Order::Start);
     controller
 }
@@ -41,14 +46,14 @@ fn hold(c: &mut Controller, mm: f64, seconds: f64) -> TickOutput {
 
 fn tick_at(c: &mut Controller, count: i32) -> TickOutput {
     c.order(Order::Heartbeat);
-    c.tick(TickInput { count: Counts(count), ..TickInput::default() })
+    c.tick(TickInput { count: Counts(count), tilt: STRAIGHT })
 }
 
 #[test]
 fn the_default_is_a_venepuncture_with_two_punctures() {
     let mut c = started(&Config::default());
     let (mut at, mut punctures, mut peak) = (0.0, Vec::new(), 0.0_f64);
-    travel(&mut c, &mut at, 10.0, 10.0, |out| {
+    travel(&mut c, &mut at, 7.7, 10.0, |out| {
         if out.transitions.puncture != 0 {
             punctures.push((out.transitions.puncture, out.depth.0.to_num::<f64>()));
         }
@@ -63,7 +68,7 @@ fn the_default_is_a_venepuncture_with_two_punctures() {
 fn a_wall_is_pressed_then_gives_way_then_rubs() {
     let mut c = started(&Config::default());
     let (mut at, mut states) = (0.0, Vec::new());
-    travel(&mut c, &mut at, 10.0, 10.0, |out| states.push(out.sample.state));
+    travel(&mut c, &mut at, 7.7, 10.0, |out| states.push(out.sample.state));
     states.dedup();
     let one_wall = [State::Elastic, State::Puncture, State::Friction].map(|state| state as u8);
     // The skin begins at depth zero, and behind it is the vessel.
@@ -74,9 +79,12 @@ fn a_wall_is_pressed_then_gives_way_then_rubs() {
 #[test]
 fn a_needle_drawn_back_slowly_is_not_withdrawn_yet() {
     // From edges, for one count in a window is faster already.
-    let mut c = started(&Config { speed: SpeedMethod::EdgeTiming, ..Config::default() });
+    let mut c = started(&Config {
+        device: Device { speed: SpeedMethod::EdgeTiming, ..Device::default() },
+        ..Config::default()
+    });
     let mut at = 0.0;
-    travel(&mut c, &mut at, 10.0, 10.0, |_| ());
+    travel(&mut c, &mut at, 7.7, 10.0, |_| ());
     let mut drawn_back_at = |mm_per_s: f64| {
         let (mut last, mm) = (State::Approach as u8, at - 1.0);
         travel(&mut c, &mut at, mm, mm_per_s, |out| last = out.sample.state);
@@ -90,13 +98,13 @@ fn a_needle_drawn_back_slowly_is_not_withdrawn_yet() {
 fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
     let layer = |top: i16, friction: f64| Layer {
         tissue: Tissue::Other,
-        top: Millimetres(I16F16::from_num(top)),
+        depth: Millimetres(I16F16::from_num(top)),
         wall: None,
         friction: FrictionPerMillimetre(I16F16::from_num(friction)),
     };
     let layers = [layer(0, 0.0), layer(2, 1.5)].into_iter().collect();
-    let mut config = Config { layers, ..Config::default() };
-    config.limits.travel = Millimetres(I16F16::from_num(3));
+    let mut config = Config { patient: Patient { layers, ..Patient::default() }, ..Config::default() };
+    config.device.limits.travel = Millimetres(I16F16::from_num(3));
     let mut c = started(&config);
     let mut at = 0.0;
     travel(&mut c, &mut at, 2.05, 5.0, |_| ());
@@ -108,8 +116,11 @@ fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
 
 #[test]
 fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
-    for (law, held) in [(Config::default().friction, true), (paper(), false)] {
-        let mut c = started(&Config { friction: law, ..Config::default() });
+    for (law, held) in [(Config::default().patient.friction, true), (paper(), false)] {
+        let mut c = started(&Config {
+            patient: Patient { friction: law, ..Patient::default() },
+            ..Config::default()
+        });
         let mut at = 0.0;
         let mut moving = 0.0;
         travel(&mut c, &mut at, 4.5, 10.0, |out| moving = out.force.0.to_num::<f64>());
@@ -128,8 +139,11 @@ fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
 
 #[test]
 fn friction_opposes_withdrawal() {
-    for law in [Config::default().friction, paper()] {
-        let mut c = started(&Config { friction: law, ..Config::default() });
+    for law in [Config::default().patient.friction, paper()] {
+        let mut c = started(&Config {
+            patient: Patient { friction: law, ..Patient::default() },
+            ..Config::default()
+        });
         let (mut at, mut inwards, mut outwards) = (0.0, 0.0, 0.0);
         travel(&mut c, &mut at, 5.0, 10.0, |o| inwards = o.force.0.to_num::<f64>());
         let mut state = State::Idle as u8;
@@ -174,7 +188,7 @@ fn every_fault_takes_torque_away_within_the_tick_and_latches() {
     assert_eq!((later.tripped, later.enable, later.dac), (None, false, zero), "it latches");
 
     let mut c = pressed();
-    let silent = (0..2_100).map(|_| c.tick(TickInput { count: Counts(deep), ..TickInput::default() }));
+    let silent = (0..2_100).map(|_| c.tick(TickInput { count: Counts(deep), tilt: STRAIGHT }));
     let tripped = silent.filter_map(|o| o.tripped.map(|f| (f, o.enable, o.dac))).collect::<Vec<_>>();
     assert_eq!(tripped, [(Fault::HostSilent, false, zero)]);
 
@@ -191,7 +205,7 @@ fn orders_that_do_not_fit_the_mode_change_nothing() {
     travel(&mut c, &mut at, 2.5, 10.0, |_| {});
     let before = hold(&mut c, at, 0.1);
     c.order(Order::Zero);
-    c.order(Order::Configure(Plan::new(&Config::default()).expect("sound")));
+    c.order(Order::Configure(Config::default().plan().expect("sound")));
     c.order(Order::Start);
     let after = hold(&mut c, at, 0.000_1);
     assert_eq!((before.sample, before.force), (after.sample, after.force));
@@ -208,8 +222,8 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
         servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
         travel: Millimetres(I16F16::from_num(20)),
     };
-    let mut c = Controller::new(Plan::new(&Config::default()).expect("sound"));
-    c.tick(TickInput::default());
+    let mut c = Controller::new(Config::default().plan().expect("sound"));
+    c.tick(TickInput { tilt: STRAIGHT, ..TickInput::default() });
     c.order(Order::Excite(excitation.clone()));
     let outputs = (0..11_000).map(|_| tick_at(&mut c, 0)).collect::<Vec<_>>();
     let zero = c.plan().zero_torque_code().0;
@@ -251,17 +265,21 @@ fn six_walls() -> Config {
     };
     let layer = |number: u8| Layer {
         tissue: Tissue::Other,
-        top: Millimetres(I16F16::from_num(number)),
+        depth: Millimetres(I16F16::from_num(number)),
         wall: Some(Wall {
             elastic: parabola(0.0, 1.0),
             puncture_travel: Millimetres(I16F16::from_num(0.5)),
             relief: parabola(4.0, 100.0),
             unload: Stiffness(I16F16::from_num(0.1)),
+            spring_back: SPRING_BACK,
         }),
         friction: FrictionPerMillimetre::default(),
     };
-    let mut config = Config { layers: (0..6).map(layer).collect(), ..Config::default() };
-    config.limits.max_counts_per_tick = 1_000;
+    let mut config = Config {
+        patient: Patient { layers: (0..6).map(layer).collect(), ..Patient::default() },
+        ..Config::default()
+    };
+    config.device.limits.max_counts_per_tick = 1_000;
     config
 }
 
@@ -269,12 +287,22 @@ fn six_walls() -> Config {
 fn a_needle_that_jumps_crosses_every_layer_and_wall_on_its_way_and_no_other() {
     let mut c = started(&six_walls());
     let per_count = c.plan().mm_per_count().to_num::<f64>();
+    // One layer a tick: all that is crossed until the tip has come to rest, and in which order.
     let mut to = |mm: f64| {
-        let crossed = tick_at(&mut c, (mm / per_count).round() as i32).transitions;
-        [crossed.contact, crossed.puncture, crossed.exit]
+        let (mut crossed, mut order) = ([0; 3], Vec::new());
+        for _ in 0..12 {
+            let step = tick_at(&mut c, (mm / per_count).round() as i32).transitions;
+            assert!(step.contact.count_ones() + step.exit.count_ones() <= 1, "one layer a tick: {step:?}");
+            order.extend(
+                [(step.puncture, 'p'), (step.contact, 'c')].into_iter().filter(|(layer, _)| *layer != 0),
+            );
+            crossed = [crossed[0] | step.contact, crossed[1] | step.puncture, crossed[2] | step.exit];
+        }
+        assert!(order.is_sorted(), "touched, then given way, from the outside inwards: {order:?}");
+        crossed
     };
     assert_eq!(to(-1.0), [0, 0, 1], "it began at the first");
-    assert_eq!(to(2.7), [0b111, 0b111, 0], "three layers and their walls at once");
+    assert_eq!(to(2.7), [0b111, 0b111, 0], "three layers and their walls");
     assert_eq!(to(4.2), [0b1_1000, 0b1000, 0], "the fifth is touched and has not given way");
     assert_eq!(to(9.0), [0b10_0000, 0b11_0000, 0]);
     assert_eq!(to(2.9), [0, 0, 0b11_0000], "0.1 mm outside the fourth it has not been left");

@@ -3,16 +3,19 @@
 use control_core::config::DacWidth;
 use control_core::event::{Fault, Limits, State};
 use control_core::excitation::{Excitation, Servo, Signal};
-use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Stiffness};
+use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
 use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
 use fixed::types::{I8F24, I16F16};
 
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
+
 fn controller() -> Controller {
-    Controller::new(Plan::new(&Config::default()).expect("the default is sound"))
+    Controller::new(Config::default().plan().expect("the default is sound"))
 }
 
 fn tick(c: &mut Controller, count: i32) -> TickOutput {
-    c.tick(TickInput { count: Counts(count), ..TickInput::default() })
+    c.tick(TickInput { count: Counts(count), tilt: STRAIGHT })
 }
 
 /// Powered at `count`.
@@ -32,7 +35,7 @@ fn tremor(tick: i32) -> i32 {
 fn other_plan() -> Plan {
     let mut config = Config::default();
     config.device.dac = DacWidth::Bits8;
-    Plan::new(&config).expect("sound")
+    config.plan().expect("sound")
 }
 
 fn ramps(travel_mm: i32) -> Excitation {
@@ -102,7 +105,8 @@ fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
     c.order(Order::Configure(other_plan()));
     let output = tick(&mut c, 400);
     assert_eq!(output.speed.0, I16F16::ZERO, "no jump from zero is taken for speed");
-    assert_eq!(output.transitions.contact, 0b111, "and the layers it is in are counted");
+    let met = (0..5).fold(output.transitions.contact, |met, _| met | tick(&mut c, 400).transitions.contact);
+    assert_eq!(met, 0b111, "and the layers it is in are counted, one a tick");
 }
 
 #[test]
@@ -127,7 +131,7 @@ fn an_excitation_begins_where_the_motor_is_and_only_while_torque_is_off() {
 
 #[test]
 fn an_encoder_may_move_as_far_in_a_tick_as_the_limit_and_no_further() {
-    let most = i32::from(Config::default().limits.max_counts_per_tick);
+    let most = i32::from(Config::default().device.limits.max_counts_per_tick);
     for direction in [-1, 1] {
         assert_eq!(tick(&mut started_at(0), direction * most).tripped, None);
         let further = tick(&mut started_at(0), direction * (most + 1)).tripped;
@@ -151,7 +155,7 @@ fn a_needle_may_go_to_the_end_of_its_travel_and_no_further() {
 
 #[test]
 fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
-    let silence = i32::from(Config::default().limits.heartbeat_ms) * 10;
+    let silence = i32::from(Config::default().device.limits.heartbeat_ms) * 10;
     let mut c = started_at(0);
     c.order(Order::Heartbeat);
     for silent in 1..=silence {
@@ -169,11 +173,14 @@ fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
 fn the_torque_limit_is_told_when_it_holds_torque_down() {
     let mut config = Config::default();
     // 1.005 N; the wall alone asks for 1.0 N, and damping at 50 mm/s for 0.025 N.
-    config.limits.torque = MillinewtonMetres(I16F16::from_num(10.05));
-    config.limits.travel = Millimetres(I16F16::from_num(40));
-    config.damping = Damping(I8F24::from_num(0.0005));
+    config.device.limits.torque = MillinewtonMetres(I16F16::from_num(10.05));
+    config.device.limits.travel = Millimetres(I16F16::from_num(40));
+    config.device.damping = Damping(I8F24::from_num(0.0005));
+    for layer in &mut config.patient.layers {
+        layer.friction = Default::default();
+    }
     for (ticks_per_count, in_force) in [(3, true), (30, false)] {
-        let mut c = Controller::new(Plan::new(&config).expect("sound"));
+        let mut c = Controller::new(config.plan().expect("sound"));
         tick(&mut c, 0);
         c.order(Order::Start);
         let mut told = Limits::default();
@@ -189,7 +196,7 @@ fn the_torque_limit_is_told_when_it_holds_torque_down() {
 #[test]
 fn torque_is_given_as_far_as_it_has_faded_in() {
     let mut c = started_at(0);
-    let fade_ticks = i32::from(Config::default().limits.fade_in_ms) * 10;
+    let fade_ticks = i32::from(Config::default().device.limits.fade_in_ms) * 10;
     for at in 1..=2 * fade_ticks {
         c.order(Order::Heartbeat);
         let in_force = tick(&mut c, -3 - tremor(at)).limits.contains(Limits::FADE_IN);

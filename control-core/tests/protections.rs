@@ -1,13 +1,17 @@
 //! The protections that only show over time: the winding's heat and the energy of a stiff wall. Each is also seen to
 //! matter: without it the bound that it holds is broken.
 
-use control_core::config::{Config, FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::config::{Config, FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::Limits;
 use control_core::units::{
-    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
+    Newtons, Stiffness,
 };
-use control_core::{Controller, Order, Plan, TickInput, TickOutput};
+use control_core::{Controller, Order, Patient, TickInput, TickOutput};
 use fixed::types::I16F16;
+
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
 
 fn q(value: f64) -> I16F16 {
     I16F16::from_num(value)
@@ -21,20 +25,21 @@ fn stiff_wall() -> Config {
         base: Newtons(q(base)),
     };
     let friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
-    let mut config = Config { friction, ..Config::default() };
-    config.limits.stiffness = Stiffness(q(7.0));
+    let mut config = Config { patient: Patient { friction, ..Patient::default() }, ..Config::default() };
+    config.device.limits.stiffness = Stiffness(q(7.0));
     // What rings is faster than a hand: the protection against that is not the one that is looked at here.
-    config.limits.max_counts_per_tick = 200;
+    config.device.limits.max_counts_per_tick = 200;
     let wall = Wall {
         // (T + 5)²/1.8 − 13.9: 5.6 N/mm at contact, and hardly more where the test presses.
         elastic: parabola(-5.0, 1.8, -25.0 / 1.8),
         puncture_travel: Millimetres(q(0.4)),
         relief: parabola(1.0, 1.0, 0.0),
         unload: Stiffness(q(1.0)),
+        spring_back: SPRING_BACK,
     };
-    config.layers = [Layer {
+    config.patient.layers = [Layer {
         tissue: Tissue::Other,
-        top: Millimetres(q(0.0)),
+        depth: Millimetres(q(0.0)),
         wall: Some(wall),
         friction: FrictionPerMillimetre(q(0.0)),
     }]
@@ -62,7 +67,7 @@ impl Needle {
 
 /// Deviation of the needle in the last half second of three, in µm, and how often the observer was in force.
 fn ringing(config: &Config) -> (f64, usize) {
-    let plan = Plan::new(config).expect("a sound wall");
+    let plan = config.plan().expect("a sound wall");
     let per_count_m = plan.mm_per_count().to_num::<f64>() / 1000.0;
     let zero = f64::from(plan.zero_torque_code().0);
     let mut c = Controller::new(plan);
@@ -77,7 +82,7 @@ fn ringing(config: &Config) -> (f64, usize) {
             needle.speed_m_per_s += 0.03;
         }
         let count = Counts((needle.position_m / per_count_m).floor() as i32);
-        let output = c.tick(TickInput { count, ..TickInput::default() });
+        let output = c.tick(TickInput { count, tilt: STRAIGHT });
         in_force += usize::from(output.limits.contains(Limits::PASSIVITY));
         if output.tripped.is_some() {
             // What rings like this is taken for a motor that runs away.
@@ -95,7 +100,8 @@ fn ringing(config: &Config) -> (f64, usize) {
 #[test]
 fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
     let with = stiff_wall();
-    let without = Config { passivity_damping: Damping::default(), ..with.clone() };
+    let mut without = with.clone();
+    without.device.passivity_damping = Damping::default();
     let ((quiet, in_force), (loud, never)) = (ringing(&with), ringing(&without));
     println!(
         "deviation without the observer {loud:.1} µm, with it {quiet:.1} µm; in force for {in_force} ticks"
@@ -109,24 +115,24 @@ fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
 fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &TickOutput)) {
     let mut config = stiff_wall();
     config.device.full_scale_torque = MillinewtonMetres(q(60.0));
-    config.limits.torque = MillinewtonMetres(q(60.0));
-    config.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
-    config.limits.winding_time_s = 2;
-    if let Some(wall) = &mut config.layers[0].wall {
+    config.device.limits.torque = MillinewtonMetres(q(60.0));
+    config.device.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
+    config.device.limits.winding_time_s = 2;
+    if let Some(wall) = &mut config.patient.layers[0].wall {
         wall.puncture_travel = Millimetres(q(0.75));
     }
-    let plan = Plan::new(&config).expect("sound");
+    let plan = config.plan().expect("sound");
     // 0.7 mm into 6 N/mm: about 5 N, 50 mN·m.
     let count = Counts((0.7 / plan.mm_per_count().to_num::<f64>()) as i32);
     let zero = f64::from(plan.zero_torque_code().0);
     let mut c = Controller::new(plan);
-    c.tick(TickInput { count, ..TickInput::default() });
+    c.tick(TickInput { count, tilt: STRAIGHT });
     c.order(Order::Start);
     for tick in 0..seconds * 10_000 {
         c.order(Order::Heartbeat);
         // A hand has a tremor: without it the encoder would pass for dead.
         let count = Counts(count.0 + [0, 1, 2, 1][tick / 250 % 4]);
-        let output = c.tick(TickInput { count, ..TickInput::default() });
+        let output = c.tick(TickInput { count, tilt: STRAIGHT });
         see((zero - f64::from(output.dac.0)) * 60.0 / 2047.0, &output);
     }
 }

@@ -1,12 +1,16 @@
 //! What may not run is refused with the reason; the last value that may run is not.
 
-use control_core::config::{FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 use control_core::plan::Field;
 use control_core::units::{
-    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
+    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
+    Newtons, Stiffness,
 };
-use control_core::{Config, Controller, Order, Plan, Refusal, TickInput};
+use control_core::{Config, Controller, Order, Patient, Plan, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
+
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
 
 fn q(value: f64) -> I16F16 {
     I16F16::from_num(value)
@@ -15,7 +19,7 @@ fn q(value: f64) -> I16F16 {
 fn refusal(change: impl FnOnce(&mut Config)) -> Option<Refusal> {
     let mut config = Config::default();
     change(&mut config);
-    Plan::new(&config).err()
+    config.plan().err()
 }
 
 /// The field that is refused; any other reason is told apart.
@@ -35,14 +39,14 @@ type ChangedLaw = fn(&mut FrictionLaw);
 
 /// A tissue that asks for next to nothing, so that what is tested is alone in being refused.
 fn weak(config: &mut Config) {
-    config.limits.stiffness = Stiffness(q(2.0));
-    config.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
-    config.layers = [layer(0.0, None)].into_iter().collect();
+    config.device.limits.stiffness = Stiffness(q(2.0));
+    config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
+    config.patient.layers = [layer(0.0, None)].into_iter().collect();
 }
 
 fn layer(top: f64, wall: Option<Wall>) -> Layer {
     let friction = FrictionPerMillimetre(I16F16::ZERO);
-    Layer { tissue: Tissue::Other, top: Millimetres(q(top)), wall, friction }
+    Layer { tissue: Tissue::Other, depth: Millimetres(q(top)), wall, friction }
 }
 
 fn parabola(vertex: f64, compliance: f64, base: f64) -> Parabola {
@@ -60,41 +64,53 @@ fn wall() -> Wall {
         puncture_travel: Millimetres(q(1.0)),
         relief: parabola(1.5, 4.0, 0.0),
         unload: Stiffness(q(0.5)),
+        spring_back: SPRING_BACK,
     }
 }
 
 #[test]
 fn each_value_has_a_range_and_its_ends_belong_to_it() {
     let paper = |config: &mut Config, change: fn(&mut FrictionLaw)| {
-        config.friction = FrictionLaw::Paper {
+        config.patient.friction = FrictionLaw::Paper {
             level_length: Millimetres(q(23.0)),
             level_cap: q(1.0),
             anchor_ms: 60,
             stiffness: Stiffness(q(0.5)),
             limit: Newtons(q(0.5)),
         };
-        change(&mut config.friction);
+        change(&mut config.patient.friction);
     };
-    let ranges: [Range; 14] = [
+    let ranges: [Range; 17] = [
         (Field::RollerRadius, [4.0, 3.99], [25.0, 25.01], |c, v| c.device.roller_radius.0 = q(v)),
         (Field::CountsPerTurn, [256.0, 255.0], [65_535.0, f64::NAN], |c, v| {
             c.device.counts_per_turn = v as u16
         }),
         (Field::FullScaleTorque, [28.8, 9.99], [500.0, 500.01], |c, v| c.device.full_scale_torque.0 = q(v)),
-        (Field::TorqueLimit, [0.1, 0.09], [28.79, 28.81], |c, v| c.limits.torque.0 = q(v)),
-        (Field::ContinuousTorque, [3.0, 2.99], [180.0, 180.1], |c, v| c.limits.continuous_torque.0 = q(v)),
-        (Field::WindingTimeS, [1.0, 0.0], [600.0, 601.0], |c, v| c.limits.winding_time_s = v as u16),
-        (Field::SlewPerTick, [0.0011, 0.0009], [100.0, 100.1], |c, v| c.limits.slew_per_tick.0 = q(v)),
-        (Field::FadeInMs, [10.0, 9.0], [5_000.0, 5_001.0], |c, v| c.limits.fade_in_ms = v as u16),
-        (Field::MaxCountsPerTick, [2.0, 1.0], [1_000.0, 1_001.0], |c, v| {
-            c.limits.max_counts_per_tick = v as u16
+        (Field::TorqueLimit, [0.1, 0.09], [28.79, 28.81], |c, v| c.device.limits.torque.0 = q(v)),
+        (Field::ContinuousTorque, [3.0, 2.99], [180.0, 180.1], |c, v| {
+            c.device.limits.continuous_torque.0 = q(v)
         }),
-        (Field::Travel, [1.0, 0.99], [500.0, 500.1], |c, v| c.limits.travel.0 = q(v)),
-        (Field::StiffnessLimit, [0.051, 0.049], [7.0, 7.01], |c, v| c.limits.stiffness.0 = q(v)),
-        (Field::HeartbeatMs, [20.0, 19.0], [5_000.0, 5_001.0], |c, v| c.limits.heartbeat_ms = v as u16),
-        (Field::Damping, [0.0, -0.0001], [0.0005, 0.0006], |c, v| c.damping = Damping(I8F24::from_num(v))),
+        (Field::WindingTimeS, [1.0, 0.0], [600.0, 601.0], |c, v| c.device.limits.winding_time_s = v as u16),
+        (Field::SlewPerTick, [0.0011, 0.0009], [100.0, 100.1], |c, v| c.device.limits.slew_per_tick.0 = q(v)),
+        (Field::FadeInMs, [10.0, 9.0], [5_000.0, 5_001.0], |c, v| c.device.limits.fade_in_ms = v as u16),
+        (Field::MaxCountsPerTick, [2.0, 1.0], [1_000.0, 1_001.0], |c, v| {
+            c.device.limits.max_counts_per_tick = v as u16
+        }),
+        (Field::Travel, [1.0, 0.99], [500.0, 500.1], |c, v| c.device.limits.travel.0 = q(v)),
+        (Field::StiffnessLimit, [0.051, 0.049], [7.0, 7.01], |c, v| c.device.limits.stiffness.0 = q(v)),
+        (Field::HeartbeatMs, [20.0, 19.0], [5_000.0, 5_001.0], |c, v| {
+            c.device.limits.heartbeat_ms = v as u16
+        }),
+        (Field::Damping, [0.0, -0.0001], [0.0005, 0.0006], |c, v| {
+            c.device.damping = Damping(I8F24::from_num(v))
+        }),
+        (Field::SkinTilt, [-1_571.0, -1_572.0], [1_571.0, 1_572.0], |c, v| c.device.skin_tilt.0 = v as i16),
+        (Field::DacZero, [-127.0, -128.0], [127.0, 128.0], |c, v| c.device.dac_zero = v as i16),
+        (Field::LargestForce, [0.011, 0.009], [2.87, f64::NAN], |c, v| {
+            c.patient.largest_force = Some(Newtons(q(v)));
+        }),
         (Field::PassivityDamping, [0.0, -0.001], [0.0199, 0.0201], |c, v| {
-            c.passivity_damping = Damping(I8F24::from_num(v));
+            c.device.passivity_damping = Damping(I8F24::from_num(v));
         }),
     ];
     for (name, low, high, set) in ranges {
@@ -105,7 +121,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
                     weak(config);
                     set(config, value);
                     if name == Field::StiffnessLimit && value < 0.05 {
-                        config.friction = FrictionLaw::Cone { stiffness: Stiffness(q(value)) };
+                        config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(value)) };
                     }
                 })
             };
@@ -152,7 +168,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
     }
     assert_eq!(field(|config| paper(config, |_| {})), None);
     assert_eq!(
-        field(|c| c.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.04)) }),
+        field(|c| c.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.04)) }),
         Some(Field::FrictionStiffness)
     );
 }
@@ -163,7 +179,7 @@ fn with_wall(change: impl FnOnce(&mut Wall)) -> Option<Refusal> {
     change(&mut changed);
     refusal(|config| {
         weak(config);
-        config.layers = [layer(1.0, Some(changed))].into_iter().collect();
+        config.patient.layers = [layer(1.0, Some(changed))].into_iter().collect();
     })
 }
 
@@ -210,8 +226,8 @@ fn inside_tissue_the_slopes_of_a_wall_and_of_friction_add_up() {
     let below = |hold: f64| {
         refusal(|config| {
             weak(config);
-            config.friction = FrictionLaw::Cone { stiffness: Stiffness(q(hold)) };
-            config.layers = [layer(0.0, None), layer(1.0, Some(wall()))].into_iter().collect();
+            config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(hold)) };
+            config.patient.layers = [layer(0.0, None), layer(1.0, Some(wall()))].into_iter().collect();
         })
     };
     // 0.5 N/mm of the wall.
@@ -221,8 +237,8 @@ fn inside_tissue_the_slopes_of_a_wall_and_of_friction_add_up() {
     let on_the_way_in = |layers: &[Layer]| {
         refusal(|config| {
             weak(config);
-            config.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
-            config.layers = layers.iter().copied().collect();
+            config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
+            config.patient.layers = layers.iter().copied().collect();
         })
     };
     let steep = Wall { elastic: parabola(0.0, 1.25, 0.0), unload: Stiffness(q(0.05)), ..wall() };
@@ -236,7 +252,7 @@ fn friction_as_printed_is_as_stiff_as_its_highest_level() {
     let with_cap = |level_cap: f64| {
         refusal(|config| {
             weak(config);
-            config.friction = FrictionLaw::Paper {
+            config.patient.friction = FrictionLaw::Paper {
                 level_length: Millimetres(q(23.0)),
                 level_cap: q(level_cap),
                 anchor_ms: 60,
@@ -256,23 +272,23 @@ fn more_force_than_the_motor_has_is_refused() {
     let with = |torque: f64, friction: f64| {
         refusal(|config| {
             weak(config);
-            config.limits.torque = MillinewtonMetres(q(torque));
-            config.limits.travel = Millimetres(q(11.0));
+            config.device.limits.torque = MillinewtonMetres(q(torque));
+            config.device.limits.travel = Millimetres(q(11.0));
             let mut inner = layer(5.0, Some(wall()));
             inner.friction.0 = q(friction);
             let mut outer = layer(1.0, None);
             outer.friction.0 = q(friction);
-            config.layers = [outer, inner].into_iter().collect();
+            config.patient.layers = [outer, inner].into_iter().collect();
         })
     };
     assert_eq!(with(2.5, 0.0), None);
     assert!(matches!(with(2.49, 0.0), Some(Refusal::TooStrong { layer: 1, .. })));
-    // 4 mm of 0.01 N/mm above the wall's 0.25 N; 10 mm of it at the end of the travel.
-    assert_eq!(with(2.92, 0.01), None);
-    assert!(matches!(with(2.88, 0.01), Some(Refusal::TooStrong { layer: 1, .. })));
-    // 1/16 N/mm: 0.5 N at the wall, 0.625 N at the end.
-    assert_eq!(with(6.25, 0.0625), None);
-    assert!(matches!(with(6.24, 0.0625), Some(Refusal::TooStrong { layer: 1, .. })));
+    // Flat enough to meet the wall at the end of the travel, 8.8 mm of 0.01 N/mm lie above its 0.25 N.
+    assert_eq!(with(3.39, 0.01), None);
+    assert!(matches!(with(3.37, 0.01), Some(Refusal::TooStrong { layer: 1, .. })));
+    // 1/16 N/mm: 0.8 N there, and 0.625 N at the end with the needle straight in.
+    assert_eq!(with(8.01, 0.0625), None);
+    assert!(matches!(with(7.99, 0.0625), Some(Refusal::TooStrong { layer: 1, .. })));
 }
 
 #[test]
@@ -280,8 +296,8 @@ fn layers_lie_in_their_order_within_the_travel() {
     let with = |layers: &[Layer]| {
         refusal(|config| {
             weak(config);
-            config.limits.travel = Millimetres(q(20.0));
-            config.layers = layers.iter().copied().collect();
+            config.device.limits.travel = Millimetres(q(20.0));
+            config.patient.layers = layers.iter().copied().collect();
         })
     };
     assert_eq!(with(&[]), Some(Refusal::Empty));
@@ -289,15 +305,47 @@ fn layers_lie_in_their_order_within_the_travel() {
     assert_eq!(with(&[layer(1.0, None), layer(1.0, None)]), Some(Refusal::Overlap { layer: 1 }));
     assert_eq!(with(&[layer(0.0, Some(wall())), layer(0.5, None)]), None);
     assert_eq!(with(&[layer(0.0, Some(wall())), layer(1.01, Some(wall()))]), None);
-    let walls = [layer(0.0, Some(wall())), layer(1.0, Some(wall()))];
-    assert_eq!(with(&walls), Some(Refusal::Overlap { layer: 1 }));
-    // A layer without a wall between the two changes nothing.
-    let between = [layer(0.0, Some(wall())), layer(0.2, None), layer(0.9, Some(wall()))];
-    assert_eq!(with(&between), Some(Refusal::Overlap { layer: 2 }));
+    // A wall that is carried along while the one above is pushed in is met later.
+    assert_eq!(with(&[layer(0.0, Some(wall())), layer(0.5, Some(wall()))]), None);
+    assert_eq!(
+        with(&[layer(0.5, Some(wall())), layer(0.5, Some(wall()))]),
+        Some(Refusal::Overlap { layer: 1 })
+    );
     assert_eq!(with(&[layer(18.99, Some(wall()))]), None);
     assert_eq!(with(&[layer(19.0, Some(wall()))]), Some(Refusal::BeyondTravel { layer: 0 }));
     assert_eq!(with(&[layer(20.0, None)]), Some(Refusal::BeyondTravel { layer: 0 }));
-    assert!(is_field(with(&[layer(-0.01, None)]), Field::LayerTop));
+    assert!(is_field(with(&[layer(-0.01, None)]), Field::LayerDepth));
+}
+
+#[test]
+fn a_vessel_has_two_walls_one_below_the_other_and_is_alone() {
+    let of = |tissues: &[Tissue], vessel: Option<Vessel>| {
+        refusal(|config| {
+            weak(config);
+            let layers = tissues.iter().enumerate();
+            config.patient.layers =
+                layers.map(|(index, &tissue)| Layer { tissue, ..layer(index as f64, None) }).collect();
+            config.patient.vessel = vessel;
+        })
+    };
+    use Tissue::{FarWall, Muscle, Skin};
+    let shape = |width: f64, offset: f64| {
+        Some(Vessel { width: Millimetres(q(width)), offset: Millimetres(q(offset)) })
+    };
+    assert_eq!(of(&[Skin, Tissue::Vessel, FarWall, Muscle], shape(0.21, 99.0)), None);
+    assert_eq!(of(&[Skin, Tissue::Vessel], None), None);
+    assert_eq!(of(&[Skin, FarWall], None), Some(Refusal::NoVessel { layer: 1 }));
+    let apart = [Skin, Tissue::Vessel, Muscle, FarWall];
+    assert_eq!(of(&apart, None), Some(Refusal::NoVessel { layer: 3 }));
+    let two = [Tissue::Vessel, FarWall, Tissue::Vessel, FarWall];
+    assert_eq!(of(&two, None), Some(Refusal::NoVessel { layer: 2 }));
+    assert_eq!(of(&[Skin, Muscle], shape(3.0, 0.0)), Some(Refusal::NoVessel { layer: 2 }));
+    let whole = [Skin, Tissue::Vessel, FarWall];
+    assert!(is_field(of(&whole, shape(0.19, 0.0)), Field::VesselWidth));
+    assert!(is_field(of(&whole, shape(30.1, 0.0)), Field::VesselWidth));
+    assert!(is_field(of(&whole, shape(3.0, -100.1)), Field::VesselOffset));
+    assert!(is_field(with_wall(|w| w.spring_back = q(1.01)), Field::SpringBack));
+    assert!(is_field(with_wall(|w| w.spring_back = q(-0.01)), Field::SpringBack));
 }
 
 #[test]
@@ -312,30 +360,65 @@ fn each_refusal_says_what_to_do() {
         Refusal::WrongWay { layer },
         Refusal::ReliefAboveElastic { layer },
         Refusal::BeyondTravel { layer },
+        Refusal::NoVessel { layer },
         Refusal::Empty,
+        Refusal::AboveCeiling { force, ceiling: limit },
     ]
     .map(|refusal| refusal.to_string());
     assert_eq!(texts[0], "Travel is 1.5000; it must lie from 3.0000 to 2.0000");
-    assert!(texts[1..].iter().all(|text| text.contains("layer")), "{texts:?}");
-    assert!(texts[3..8].iter().all(|text| text.contains("layer 1")), "{texts:?}");
+    assert!(texts[1..10].iter().all(|text| text.contains("layer")), "{texts:?}");
+    assert!(texts[10].contains("ceiling is 2.000 N"), "{texts:?}");
+    assert!(texts[3..9].iter().all(|text| text.contains("layer 1")), "{texts:?}");
+}
+
+#[test]
+fn no_patient_raises_the_devices_ceiling_and_one_may_ask_for_less() {
+    let wants = |force: f64| {
+        refusal(|config| {
+            config.patient.largest_force = Some(Newtons(q(force)));
+        })
+    };
+    // 28.8 mN·m at 10 mm.
+    assert_eq!(wants(2.87), None);
+    let refused = wants(2.9);
+    assert!(matches!(refused, Some(Refusal::AboveCeiling { .. })), "{refused:?}");
+    // The default tissue asks for up to 1.2 N at the end of the travel: what a patient may not ask for is told.
+    assert!(matches!(wants(0.9), Some(Refusal::TooStrong { layer: 0, .. })));
+    let mut config = Config::default();
+    config.patient.largest_force = Some(Newtons(q(2.0)));
+    assert_eq!(config.plan().expect("sound").largest_force().0, q(2.0));
+}
+
+#[test]
+fn any_device_that_may_be_bears_nobody() {
+    let nobody = Patient::nobody();
+    let mut device = control_core::Device::default();
+    assert!(Plan::new(&device, &nobody).is_ok());
+    device.roller_radius.0 = q(25.0);
+    device.limits.torque.0 = q(0.1);
+    device.limits.stiffness.0 = q(0.05);
+    device.limits.travel.0 = q(1.0);
+    assert!(Plan::new(&device, &nobody).is_ok(), "{:?}", Plan::new(&device, &nobody).err());
+    device.roller_radius.0 = q(26.0);
+    assert!(Plan::new(&device, &nobody).is_err());
 }
 
 /// What a plan says of itself.
 #[test]
 fn a_plan_knows_its_force_its_layers_and_its_torque_of_a_dead_encoder() {
-    let plan = Plan::new(&Config::default()).expect("sound");
+    let plan = Config::default().plan().expect("sound");
     assert_eq!(plan.largest_force().0, q(28.8).saturating_div(q(10.0)));
     assert_eq!(plan.tissue(0), Some(Tissue::Skin));
-    assert_eq!((plan.tissue(2), plan.tissue(3)), (Some(Tissue::Vessel), None));
+    assert_eq!((plan.tissue(2), plan.tissue(4)), (Some(Tissue::Vessel), None));
     // An eighth of the torque limit is 3.6 mN·m: 1.8 mm into the skin, 0.36 N.
     let trips = |depth_mm: f64| {
         let count = Counts((depth_mm / plan.mm_per_count().to_num::<f64>()) as i32);
         let mut c = Controller::new(plan.clone());
-        c.tick(TickInput { count, ..TickInput::default() });
+        c.tick(TickInput { count, tilt: STRAIGHT });
         c.order(Order::Start);
         (0..50_000).any(|_| {
             c.order(Order::Heartbeat);
-            c.tick(TickInput { count, ..TickInput::default() }).tripped.is_some()
+            c.tick(TickInput { count, tilt: STRAIGHT }).tripped.is_some()
         })
     };
     assert!(!trips(1.75) && trips(1.85));

@@ -3,7 +3,7 @@
 
 use control_core::controller::{Order, TickInput};
 use control_core::units::Counts;
-use control_core::{Config, Controller, Plan, TICK_HZ};
+use control_core::{Config, Controller, TICK_HZ};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ const RUNS: usize = 21;
 const DEPTH_COUNTS: i32 = 700;
 
 fn main() {
-    let plan = Plan::new(&Config::default()).expect("the default is sound");
+    let plan = Config::default().plan().expect("the default is sound");
     let mut controller = Controller::new(plan);
     let mut nanoseconds: Vec<f64> = (0..RUNS).map(|run| second(&mut controller, run)).collect();
     nanoseconds.sort_by(f64::total_cmp);

@@ -25,7 +25,7 @@ pub(crate) mod usb;
 
 use crate::tasks::supply::{PVD_LINE, Supply, SupplyLevel};
 use control_core::event::Fault;
-use control_core::{Config, Plan};
+use control_core::{Device, Patient, Plan};
 pub(crate) use encoder::{Encoder, EncoderLines};
 use firmware::drive::{Drive, ParallelDac};
 use firmware::reset::{ResetFlags, Said, cause};
@@ -145,8 +145,8 @@ pub(crate) fn init(
     gpiod.pd12.into_push_pull_output().set_high();
 
     let Said { crash, torque, heat } = crate::tasks::shared::LAST_WORDS.take();
-    let (store, stored) = Store::open(flash::Sectors::new(device.FLASH));
-    let (plan, damage) = plan(&stored);
+    let (store, device_part, patient_part) = Store::open(flash::Sectors::new(device.FLASH));
+    let (plan, damage) = plan(device_part, patient_part);
     let reset_cause = cause(flags, crash, torque).or(damage);
     match crash {
         Some(crash) => {
@@ -198,19 +198,21 @@ pub(crate) fn init(
     }
 }
 
-/// The stored configuration where it may run, else the default, and what is to be said of it.
-fn plan(stored: &Stored) -> (Plan, Option<Fault>) {
-    let default = || match Plan::new(&Config::default()) {
+/// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
+fn plan(device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
+    let (device, lost_device) = device.or_default();
+    let (patient, lost_patient) = patient.or_default();
+    let fault = (lost_device || lost_patient).then_some(Fault::StoredConfig);
+    // A patient for another device leaves, and a device that may not be leaves the default.
+    let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
+    let parts = [(device, Patient::nobody()), (Device::default(), Patient::default())];
+    let plan = fitting.or_else(|_| {
+        let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
+        plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())
+    });
+    match plan {
         Ok(plan) => plan,
-        Err(_) => panic!("the default configuration is refused"),
-    };
-    match stored {
-        Stored::Config(config) => match Plan::new(config) {
-            Ok(plan) => (plan, None),
-            Err(_) => (default(), Some(Fault::StoredConfig)),
-        },
-        Stored::None => (default(), None),
-        Stored::Damaged => (default(), Some(Fault::StoredConfig)),
+        Err(()) => panic!("the default configuration is refused"),
     }
 }
 

@@ -92,7 +92,7 @@ impl<D12: MotorDac, D8: MotorDac, E: OutputPin> Drive<D12, D8, E> {
 mod tests {
     use super::*;
     use control_core::controller::{Order, TickInput};
-    use control_core::{Config, Controller, Plan};
+    use control_core::{Config, Controller};
     use core::cell::RefCell;
     use core::convert::Infallible;
     use embedded_hal::digital::ErrorType;
@@ -137,7 +137,7 @@ mod tests {
     }
 
     fn output(enable: bool, dac: u16) -> TickOutput {
-        let plan = Plan::new(&Config::default()).unwrap();
+        let plan = Config::default().plan().unwrap();
         let mut controller = Controller::new(plan);
         let mut output = controller.tick(TickInput::default());
         output.enable = enable;
@@ -183,7 +183,7 @@ mod tests {
     fn a_controller_switches_the_drive() {
         let writes = RefCell::new(vec![]);
         let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
-        let mut controller = Controller::new(Plan::new(&Config::default()).unwrap());
+        let mut controller = Controller::new(Config::default().plan().unwrap());
         let mut tick = |controller: &mut Controller| {
             drive.apply(DacWidth::Bits12, &controller.tick(TickInput::default()));
             drive.is_enabled()

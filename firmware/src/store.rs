@@ -1,14 +1,17 @@
-//! The configuration in flash: two slots (sectors), each a row of cells, a cell for each configuration ever saved. A cell
-//! is written once, its last word last; losing power at any point leaves the configuration that was or the one that
-//! comes, never a mixture. A slot is erased at start-up, before the tick and the watchdog run, and where no cell is left:
-//! an erasure stops the processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
+//! The configuration in flash: two records, what was found of the device and whom it was set for last, each with versions of
+//! its own. Both live in two slots (sectors), each a row of cells, a cell for each version ever saved. A cell is written
+//! once, its last word last; losing power at any point leaves the record that was or the one that comes, never a mixture.
+//! A slot is erased at start-up, before the tick and the watchdog run, and where no cell is left: an erasure stops the
+//! processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
 
-use control_core::Config;
+use control_core::{Device, Patient};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-/// Raised whenever the bytes of a stored configuration mean something else.
-pub const LAYOUT_VERSION: u8 = 1;
-/// Words of a cell: 1 KiB, room for the longest configuration.
+/// Raised whenever the bytes of a stored record mean something else.
+pub const LAYOUT_VERSION: u8 = 2;
+/// Words of a cell: 1 KiB, room for the longest record.
 pub const CELL_WORDS: usize = 256;
 /// Erased flash.
 const BLANK: u32 = u32::MAX;
@@ -17,10 +20,31 @@ const MAGIC: u32 = 0xC0F1 << 16;
 const COMMITTED: u32 = 0x600D_600D;
 const HEADER_WORDS: usize = 3;
 const PAYLOAD_BYTES: usize = (CELL_WORDS - HEADER_WORDS - 1) * 4;
+/// The bits of a header that hold the payload's length.
+const LENGTH: u32 = 0x3FF;
 /// With fewer blank cells left, start-up moves to the other slot.
 const RESERVE_CELLS: usize = 2;
 
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Which record a cell holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Device = 0,
+    Patient = 1,
+}
+
+impl Kind {
+    const ALL: [Self; 2] = [Self::Device, Self::Patient];
+
+    /// Its bits in a header. A single bit that flips makes neither of the other.
+    fn bits(self) -> u32 {
+        match self {
+            Kind::Device => 0b01 << 10,
+            Kind::Patient => 0b10 << 10,
+        }
+    }
+}
 
 /// Either slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,24 +86,44 @@ pub enum StoreError {
     TooLong,
 }
 
-/// What start-up finds.
+/// What start-up finds of a record.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and there is one at start-up")]
-pub enum Stored {
-    /// The configuration saved last.
-    Config(Config),
+pub enum Stored<T> {
+    /// The version saved last.
+    Found(T),
     /// None was saved, or only by a firmware with another layout.
     None,
-    /// The configuration saved last cannot be read: flash has lost a bit.
+    /// The version saved last cannot be read: flash has lost a bit.
     Damaged,
+}
+
+impl<T: Default> Stored<T> {
+    /// What to use, and whether a version was lost.
+    pub fn or_default(self) -> (T, bool) {
+        match self {
+            Stored::Found(record) => (record, false),
+            Stored::None => (T::default(), false),
+            Stored::Damaged => (T::default(), true),
+        }
+    }
 }
 
 /// The store on its flash.
 pub struct Store<F> {
     flash: F,
     slot: Slot,
-    newest: Option<(usize, u32)>,
+    /// The newest version of each record, by [`Kind`].
+    newest: [Option<Version>; 2],
     next_cell: usize,
+    next_sequence: u32,
+}
+
+/// Where a version of a record is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Version {
+    slot: Slot,
+    cell: usize,
+    sequence: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,53 +131,89 @@ enum Cell {
     Blank,
     /// Begun and never committed: the power went.
     Torn,
-    /// Committed and wrong.
-    Damaged,
-    /// Whole, with its sequence number.
-    Whole(u32),
+    /// Committed and wrong, with the record that its header names, where it still names one.
+    Damaged(Option<Kind>),
+    /// Whole, with its record and its sequence number.
+    Whole(Kind, u32),
+    /// Whole, from a firmware with another layout.
+    Foreign(u32),
+}
+
+impl Cell {
+    fn sequence(self) -> Option<u32> {
+        match self {
+            Cell::Whole(_, sequence) | Cell::Foreign(sequence) => Some(sequence),
+            Cell::Blank | Cell::Torn | Cell::Damaged(_) => None,
+        }
+    }
+}
+
+/// Whether number `a` was given out after `b`.
+fn is_later(a: u32, b: u32) -> bool {
+    a.wrapping_sub(b).cast_signed() > 0
 }
 
 impl<F: ConfigFlash> Store<F> {
-    /// Finds the configuration saved last and makes room for the next ones. Erases, so that it may take seconds.
-    pub fn open(flash: F) -> (Self, Stored) {
-        let mut store = Self { flash, slot: Slot::A, newest: None, next_cell: 0 };
-        let stored = store.find();
+    /// Finds the versions saved last and makes room for the next ones. Erases, so that it may take seconds.
+    pub fn open(flash: F) -> (Self, Stored<Device>, Stored<Patient>) {
+        let mut store = Self { flash, slot: Slot::A, newest: [None; 2], next_cell: 0, next_sequence: 0 };
+        let [device_damaged, patient_damaged] = store.find();
+        let device = store.stored(Kind::Device, device_damaged);
+        let patient = store.stored(Kind::Patient, patient_damaged);
         // Without room the device works as well; saving then says so.
         let _ = store.make_room();
-        (store, stored)
+        (store, device, patient)
     }
 
-    /// Saves `config` unless it is what was saved last. Takes as long as the flash takes for its words; where no cell is
-    /// left, as long as an erasure.
-    pub fn save(&mut self, config: &Config) -> Result<(), StoreError> {
-        if let Some((cell, _)) = self.newest
-            && self.payload(cell) == Some(Stored::Config(config.clone()))
-        {
+    /// Saves the device's part unless it is what was saved last. Takes as long as the flash takes for its words; where no cell
+    /// is left, as long as an erasure.
+    pub fn save_device(&mut self, device: &Device) -> Result<(), StoreError> {
+        self.save(Kind::Device, device)
+    }
+
+    /// Saves the patient's part unless it is what was saved last; as [`Self::save_device`].
+    pub fn save_patient(&mut self, patient: &Patient) -> Result<(), StoreError> {
+        self.save(Kind::Patient, patient)
+    }
+
+    fn save<T: Serialize>(&mut self, kind: Kind, record: &T) -> Result<(), StoreError> {
+        let mut bytes = [0; PAYLOAD_BYTES];
+        let payload = &*postcard::to_slice(record, &mut bytes).map_err(|_| StoreError::TooLong)?;
+        if self.is_saved(kind, payload) {
             return Ok(());
         }
         if self.next_cell >= F::CELLS {
             self.make_room()?;
         }
+        self.append(kind, payload)
+    }
+
+    fn is_saved(&self, kind: Kind, payload: &[u8]) -> bool {
+        let mut bytes = [0; PAYLOAD_BYTES];
+        let newest = self.newest[kind as usize];
+        newest.is_some_and(|newest| self.read(newest, &mut bytes) == Some(payload))
+    }
+
+    /// Writes the next version of a record to the next cell.
+    fn append(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StoreError> {
         if self.next_cell >= F::CELLS {
             return Err(StoreError::Full);
         }
-        let mut bytes = [0; PAYLOAD_BYTES];
-        let length = postcard::to_slice(config, &mut bytes).map_err(|_| StoreError::TooLong)?.len();
-        let sequence = self.newest.map_or(0, |(_, sequence)| sequence.wrapping_add(1));
-        let cell = self.next_cell;
+        let (cell, sequence) = (self.next_cell, self.next_sequence);
         // Whatever becomes of it, this cell is used.
         self.next_cell += 1;
-        self.write(self.slot, cell, sequence, bytes.get(..length).ok_or(StoreError::TooLong)?)?;
-        if self.cell(self.slot, cell) != Cell::Whole(sequence) {
+        self.next_sequence = sequence.wrapping_add(1);
+        self.write(cell, kind, sequence, payload)?;
+        if self.cell(self.slot, cell) != Cell::Whole(kind, sequence) {
             return Err(StoreError::Flash);
         }
-        self.newest = Some((cell, sequence));
+        self.newest[kind as usize] = Some(Version { slot: self.slot, cell, sequence });
         Ok(())
     }
 
-    fn write(&mut self, slot: Slot, cell: usize, sequence: u32, payload: &[u8]) -> Result<(), StoreError> {
-        let header = MAGIC | u32::from(LAYOUT_VERSION) << 12 | payload.len() as u32;
-        let at = cell * CELL_WORDS;
+    fn write(&mut self, cell: usize, kind: Kind, sequence: u32, payload: &[u8]) -> Result<(), StoreError> {
+        let header = MAGIC | u32::from(LAYOUT_VERSION) << 12 | kind.bits() | payload.len() as u32;
+        let (slot, at) = (self.slot, cell * CELL_WORDS);
         self.flash.program(slot, at, header)?;
         self.flash.program(slot, at + 1, sequence)?;
         self.flash.program(slot, at + 2, checksum(header, sequence, payload))?;
@@ -153,9 +233,16 @@ impl<F: ConfigFlash> Store<F> {
         }
         let mut bytes = [0; PAYLOAD_BYTES];
         let (header, sequence) = (word(0), word(1));
-        match self.read_payload(slot, cell, header, &mut bytes) {
-            Some(payload) if checksum(header, sequence, payload) == word(2) => Cell::Whole(sequence),
-            _ => Cell::Damaged,
+        let is_ours = header >> 12 & 0xF == u32::from(LAYOUT_VERSION);
+        // Another layout may have had its length where this one has the record's name.
+        let length = header & if is_ours { LENGTH } else { 0xFFF };
+        let kind = Kind::ALL.into_iter().find(|kind| kind.bits() == header & (0b11 << 10));
+        let payload = self.read_payload(slot, cell, header, length, &mut bytes);
+        match (payload, kind) {
+            (Some(payload), _) if checksum(header, sequence, payload) != word(2) => Cell::Damaged(kind),
+            (Some(_), _) if !is_ours => Cell::Foreign(sequence),
+            (Some(_), Some(kind)) => Cell::Whole(kind, sequence),
+            _ => Cell::Damaged(kind),
         }
     }
 
@@ -164,12 +251,13 @@ impl<F: ConfigFlash> Store<F> {
         slot: Slot,
         cell: usize,
         header: u32,
+        length: u32,
         bytes: &'a mut [u8],
     ) -> Option<&'a [u8]> {
         if header & 0xFFFF_0000 != MAGIC {
             return None;
         }
-        let payload = bytes.get_mut(..(header & 0xFFF) as usize)?;
+        let payload = bytes.get_mut(..length as usize)?;
         for (index, chunk) in payload.chunks_mut(4).enumerate() {
             let word = self.flash.word(slot, cell * CELL_WORDS + HEADER_WORDS + index).to_le_bytes();
             chunk.copy_from_slice(word.get(..chunk.len())?);
@@ -177,79 +265,98 @@ impl<F: ConfigFlash> Store<F> {
         Some(payload)
     }
 
-    /// What the whole cell of the current slot says.
-    fn payload(&self, cell: usize) -> Option<Stored> {
+    /// The bytes of a whole version.
+    fn read<'a>(&self, version: Version, bytes: &'a mut [u8]) -> Option<&'a [u8]> {
+        let header = self.flash.word(version.slot, version.cell * CELL_WORDS);
+        self.read_payload(version.slot, version.cell, header, header & LENGTH, bytes)
+    }
+
+    /// What the newest version of a record says.
+    fn stored<T: DeserializeOwned>(&self, kind: Kind, is_damaged: bool) -> Stored<T> {
         let mut bytes = [0; PAYLOAD_BYTES];
-        let header = self.flash.word(self.slot, cell * CELL_WORDS);
-        let payload = self.read_payload(self.slot, cell, header, &mut bytes)?;
-        if header >> 12 & 0xF != u32::from(LAYOUT_VERSION) {
-            return Some(Stored::None);
-        }
-        Some(postcard::from_bytes(payload).map_or(Stored::Damaged, Stored::Config))
-    }
-
-    /// The last whole cell of `slot`, and whether a damaged one follows it.
-    fn survey(&self, slot: Slot) -> (Option<(usize, u32)>, bool) {
-        let mut newest = None;
-        let mut damaged = false;
-        for cell in 0..F::CELLS {
-            match self.cell(slot, cell) {
-                Cell::Whole(sequence) => (newest, damaged) = (Some((cell, sequence)), false),
-                Cell::Damaged => damaged = true,
-                Cell::Blank | Cell::Torn => {}
-            }
-        }
-        (newest, damaged)
-    }
-
-    fn find(&mut self) -> Stored {
-        let (a, a_damaged) = self.survey(Slot::A);
-        let (b, b_damaged) = self.survey(Slot::B);
-        // The slot with the later sequence number; a slot whose erasure was cut short holds earlier ones or none.
-        let b_is_newer = match (a, b) {
-            (Some((_, a)), Some((_, b))) => b.wrapping_sub(a).cast_signed() > 0,
-            (a, b) => a.is_none() && (b.is_some() || b_damaged && !a_damaged),
-        };
-        let (slot, newest, damaged) =
-            if b_is_newer { (Slot::B, b, b_damaged) } else { (Slot::A, a, a_damaged) };
-        (self.slot, self.newest) = (slot, newest);
-        let is_used = |cell: &usize| self.cell(slot, *cell) != Cell::Blank;
-        self.next_cell = (0..F::CELLS).rev().find(is_used).map_or(0, |cell| cell + 1);
-        match newest {
-            _ if damaged => Stored::Damaged,
-            Some((cell, _)) => self.payload(cell).unwrap_or(Stored::Damaged),
+        match self.newest[kind as usize] {
+            _ if is_damaged => Stored::Damaged,
             None => Stored::None,
+            Some(newest) => {
+                let record = self.read(newest, &mut bytes).and_then(|bytes| postcard::from_bytes(bytes).ok());
+                record.map_or(Stored::Damaged, Stored::Found)
+            }
         }
     }
 
-    /// Leaves the other slot blank and, where this one is nearly used up, goes over to it.
-    fn make_room(&mut self) -> Result<(), StoreError> {
-        let other = self.slot.other();
-        if (0..F::CELLS).any(|cell| self.cell(other, cell) != Cell::Blank) {
-            self.flash.erase(other)?;
-        }
-        if self.next_cell + RESERVE_CELLS <= F::CELLS {
-            return Ok(());
-        }
-        let mut bytes = [0; PAYLOAD_BYTES];
-        let moved = match self.newest {
-            Some((cell, sequence)) => {
-                let header = self.flash.word(self.slot, cell * CELL_WORDS);
-                let payload =
-                    self.read_payload(self.slot, cell, header, &mut bytes).ok_or(StoreError::Flash)?;
-                let sequence = sequence.wrapping_add(1);
-                self.write(other, 0, sequence, payload)?;
-                if self.cell(other, 0) != Cell::Whole(sequence) {
-                    return Err(StoreError::Flash);
-                }
-                Some((0, sequence))
+    /// Finds the newest versions, the slot to write to and the cell; whether each record has lost its last version.
+    fn find(&mut self) -> [bool; 2] {
+        let mut last: Option<(u32, Slot)> = None;
+        for (slot, cell) in cells::<F>() {
+            let found = self.cell(slot, cell);
+            let Some(sequence) = found.sequence() else { continue };
+            if last.is_none_or(|(last, _)| is_later(sequence, last)) {
+                last = Some((sequence, slot));
             }
-            None => None,
+            if let Cell::Whole(kind, _) = found {
+                let newest = &mut self.newest[kind as usize];
+                if newest.is_none_or(|newest| is_later(sequence, newest.sequence)) {
+                    *newest = Some(Version { slot, cell, sequence });
+                }
+            }
+        }
+        self.next_sequence = last.map_or(0, |(last, _)| last.wrapping_add(1));
+        let damaged_in = |slot| (0..F::CELLS).any(|cell| matches!(self.cell(slot, cell), Cell::Damaged(_)));
+        self.slot = match last {
+            Some((_, slot)) => slot,
+            None if damaged_in(Slot::B) && !damaged_in(Slot::A) => Slot::B,
+            None => Slot::A,
         };
-        let old = self.slot;
-        (self.slot, self.newest, self.next_cell) = (other, moved, usize::from(moved.is_some()));
-        self.flash.erase(old)
+        let is_used = |cell: &usize| self.cell(self.slot, *cell) != Cell::Blank;
+        self.next_cell = (0..F::CELLS).rev().find(is_used).map_or(0, |cell| cell + 1);
+        Kind::ALL.map(|kind| self.is_damaged(kind))
     }
+
+    /// Whether a version of the record that was committed after its newest whole one cannot be read. The other slot does not
+    /// count: it may be half erased.
+    fn is_damaged(&self, kind: Kind) -> bool {
+        let from = match self.newest[kind as usize] {
+            Some(newest) if newest.slot == self.slot => newest.cell + 1,
+            Some(_) => return false,
+            None => 0,
+        };
+        (from..F::CELLS).any(|cell| match self.cell(self.slot, cell) {
+            Cell::Damaged(damaged) => damaged.is_none_or(|damaged| damaged == kind),
+            _ => false,
+        })
+    }
+
+    /// Brings both records together in one slot with room for more, and leaves the other one blank.
+    fn make_room(&mut self) -> Result<(), StoreError> {
+        let is_full = self.next_cell + RESERVE_CELLS > F::CELLS;
+        let are_here = self.newest.iter().flatten().all(|newest| newest.slot == self.slot);
+        if is_full && are_here {
+            let other = self.slot.other();
+            self.blank(other)?;
+            (self.slot, self.next_cell) = (other, 0);
+        }
+        for kind in Kind::ALL {
+            if let Some(newest) = self.newest[kind as usize]
+                && newest.slot != self.slot
+            {
+                let mut bytes = [0; PAYLOAD_BYTES];
+                let payload = self.read(newest, &mut bytes).ok_or(StoreError::Flash)?;
+                self.append(kind, payload)?;
+            }
+        }
+        self.blank(self.slot.other())
+    }
+
+    /// Erases a slot that holds anything.
+    fn blank(&mut self, slot: Slot) -> Result<(), StoreError> {
+        let is_blank = (0..F::CELLS).all(|cell| self.cell(slot, cell) == Cell::Blank);
+        if is_blank { Ok(()) } else { self.flash.erase(slot) }
+    }
+}
+
+/// Every cell of both slots.
+fn cells<F: ConfigFlash>() -> impl Iterator<Item = (Slot, usize)> {
+    [Slot::A, Slot::B].into_iter().flat_map(|slot| (0..F::CELLS).map(move |cell| (slot, cell)))
 }
 
 fn checksum(header: u32, sequence: u32, payload: &[u8]) -> u32 {

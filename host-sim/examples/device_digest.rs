@@ -15,7 +15,7 @@ fn main() {
     let profile = Profile::find(&name).expect("a built-in profile");
     let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
     let mut device = VirtualDevice::new(&profile, procedure);
-    let mut driver = Driver::new(profile.config.clone());
+    let mut driver = Driver::new(profile.config.patient.clone());
     driver.connected(Duration::ZERO);
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
     let mut bytes = [0; MAX_FRAME];

@@ -21,6 +21,8 @@ export function words(event, layers) {
   switch (event.kind) {
     case "contact": return `Tip touches ${article(name)}${where(event, false)}`;
     case "puncture": return `${capital(name)} punctured${where(event, true)}`;
+    case "flashback": return "Flashback: blood shows in the hub";
+    case "far_wall": return "Through the far wall of the vessel";
     case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
     case "exit": return `Needle out of ${article(name)}`;
     case "fault": return `Fault, torque off: ${event.cause}`;

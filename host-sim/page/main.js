@@ -8,7 +8,7 @@ import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
 import { Scrub } from "./scrub.js";
-import { Section } from "./section.js";
+import { FLATTEST, Section } from "./section.js";
 import { Tissue } from "./tissue.js";
 import { Clock, Trace } from "./trace.js";
 
@@ -119,7 +119,7 @@ function draw(nowMs) {
   view.person = hand.person;
   const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
-  tissue.move(view.depth, view.force, view.seconds);
+  tissue.move(view.depth, view.force, view.seconds, Math.sin(Math.max(view.tilt, FLATTEST)));
   if (!body.open) section.draw(view, tissue);
   body.draw(view);
   timePlot.draw(trace, now);

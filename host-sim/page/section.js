@@ -7,7 +7,7 @@ const NEEDLE = { length: 32, radius: 0.41, bevel: 2.1 }; // 21 gauge
 /** The grip that a person drags, mm behind the tip. */
 const GRIP_MM = 10;
 /** The tilt is drawn at least this steep: flatter, the layers would fall into one line. */
-const FLATTEST = 0.17;
+export const FLATTEST = 0.17;
 const WIDE_MM = 33;
 /** On a phone less is shown, larger. */
 const NARROW = { width: 560, mm: 23 };
@@ -56,7 +56,7 @@ export class Section {
     this.axis.x = Math.cos(this.axis.tilt);
     this.axis.y = Math.sin(this.axis.tilt);
     const target = tissue.layers.find((layer) => layer.is_vessel) ?? tissue.layers.at(-1);
-    const aim = target ? target.top_mm : 5;
+    const aim = target ? target.depth_mm / this.axis.y : 5;
     const across = Math.hypot(this.axis.x / VESSEL_MM.wide, this.axis.y / VESSEL_MM.high);
     this.ellipse.along = aim + 0.5 / across;
     this.ellipse.x = this.ellipse.along * this.axis.x;
@@ -84,10 +84,10 @@ export class Section {
 
   layers(g, tissue, width, height) {
     const bottom = (height - this.origin.y) / this.scale + 3;
-    const bands = tissue.layers.filter((layer) => !layer.is_vessel);
+    const bands = tissue.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
     for (let i = 0; i < bands.length; i++) {
-      const top = bands[i].top_mm * this.axis.y;
-      const end = i + 1 < bands.length ? bands[i + 1].top_mm * this.axis.y : bottom;
+      const top = bands[i].depth_mm;
+      const end = i + 1 < bands.length ? bands[i + 1].depth_mm : bottom;
       g.beginPath();
       this.level(g, tissue, top, width);
       g.lineTo(width + 99, height + 99);
@@ -289,15 +289,16 @@ export class Section {
     g.fillStyle = this.colours["on-tissue"];
     let free = 0;
     for (const [i, layer] of tissue.layers.entries()) {
+      if (layer.is_far_wall) continue;
       const name = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
-      const label = width < NARROW.width ? name : `${name}, from ${layer.top_mm.toFixed(1)} mm`;
+      const label = width < NARROW.width ? name : `${name}, from ${layer.depth_mm.toFixed(1)} mm`;
       if (layer.is_vessel) {
         g.fillText(label, this.x(this.ellipse.x), this.y(this.ellipse.y + VESSEL_MM.high / 2) + 22);
         continue;
       }
-      const next = tissue.layers.slice(i + 1).find((other) => !other.is_vessel);
-      const top = this.y(layer.top_mm * this.axis.y);
-      const bottom = next ? this.y(next.top_mm * this.axis.y) : height;
+      const next = tissue.layers.slice(i + 1).find((other) => !other.is_vessel && !other.is_far_wall);
+      const top = this.y(layer.depth_mm);
+      const bottom = next ? this.y(next.depth_mm) : height;
       const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 9);
       g.fillText(label, width - 12, y);
       free = y + 9;

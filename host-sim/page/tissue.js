@@ -28,18 +28,20 @@ export class Tissue {
   }
 
   /** Follows the depth; also finds out by itself what happened before this page was opened. */
-  move(depth, force, seconds) {
+  move(depth, force, seconds, steepness) {
     const relaxed = 1 - Math.exp(-seconds / RECOVERY_S);
     for (const layer of this.layers) {
-      const wall = layer.puncture_depth_mm;
-      if (wall === null) continue;
+      if (layer.puncture_travel_mm === null) continue;
+      // Depths lie in the body; the tip goes along the needle.
+      const top = layer.depth_mm / steepness;
+      const wall = top + layer.puncture_travel_mm;
       if (depth > wall + 0.3) layer.given = true;
-      if (depth < layer.top_mm - 0.3) layer.given = false;
-      if (!layer.given && depth > layer.top_mm) {
-        layer.dent = depth - layer.top_mm;
+      if (depth < top - 0.3) layer.given = false;
+      if (!layer.given && depth > top) {
+        layer.dent = depth - top;
         continue;
       }
-      const inside = layer.given && depth > layer.top_mm;
+      const inside = layer.given && depth > top;
       const drag = inside ? Math.max(-LARGEST_DRAG_MM, Math.min(LARGEST_DRAG_MM, DRAG_MM_PER_N * force)) : 0;
       layer.dent += relaxed * (drag - layer.dent);
     }
@@ -47,7 +49,7 @@ export class Tissue {
 
   /** Whether the tip is in the vessel. */
   get inVessel() {
-    return this.layers.some((layer) => layer.is_vessel && layer.given);
+    return this.layers.some((layer) => layer.is_vessel && layer.given) && !this.layers.some((layer) => layer.is_far_wall && layer.given);
   }
 }
 
@@ -61,8 +63,8 @@ export function displace(tissue, axis, x, y, out) {
   for (const layer of tissue.layers) {
     if (layer.dent === 0) continue;
     const reach = layer.is_vessel ? REACH_VESSEL_MM : REACH_SKIN_MM;
-    const dx = (x - layer.top_mm * axis.x) / reach;
-    const dy = (y - layer.top_mm * axis.y) / reach;
+    const dx = (x - (layer.depth_mm * axis.x) / axis.y) / reach;
+    const dy = (y - layer.depth_mm) / reach;
     const share = layer.dent / (1 + dx * dx + dy * dy);
     out.x += share * axis.x;
     out.y += share * axis.y;

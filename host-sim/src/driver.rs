@@ -4,8 +4,8 @@
 //! an earlier connection is ever played again. Commands are repeated until they are answered; a heartbeat says every 50 ms
 //! that the PC lives.
 
-use control_core::Config;
 use control_core::excitation::Excitation;
+use control_core::{Device, Patient};
 use link::codec::MAX_FRAME;
 use link::frames::{Ack, Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
 use link::host::{Commands, Counts, Reception};
@@ -34,7 +34,9 @@ pub enum Request {
 
 /// The PC's side of a conversation.
 pub struct Driver {
-    config: Config,
+    patient: Patient,
+    /// Sent too, where it is not the one that the device has.
+    device: Option<Device>,
     reception: Reception,
     commands: Commands,
     open: bool,
@@ -60,9 +62,10 @@ struct Pending {
 
 impl Driver {
     /// Nothing is open yet.
-    pub fn new(config: Config) -> Self {
+    pub fn new(patient: Patient) -> Self {
         Self {
-            config,
+            patient,
+            device: None,
             reception: Reception::default(),
             commands: Commands::default(),
             open: false,
@@ -76,6 +79,11 @@ impl Driver {
             refused: None,
             out: Vec::new(),
         }
+    }
+
+    /// Configures the device's own part as well; without it, that stays as commissioning found it.
+    pub fn with_device(self, device: Device) -> Self {
+        Self { device: Some(device), ..self }
     }
 
     /// A connection is open: hello, torque off, configuration.
@@ -96,8 +104,15 @@ impl Driver {
     pub fn request(&mut self, request: Request) {
         match request {
             Request::Stop => {
-                self.waiting
-                    .retain(|c| matches!(c, Command::Hello { .. } | Command::Configure(_) | Command::Stop));
+                self.waiting.retain(|c| {
+                    matches!(
+                        c,
+                        Command::Hello { .. }
+                            | Command::ConfigureDevice(_)
+                            | Command::ConfigurePatient(_)
+                            | Command::Stop
+                    )
+                });
                 self.waiting.push_front(Command::Stop);
                 if self
                     .pending
@@ -188,7 +203,8 @@ impl Driver {
         self.waiting.clear();
         self.waiting.push_back(Command::Hello { version: PROTOCOL_VERSION });
         self.waiting.push_back(Command::Stop);
-        self.waiting.push_back(Command::Configure(self.config.clone()));
+        self.waiting.extend(self.device.map(Command::ConfigureDevice));
+        self.waiting.push_back(Command::ConfigurePatient(self.patient.clone()));
     }
 
     fn next_command(&mut self, now: Duration) {
@@ -214,7 +230,7 @@ impl Driver {
         }
         let Some(pending) = self.pending.take() else { return };
         match (ack.result, &pending.command) {
-            (Ok(()), Command::Configure(_)) => self.ready = true,
+            (Ok(()), Command::ConfigurePatient(_)) => self.ready = true,
             (Ok(()), Command::Start) => {
                 self.has_started = true;
                 self.notice = None;
@@ -223,7 +239,7 @@ impl Driver {
             (Ok(()), _) => {}
             // The same bytes again, soon.
             (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
-            (Err(Rejection::Powered), Command::Configure(_)) => {
+            (Err(Rejection::Powered), Command::ConfigureDevice(_) | Command::ConfigurePatient(_)) => {
                 self.waiting.push_front(pending.command);
                 self.waiting.push_front(Command::Stop);
             }

@@ -4,7 +4,7 @@
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::plant::hand::Grip;
-use crate::profile::{Profile, TissueName, puncture_depth_mm};
+use crate::profile::{Profile, TissueName, puncture_path_mm};
 use control_core::config::Tissue;
 use serde::Deserialize;
 
@@ -97,7 +97,7 @@ impl File {
         if self.format != 1 {
             return Err(format!("format is {}; this program reads format 1", self.format));
         }
-        let travel = profile.config.limits.travel.0.to_num::<f64>();
+        let travel = profile.config.device.limits.travel.0.to_num::<f64>();
         within("start_mm", self.start_mm, -travel, travel)?;
         within("stiffness_n_per_mm", self.hand.stiffness_n_per_mm, 0.05, 10.0)?;
         within("damping_n_s_per_mm", self.hand.damping_n_s_per_mm, 0.0, 0.1)?;
@@ -141,8 +141,13 @@ impl Step {
             (None, None) => Ok(at_mm),
             (None, Some(past)) => {
                 let tissue = Tissue::from(past);
-                let wall =
-                    profile.config.layers.iter().filter(|l| l.tissue == tissue).find_map(puncture_depth_mm);
+                let wall = profile
+                    .config
+                    .patient
+                    .layers
+                    .iter()
+                    .filter(|l| l.tissue == tissue)
+                    .find_map(|layer| puncture_path_mm(layer, profile.entry_rad));
                 wall.map(|depth| depth + self.by_mm).ok_or_else(|| {
                     format!(
                         "step \"{}\" goes past a wall that profile {} does not have; use to_mm",

@@ -1,15 +1,14 @@
-//! A patient's tissue and the device's limits, as a person writes them (TOML, decimal numbers with their unit in the key),
-//! and as the control law takes them ([`Config`], fixed point). What the control law refuses is refused here too.
+//! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
+//! ([`Patient`], fixed point). Nothing of the device stands in it: that is [`crate::device::part`]. What the control law
+//! refuses is refused here too.
 
 use crate::failure::Failure;
 use crate::library::{self, Text};
-use crate::session::{Scene, SceneLayer, Source, tissue_name};
-use control_core::config::{self, Config, DacWidth, FrictionLaw, SpeedMethod, Tissue};
-use control_core::units::{
-    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
-};
-use control_core::{Plan, plan};
-use fixed::types::{I8F24, I16F16};
+use crate::session::{Scene, SceneLayer, SceneVessel, Source, tissue_name};
+use control_core::config::{self, Config, FrictionLaw, Tissue};
+use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
+use control_core::{Device, Patient, Plan, plan};
+use fixed::types::I16F16;
 use serde::Deserialize;
 
 /// The profiles that come with the program.
@@ -25,9 +24,9 @@ pub const BUILT_IN: [(&str, &str); 4] = [
 pub struct Profile {
     /// What it is called.
     pub name: String,
-    /// Inclination of the needle below the horizontal at entry, in rad.
+    /// Angle of the needle to the skin at entry, in rad.
     pub entry_rad: f64,
-    /// What the device is configured with.
+    /// What the device is configured with: its own part and this patient.
     pub config: Config,
     /// The same, checked.
     pub plan: Plan,
@@ -36,33 +35,43 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// A built-in profile by its name, or a file by its path.
+    /// A built-in profile by its name, or a file by its path, for the built-in device.
     pub fn find(wanted: &str) -> Result<Self, Failure> {
-        Self::parse(library::find("profile", wanted, &BUILT_IN)?)
+        Self::find_for(wanted, &Device::default())
     }
 
-    /// Checks the text of a profile.
+    /// A built-in profile by its name, or a file by its path, for `device`.
+    pub fn find_for(wanted: &str, device: &Device) -> Result<Self, Failure> {
+        Self::parse_for(library::find("profile", wanted, &BUILT_IN)?, device)
+    }
+
+    /// Checks the text of a profile for the built-in device.
     pub fn parse(source: Text) -> Result<Self, Failure> {
+        Self::parse_for(source, &Device::default())
+    }
+
+    /// Checks the text of a profile for `device`.
+    pub fn parse_for(source: Text, device: &Device) -> Result<Self, Failure> {
         let file: File = library::parse(&source)?;
         let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
-        if !(-90.0..=90.0).contains(&file.entry_deg) {
-            return Err(refuse(format!("entry_deg is {}; it must lie from -90 to 90", file.entry_deg)));
-        }
-        let config = file.config().map_err(refuse)?;
-        let plan = Plan::new(&config).map_err(|refusal| refuse(say(&refusal, &file)))?;
+        check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
+        let config = Config { device: *device, patient: file.patient().map_err(refuse)? };
+        let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
         Ok(Self { name: file.name, entry_rad: file.entry_deg.to_radians(), config, plan, source })
     }
 
     /// What a picture needs to know.
     pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
-        let layers = self.config.layers.iter().map(|layer| SceneLayer {
+        let layers = self.config.patient.layers.iter().map(|layer| SceneLayer {
             name: tissue_name(layer.tissue).to_owned(),
             is_vessel: layer.tissue == Tissue::Vessel,
-            top_mm: layer.top.0.to_num(),
-            puncture_depth_mm: puncture_depth_mm(layer),
+            is_far_wall: layer.tissue == Tissue::FarWall,
+            depth_mm: layer.depth.0.to_num(),
+            puncture_travel_mm: layer.wall.map(|wall| wall.puncture_travel.0.to_num()),
+            spring_back: layer.wall.map(|wall| wall.spring_back.to_num()),
             puncture_force_n: layer.wall.map(|wall| force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
             friction_n_per_mm: layer.friction.0.to_num(),
         });
@@ -73,16 +82,59 @@ impl Profile {
             procedure,
             layers: layers.collect(),
             roller_radius_mm: self.config.device.roller_radius.0.to_num(),
-            travel_mm: self.config.limits.travel.0.to_num(),
+            travel_mm: self.config.device.limits.travel.0.to_num(),
             largest_force_n: self.plan.largest_force().0.to_num(),
-            tilt_rad: self.entry_rad,
+            tilt_rad: self.tilt_rad(),
+            skin_tilt_rad: self.skin_tilt_rad(),
+            vessel: self.vessel(),
         }
+    }
+
+    /// The same patient with another angle to the skin at entry, 5 to 90°.
+    pub fn at_angle(self, degrees: f64) -> Result<Self, Failure> {
+        check_angle("--angle", degrees).map_err(Failure::input)?;
+        Ok(Self { entry_rad: degrees.to_radians(), ..self })
+    }
+
+    /// Inclination of the needle laid on the skin, in rad.
+    pub fn skin_tilt_rad(&self) -> f64 {
+        f64::from(self.config.device.skin_tilt.0) * 1e-3
+    }
+
+    /// Inclination of the needle below the horizontal at entry, in rad.
+    pub fn tilt_rad(&self) -> f64 {
+        self.entry_rad + self.skin_tilt_rad()
+    }
+
+    fn vessel(&self) -> Option<SceneVessel> {
+        let layers = &self.config.patient.layers;
+        let depth_mm = |tissue| {
+            let layer = layers.iter().find(|layer| layer.tissue == tissue)?;
+            Some(layer.depth.0.to_num::<f64>())
+        };
+        let (near, far) = (depth_mm(Tissue::Vessel)?, depth_mm(Tissue::FarWall)?);
+        let shape = self.config.patient.vessel;
+        Some(SceneVessel {
+            axis_mm: (near + far) / 2.0,
+            height_mm: far - near,
+            width_mm: shape.map_or(far - near, |shape| shape.width.0.to_num()),
+            offset_mm: shape.map_or(0.0, |shape| shape.offset.0.to_num()),
+        })
     }
 }
 
-/// Depth in mm at which the wall of `layer` gives way, where it has one.
-pub fn puncture_depth_mm(layer: &config::Layer) -> Option<f64> {
-    layer.wall.map(|wall| layer.top.0.to_num::<f64>() + wall.puncture_travel.0.to_num::<f64>())
+fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
+    if (5.0..=90.0).contains(&degrees) {
+        Ok(())
+    } else {
+        Err(format!("{key} is {degrees}; it must lie from 5 to 90, the angle to the skin"))
+    }
+}
+
+/// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way, where it has one.
+pub fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
+    let wall = layer.wall?;
+    Some(layer.depth.0.to_num::<f64>() / angle_rad.sin() + wall.puncture_travel.0.to_num::<f64>())
 }
 
 /// `(T − n)²/a + b` of seed 001, eq. 1, in N; `travel_mm` is T.
@@ -94,13 +146,15 @@ fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
 /// The control law names layers by number; a person by what they are.
 fn say(refusal: &plan::Refusal, file: &File) -> String {
     use plan::Refusal::{
-        BeyondTravel, ContactStep, Overlap, ReliefAboveElastic, TooStiff, TooStrong, WrongWay,
+        BeyondTravel, ContactStep, NoVessel, Overlap, ReliefAboveElastic, TooStiff, TooStrong, WrongWay,
     };
     let layer = match *refusal {
         TooStiff { layer, .. } | TooStrong { layer, .. } | Overlap { layer } | ContactStep { layer, .. } => {
             layer
         }
-        WrongWay { layer } | ReliefAboveElastic { layer } | BeyondTravel { layer } => layer,
+        WrongWay { layer } | ReliefAboveElastic { layer } | BeyondTravel { layer } | NoVessel { layer } => {
+            layer
+        }
         _ => return refusal.to_string(),
     };
     match file.layer.get(usize::from(layer)) {
@@ -115,49 +169,19 @@ struct File {
     format: u32,
     name: String,
     entry_deg: f64,
-    device: Option<Device>,
-    limits: Option<Limits>,
-    control: Option<Control>,
+    /// In N; without it, as much as the device gives.
+    largest_force_n: Option<f64>,
     friction: Option<Friction>,
     layer: Vec<Layer>,
+    vessel: Option<Vessel>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Device {
-    roller_radius_mm: f64,
-    counts_per_turn: u16,
-    full_scale_torque_mnm: f64,
-    dac_bits: u8,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Limits {
-    torque_mnm: f64,
-    continuous_torque_mnm: f64,
-    winding_time_s: u16,
-    slew_mnm_per_tick: f64,
-    fade_in_ms: u16,
-    max_counts_per_tick: u16,
-    travel_mm: f64,
-    stiffness_n_per_mm: f64,
-    heartbeat_ms: u16,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Control {
-    speed: Speed,
-    damping_n_s_per_mm: f64,
-    passivity_damping_n_s_per_mm: f64,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Speed {
-    Window,
-    EdgeTiming,
+struct Vessel {
+    width_mm: f64,
+    #[serde(default)]
+    offset_mm: f64,
 }
 
 #[derive(Deserialize)]
@@ -171,7 +195,7 @@ enum Friction {
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
-    top_mm: f64,
+    depth_mm: f64,
     wall: Option<Wall>,
     friction_n_per_mm: f64,
 }
@@ -184,6 +208,10 @@ pub(crate) enum TissueName {
     Muscle,
     Vessel,
     Other,
+    Bursa,
+    Tendon,
+    Cartilage,
+    FarWall,
 }
 
 #[derive(Deserialize)]
@@ -193,6 +221,8 @@ struct Wall {
     puncture_mm: f64,
     relief: Parabola,
     unload_n_per_mm: f64,
+    /// An assumption where it is left out: nobody gives it.
+    spring_back: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -211,74 +241,43 @@ impl From<TissueName> for Tissue {
             TissueName::Muscle => Tissue::Muscle,
             TissueName::Vessel => Tissue::Vessel,
             TissueName::Other => Tissue::Other,
+            TissueName::Bursa => Tissue::Bursa,
+            TissueName::Tendon => Tissue::Tendon,
+            TissueName::Cartilage => Tissue::Cartilage,
+            TissueName::FarWall => Tissue::FarWall,
         }
     }
 }
 
 /// A decimal number as the control law holds it; one that it cannot hold is refused by name.
-fn fix(key: &str, value: f64) -> Result<I16F16, String> {
+pub(crate) fn fix(key: &str, value: f64) -> Result<I16F16, String> {
     I16F16::checked_from_num(value)
         .ok_or_else(|| format!("{key} is {value}; it must be a number between -32768 and 32768"))
 }
 
-fn damping(key: &str, value: f64) -> Result<Damping, String> {
-    let held = I8F24::checked_from_num(value);
-    held.map(Damping).ok_or_else(|| format!("{key} is {value}; it must be a small number: 0.00002 is usual"))
-}
-
 impl File {
-    fn config(&self) -> Result<Config, String> {
-        let mut config = Config::default();
-        config.layers.clear();
+    fn patient(&self) -> Result<Patient, String> {
+        let mut patient = Patient::default();
+        patient.layers.clear();
         for layer in &self.layer {
-            config.layers.push(layer.config()?).map_err(|_| {
+            patient.layers.push(layer.config()?).map_err(|_| {
                 format!("there are {} layers; at most {} are possible", self.layer.len(), config::MAX_LAYERS)
             })?;
         }
-        if let Some(device) = &self.device {
-            config.device = config::Device {
-                roller_radius: Millimetres(fix("roller_radius_mm", device.roller_radius_mm)?),
-                counts_per_turn: device.counts_per_turn,
-                full_scale_torque: MillinewtonMetres(fix(
-                    "full_scale_torque_mnm",
-                    device.full_scale_torque_mnm,
-                )?),
-                dac: match device.dac_bits {
-                    8 => DacWidth::Bits8,
-                    12 => DacWidth::Bits12,
-                    other => return Err(format!("dac_bits is {other}; it must be 8 or 12")),
-                },
-            };
+        if let Some(force) = self.largest_force_n {
+            patient.largest_force = Some(Newtons(fix("largest_force_n", force)?));
         }
-        if let Some(limits) = &self.limits {
-            config.limits = config::SafetyConfig {
-                torque: MillinewtonMetres(fix("torque_mnm", limits.torque_mnm)?),
-                continuous_torque: MillinewtonMetres(fix(
-                    "continuous_torque_mnm",
-                    limits.continuous_torque_mnm,
-                )?),
-                winding_time_s: limits.winding_time_s,
-                slew_per_tick: MillinewtonMetres(fix("slew_mnm_per_tick", limits.slew_mnm_per_tick)?),
-                fade_in_ms: limits.fade_in_ms,
-                max_counts_per_tick: limits.max_counts_per_tick,
-                travel: Millimetres(fix("travel_mm", limits.travel_mm)?),
-                stiffness: Stiffness(fix("stiffness_n_per_mm", limits.stiffness_n_per_mm)?),
-                heartbeat_ms: limits.heartbeat_ms,
-            };
-        }
-        if let Some(control) = &self.control {
-            config.speed = match control.speed {
-                Speed::Window => SpeedMethod::Window,
-                Speed::EdgeTiming => SpeedMethod::EdgeTiming,
-            };
-            config.damping = damping("damping_n_s_per_mm", control.damping_n_s_per_mm)?;
-            config.passivity_damping =
-                damping("passivity_damping_n_s_per_mm", control.passivity_damping_n_s_per_mm)?;
-        }
+        patient.vessel = match &self.vessel {
+            None => None,
+            Some(vessel) => Some(config::Vessel {
+                width: Millimetres(fix("width_mm", vessel.width_mm)?),
+                offset: Millimetres(fix("offset_mm", vessel.offset_mm)?),
+            }),
+        };
         if let Some(friction) = &self.friction {
-            config.friction = friction.law()?;
+            patient.friction = friction.law()?;
         }
-        Ok(config)
+        Ok(patient)
     }
 }
 
@@ -309,11 +308,15 @@ impl Layer {
                 puncture_travel: Millimetres(fix("puncture_mm", wall.puncture_mm)?),
                 relief: wall.relief.config()?,
                 unload: Stiffness(fix("unload_n_per_mm", wall.unload_n_per_mm)?),
+                spring_back: match wall.spring_back {
+                    Some(share) => fix("spring_back", share)?,
+                    None => config::SPRING_BACK,
+                },
             })
         });
         Ok(config::Layer {
             tissue: self.tissue.into(),
-            top: Millimetres(fix("top_mm", self.top_mm)?),
+            depth: Millimetres(fix("depth_mm", self.depth_mm)?),
             wall: wall.transpose()?,
             friction: FrictionPerMillimetre(fix("friction_n_per_mm", self.friction_n_per_mm)?),
         })
@@ -354,7 +357,7 @@ mod tests {
             let force = |index: usize| walls[index].puncture_force_n.expect("it is a wall");
             assert!((force(0) - skin_n).abs() < 0.01, "{name}: skin {} N", force(0));
             assert!((force(1) - vein_n).abs() < 0.01, "{name}: vein {} N", force(1));
-            assert!(walls[1].is_vessel && (walls[1].top_mm - vein_mm).abs() < 1e-3);
+            assert!(walls[1].is_vessel && (walls[1].depth_mm - vein_mm).abs() < 1e-3);
             assert!(scene.layers.iter().all(|l| (l.friction_n_per_mm - friction).abs() < 1e-4));
         }
     }
@@ -369,11 +372,13 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_their_line() {
         for (wrong, hint) in [
-            (BUILT_IN[0].1.replace("top_mm = 2.0", "top_mm = \"deep\""), "line 24"),
+            (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = \"deep\""), "line 23"),
             (BUILT_IN[0].1.replace("friction_n", "frction_n"), "frction_n_per_mm"),
             (BUILT_IN[0].1.replace("format = 1", "format = 9"), "format is 9"),
-            (BUILT_IN[0].1.replace("top_mm = 2.0", "top_mm = nan"), "top_mm"),
-            (BUILT_IN[0].1.replace("top_mm = 2.0", "top_mm = 1e300"), "top_mm"),
+            (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = nan"), "depth_mm"),
+            (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = 1e300"), "depth_mm"),
+            (format!("{}\n[limits]\ntorque_mnm = 90.0\n", BUILT_IN[0].1), "limits"),
+            (format!("largest_force_n = 9.0\n{}", BUILT_IN[0].1), "ceiling is 2.880 N"),
             ("[[layer]".into(), "line 1"),
             (String::new(), "format"),
         ] {

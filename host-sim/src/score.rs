@@ -1,6 +1,6 @@
 //! A trainee's figures, insertion by insertion: time, path, force, punctures, vessel hit, angle.
 
-use crate::profile::{Profile, puncture_depth_mm};
+use crate::profile::{Profile, puncture_path_mm};
 use crate::recording::export::{Stretch, stretches};
 use crate::recording::read::Recording;
 use control_core::TICK_HZ;
@@ -35,12 +35,10 @@ pub struct Insertion {
 
 /// All insertions of a recording against `profile`.
 pub fn score(recording: &Recording, profile: &Profile) -> Vec<Insertion> {
-    let vessel_mm = profile
-        .config
-        .layers
-        .iter()
+    let layers = profile.config.patient.layers.iter();
+    let vessel_mm = layers
         .filter(|layer| layer.tissue == Tissue::Vessel)
-        .find_map(puncture_depth_mm);
+        .find_map(|layer| puncture_path_mm(layer, profile.entry_rad));
     let stretches = stretches(recording);
     let zero_tick = stretches.first().map_or(0, |s| s.first_tick);
     stretches

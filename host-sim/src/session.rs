@@ -3,7 +3,7 @@
 
 use control_core::config::Tissue;
 use control_core::controller::Sample;
-use control_core::event::State;
+use control_core::event::{State, VesselState};
 use link::frames::{Event, Hello, Pose, Timing};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -18,7 +18,7 @@ const WAITING_EVENTS: usize = 256;
 /// An older pose says nothing of where the needle was at an event: 100 ms.
 const NEAR_TICKS: u64 = control_core::TICK_HZ as u64 / 10;
 
-/// What a picture needs to know before anything moves. Lengths along the needle.
+/// What a picture needs to know before anything moves. Layers lie in the body: their depths are perpendicular to the skin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scene {
     /// Where the samples come from.
@@ -31,12 +31,16 @@ pub struct Scene {
     pub layers: Vec<SceneLayer>,
     /// Radius of the roller in mm.
     pub roller_radius_mm: f64,
-    /// Largest depth in mm.
+    /// Largest depth along the needle in mm.
     pub travel_mm: f64,
     /// Largest force at the roller in N.
     pub largest_force_n: f64,
     /// Inclination below the horizontal that the procedure begins with, in rad.
     pub tilt_rad: f64,
+    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is what is left of the tilt.
+    pub skin_tilt_rad: f64,
+    /// The vessel, where there is one with two walls.
+    pub vessel: Option<SceneVessel>,
     /// Whether [`Control::Drag`], [`Control::Tilt`] and [`Control::Script`] do anything: only with the virtual device.
     pub hand: bool,
 }
@@ -59,6 +63,19 @@ pub enum Source {
     },
 }
 
+/// A tube with its axis level with the skin and along the way that the needle points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SceneVessel {
+    /// Depth of its axis, perpendicular to the skin, in mm.
+    pub axis_mm: f64,
+    /// Diameter perpendicular to the skin in mm.
+    pub height_mm: f64,
+    /// Diameter along the skin in mm.
+    pub width_mm: f64,
+    /// How far the needle's plane passes beside the axis in mm.
+    pub offset_mm: f64,
+}
+
 /// One layer of tissue.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneLayer {
@@ -66,10 +83,14 @@ pub struct SceneLayer {
     pub name: String,
     /// Whether it is the vessel that the procedure aims at.
     pub is_vessel: bool,
-    /// Depth of its outer face in mm.
-    pub top_mm: f64,
-    /// Depth at which its wall gives way in mm, where it has one.
-    pub puncture_depth_mm: Option<f64>,
+    /// Whether it begins with the vessel's far wall.
+    pub is_far_wall: bool,
+    /// Depth of its outer face in mm, perpendicular to the skin.
+    pub depth_mm: f64,
+    /// How far its wall is pushed in along the needle before it gives way, in mm, where it has one.
+    pub puncture_travel_mm: Option<f64>,
+    /// Part of that which is left when it has just given way, 0 to 1.
+    pub spring_back: Option<f64>,
     /// Force at which its wall gives way in N, friction not counted.
     pub puncture_force_n: Option<f64>,
     /// Friction gained for each mm inside it, in N/mm.
@@ -84,6 +105,22 @@ pub fn tissue_name(tissue: Tissue) -> &'static str {
         Tissue::Muscle => "muscle",
         Tissue::Vessel => "vessel",
         Tissue::Other => "other",
+        Tissue::Bursa => "bursa",
+        Tissue::Tendon => "tendon",
+        Tissue::Cartilage => "cartilage",
+        Tissue::FarWall => "far wall",
+    }
+}
+
+/// What programs call the place of the tip as seen from a vessel.
+pub fn vessel_name(code: u8) -> &'static str {
+    match VesselState::from_code(code) {
+        Some(VesselState::Outside) => "outside",
+        Some(VesselState::Touching) => "touching",
+        Some(VesselState::InLumen) => "in_lumen",
+        Some(VesselState::Through) => "through",
+        Some(VesselState::Beside) => "beside",
+        None => "unknown",
     }
 }
 
@@ -437,6 +474,8 @@ mod tests {
             travel_mm: 60.0,
             largest_force_n: 2.88,
             tilt_rad: 0.0,
+            skin_tilt_rad: 0.0,
+            vessel: None,
             hand: true,
         }
     }

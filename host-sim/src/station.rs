@@ -79,7 +79,7 @@ impl Outlets {
                 self.publisher.timing(*timing);
                 Ok(())
             }
-            DeviceFrame::Ack(_) => Ok(()),
+            DeviceFrame::Ack(_) | DeviceFrame::Device(_) => Ok(()),
         }
     }
 

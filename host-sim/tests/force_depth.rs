@@ -12,6 +12,8 @@ const SLEW_MNM_PER_TICK: f64 = 1.0;
 const FADE_TICKS: f64 = 3_000.0;
 const HOLD_N_PER_MM: f64 = 1.0;
 const HEAL_MM: f64 = 0.2;
+/// The tilt is told in mrad: 30° is 524 of them.
+const ANGLE_RAD: f64 = 0.524;
 
 struct Row {
     command: f64,
@@ -43,7 +45,13 @@ fn jog(parabola: &toml::Value, travel_mm: f64) -> f64 {
     from_vertex * from_vertex / number(parabola, &["compliance_mm2_per_n"]) + number(parabola, &["base_n"])
 }
 
-/// The tissue of a profile, as the README of any such device would describe it.
+/// Where a layer begins along the needle.
+fn top_mm(layer: &toml::Value) -> f64 {
+    number(layer, &["depth_mm"]) / ANGLE_RAD.sin()
+}
+
+/// The tissue of a profile, as the README of any such device would describe it. Every wall has given way long before the
+/// next one is met.
 struct Twin {
     layers: Vec<toml::Value>,
     given: Vec<Option<f64>>,
@@ -54,7 +62,7 @@ impl Twin {
     fn force_n(&mut self, depth_mm: f64) -> f64 {
         let mut force = 0.0;
         for (layer, given) in self.layers.iter().zip(&mut self.given) {
-            let travel = depth_mm - number(layer, &["top_mm"]);
+            let travel = depth_mm - top_mm(layer);
             if travel < -HEAL_MM {
                 *given = None;
             }
@@ -81,8 +89,8 @@ impl Twin {
         }
         let mut limit = 0.0;
         for (index, layer) in self.layers.iter().enumerate() {
-            let top = number(layer, &["top_mm"]);
-            let end = self.layers.get(index + 1).map_or(f64::INFINITY, |next| number(next, &["top_mm"]));
+            let top = top_mm(layer);
+            let end = self.layers.get(index + 1).map_or(f64::INFINITY, top_mm);
             limit += (depth_mm.min(end) - top).max(0.0) * number(layer, &["friction_n_per_mm"]);
         }
         let reach = limit / HOLD_N_PER_MM;

@@ -19,7 +19,7 @@ impl Bench {
     fn new() -> Self {
         let profile = Profile::find("adult").expect("it is built in");
         let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
-        let mut driver = Driver::new(profile.config.clone());
+        let mut driver = Driver::new(profile.config.patient.clone());
         driver.connected(Duration::ZERO);
         Self { device: VirtualDevice::new(&profile, procedure), driver, frames: Vec::new() }
     }
@@ -90,7 +90,7 @@ fn a_pc_that_dies_takes_the_torque_with_it_and_one_that_comes_back_does_not_brin
     let mut bench = Bench::new();
     bench.start();
     // Into the skin, so that there is torque to lose.
-    bench.run(2_300, |_| {});
+    bench.run(2_100, |_| {});
     assert!(bench.device.set_value() < -0.05, "{}", bench.device.set_value());
     let mut on_for = 0;
     while bench.device.is_enabled() && on_for < 1_000 {
@@ -128,7 +128,7 @@ fn a_pc_that_restarts_while_torque_is_on_stops_the_device_first() {
     let mut bench = Bench::new();
     bench.start();
     let profile = Profile::find("thin-elderly").expect("it is built in");
-    bench.driver = Driver::new(profile.config.clone());
+    bench.driver = Driver::new(profile.config.patient.clone());
     let now = bench.now();
     bench.driver.connected(now);
     bench.run(200, |_| {});

@@ -23,6 +23,7 @@ fn setup() -> Setup {
         profile_toml: profile.source.text,
         profile_origin: profile.source.origin,
         procedure: None,
+        device_toml: None,
     }
 }
 

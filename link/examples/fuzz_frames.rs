@@ -2,7 +2,7 @@
 //! --seconds 60 [--seed N]`. Nothing may panic, and after any damage the next whole frame must be read.
 
 use control_core::config::Config;
-use control_core::{Controller, Plan, TickInput};
+use control_core::{Controller, TickInput};
 use link::codec::{self, MAX_FRAME};
 use link::device::{Endpoint, Identity};
 use link::frames::{Command, HostFrame, PROTOCOL_VERSION};
@@ -14,7 +14,7 @@ fn main() {
     let seed = argument("--seed").unwrap_or(1);
     let mut random = fastrand::Rng::with_seed(seed);
     let end = Instant::now() + Duration::from_secs(seconds);
-    let plan = Plan::new(&Config::default()).expect("the default is sound");
+    let plan = Config::default().plan().expect("the default is sound");
     let identity = Identity { serial: [0; 12], firmware: [0; 3] };
     let mut device = Endpoint::new(identity, &plan, None);
     let mut controller = Controller::new(plan);
@@ -60,9 +60,11 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 }
 
 fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
-    let command = match random.u8(0..7) {
+    let command = match random.u8(0..9) {
         0 => Command::Hello { version: random.u16(0..3) },
-        1 => Command::Configure(config(random)),
+        1 => Command::ConfigurePatient(config(random).patient),
+        6 => Command::ConfigureDevice(config(random).device),
+        7 => Command::ReportDevice,
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::Zero,
@@ -77,9 +79,9 @@ fn config(random: &mut fastrand::Rng) -> Config {
     let mut config = Config::default();
     let any =
         |random: &mut fastrand::Rng| fixed::types::I16F16::from_bits(random.i32(..) >> random.u32(0..32));
-    for layer in &mut config.layers {
+    for layer in &mut config.patient.layers {
         if random.u8(0..4) == 0 {
-            layer.top.0 = any(random);
+            layer.depth.0 = any(random);
         }
         if let Some(wall) = &mut layer.wall
             && random.bool()
@@ -91,8 +93,8 @@ fn config(random: &mut fastrand::Rng) -> Config {
     }
     if random.u8(0..4) == 0 {
         config.device.counts_per_turn = random.u16(..);
-        config.limits.fade_in_ms = random.u16(..);
-        config.limits.max_counts_per_tick = random.u16(..);
+        config.device.limits.fade_in_ms = random.u16(..);
+        config.device.limits.max_counts_per_tick = random.u16(..);
     }
     config
 }

@@ -9,7 +9,7 @@ use crate::frames::{
 use control_core::config::Tissue;
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
-use control_core::{Order, Plan, TICK_HZ, TickOutput};
+use control_core::{Order, Patient, Plan, TICK_HZ, TickOutput};
 use heapless::{Deque, HistoryBuf};
 
 /// Blocks that wait for the PC: 77 ms of samples.
@@ -36,7 +36,6 @@ pub struct Identity {
 /// The device's end of the link.
 pub struct Endpoint {
     identity: Identity,
-    plan_hash: u32,
     plan: Plan,
     decoder: Decoder,
     answered: HistoryBuf<Ack, REMEMBERED>,
@@ -49,6 +48,7 @@ pub struct Endpoint {
     sequence: u32,
     acks: Deque<Ack, WAITING_ACKS>,
     hello_due: bool,
+    device_due: bool,
     events: Deque<Event, WAITING_EVENTS>,
     filling: SampleBlock,
     blocks: Deque<SampleBlock, WAITING_BLOCKS>,
@@ -63,7 +63,6 @@ impl Endpoint {
     pub fn new(identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
         Self {
             identity,
-            plan_hash: codec::hash(plan.config()),
             plan: plan.clone(),
             decoder: Decoder::default(),
             answered: HistoryBuf::new(),
@@ -76,6 +75,7 @@ impl Endpoint {
             sequence: 0,
             acks: Deque::new(),
             hello_due: false,
+            device_due: false,
             events: Deque::new(),
             filling: SampleBlock::default(),
             blocks: Deque::new(),
@@ -148,6 +148,8 @@ impl Endpoint {
                 tilt: control_core::units::Milliradians(output.sample.tilt_mrad),
                 state: output.sample.state,
                 limits: output.limits,
+                angle: output.angle,
+                vessel: output.vessel as u8,
             });
         }
         self.timing_due |= tick.is_multiple_of(TIMING_TICKS);
@@ -190,6 +192,9 @@ impl Endpoint {
         if !self.in_session {
             return None;
         }
+        if core::mem::take(&mut self.device_due) {
+            return Some(DeviceFrame::Device(*self.plan.device()));
+        }
         if let Some(event) = self.events.pop_front() {
             return Some(DeviceFrame::Event(event));
         }
@@ -205,12 +210,13 @@ impl Endpoint {
     /// Who it is and in which scale it speaks under the configuration in force.
     pub fn hello(&self) -> Hello {
         let plan = &self.plan;
-        let device = plan.config().device;
+        let device = plan.device();
         Hello {
             version: PROTOCOL_VERSION,
             identity: self.identity.serial,
             firmware: self.identity.firmware,
-            config_hash: self.plan_hash,
+            config_hash: codec::hash(plan.config()),
+            device_hash: codec::hash(device),
             tick_hz: TICK_HZ,
             pose_hz: POSE_HZ,
             mm_per_count: plan.mm_per_count(),
@@ -263,7 +269,14 @@ impl Endpoint {
                 self.fault = None;
                 Ok(())
             }
-            Command::Configure(_) | Command::Zero | Command::Excite(_) if powered => Err(Rejection::Powered),
+            Command::ConfigurePatient(_)
+            | Command::ConfigureDevice(_)
+            | Command::Zero
+            | Command::Excite(_)
+                if powered =>
+            {
+                Err(Rejection::Powered)
+            }
             Command::Zero => self.order(Order::Zero),
             Command::Excite(excitation) => {
                 excitation.check(&self.plan).map_err(Rejection::Config)?;
@@ -273,12 +286,18 @@ impl Endpoint {
                 self.fault = None;
                 Ok(())
             }
-            Command::Configure(config) => {
-                let plan = Plan::new(&config).map_err(Rejection::Config)?;
-                self.order(Order::Configure(plan.clone()))?;
-                self.plan_hash = codec::hash(&config);
-                self.plan = plan;
-                self.hello_due = true;
+            Command::ConfigurePatient(patient) => {
+                self.configure(Plan::new(self.plan.device(), &patient).map_err(Rejection::Config)?)
+            }
+            Command::ConfigureDevice(device) => {
+                // A patient for another device leaves; what is wrong with the device itself is wrong without a patient too.
+                let plan = Plan::new(&device, self.plan.patient())
+                    .or_else(|_| Plan::new(&device, &Patient::nobody()))
+                    .map_err(Rejection::Config)?;
+                self.configure(plan)
+            }
+            Command::ReportDevice => {
+                self.device_due = true;
                 Ok(())
             }
         }
@@ -290,6 +309,13 @@ impl Endpoint {
             return Err(Rejection::NoSession);
         }
         self.interlocks.first().map_or(Ok(()), |interlock| Err(Rejection::Interlocked(interlock)))
+    }
+
+    fn configure(&mut self, plan: Plan) -> Result<(), Rejection> {
+        self.order(Order::Configure(plan.clone()))?;
+        self.plan = plan;
+        self.hello_due = true;
+        Ok(())
     }
 
     fn order(&mut self, order: Order) -> Result<(), Rejection> {
@@ -330,13 +356,20 @@ impl Endpoint {
             }
             if has(output.transitions.puncture) {
                 self.event(tick, EventKind::Puncture { layer });
-                if self.plan.tissue(layer) == Some(Tissue::Vessel) {
-                    self.event(tick, EventKind::Vessel { layer });
+                match self.plan.tissue(layer) {
+                    Some(Tissue::Vessel) => self.event(tick, EventKind::Vessel { layer }),
+                    Some(Tissue::FarWall) => self.event(tick, EventKind::FarWall { layer }),
+                    _ => {}
                 }
             }
             if has(output.transitions.exit) {
                 self.event(tick, EventKind::Exit { layer });
             }
+        }
+        if output.transitions.flashback
+            && let Some(layer) = (0..8).find(|&layer| self.plan.tissue(layer) == Some(Tissue::Vessel))
+        {
+            self.event(tick, EventKind::Flashback { layer });
         }
     }
 
@@ -367,5 +400,6 @@ impl Endpoint {
         self.filling = SampleBlock::default();
         self.pose = None;
         self.timing_due = false;
+        self.device_due = false;
     }
 }

@@ -1,6 +1,6 @@
 //! What is said. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
-use control_core::config::{Config, DacWidth};
+use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::excitation::Excitation;
@@ -12,7 +12,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -48,6 +48,8 @@ pub enum DeviceFrame {
     Timing(Timing),
     /// The answer to a command.
     Ack(Ack),
+    /// The device's part of the configuration in force; the answer to [`Command::ReportDevice`].
+    Device(Device),
 }
 
 /// Who speaks and in which scale.
@@ -59,8 +61,10 @@ pub struct Hello {
     pub identity: [u8; 12],
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// CRC-32 of the configuration in force.
+    /// CRC-32 of the configuration in force, both parts.
     pub config_hash: u32,
+    /// CRC-32 of its device's part.
+    pub device_hash: u32,
     /// Samples a second.
     pub tick_hz: u32,
     /// Poses a second.
@@ -103,6 +107,10 @@ pub struct Pose {
     pub state: u8,
     /// What holds torque back.
     pub limits: Limits,
+    /// The angle to the skin that the layers are met at, smoothed.
+    pub angle: Milliradians,
+    /// [`control_core::event::VesselState`] as a number.
+    pub vessel: u8,
 }
 
 /// Something happened.
@@ -136,6 +144,10 @@ pub enum EventKind {
     Stopped,
     /// The configuration is in force, but will be lost at the next reset.
     NotSaved { cause: SaveFailure },
+    /// The tip has come into the lumen of a vessel, through its near wall or drawn back through its far one: blood shows.
+    Flashback { layer: u8 },
+    /// A vessel's far wall has given way: the needle has gone through.
+    FarWall { layer: u8 },
 }
 
 /// Why a configuration was not saved.
@@ -264,8 +276,9 @@ pub enum Command {
         /// [`PROTOCOL_VERSION`] of the PC.
         version: u16,
     },
-    /// Use this configuration from now on; only while torque is off.
-    Configure(Config),
+    /// Whom the needle goes into from now on; taken whole or refused with the reason, and only while torque is off. What
+    /// was found at commissioning stays as it is.
+    ConfigurePatient(Patient),
     /// Power up and fade in.
     Start,
     /// Torque off.
@@ -276,4 +289,9 @@ pub enum Command {
     Heartbeat,
     /// Play an excitation, with nobody's hand on the needle; only while torque is off.
     Excite(Excitation),
+    /// How the device is built, as commissioning found it; taken whole or refused with the reason, and only while torque is
+    /// off. A patient whom it does not suit leaves: until another is sent there is nobody, and no force.
+    ConfigureDevice(Device),
+    /// Tell the device's part of the configuration.
+    ReportDevice,
 }

@@ -3,8 +3,8 @@
 use control_core::config::Config;
 use control_core::controller::Sample;
 use control_core::event::Limits;
-use control_core::units::Counts;
-use control_core::{Controller, Order, Plan, Refusal, TickInput};
+use control_core::units::{Counts, Milliradians};
+use control_core::{Controller, Order, Refusal, TickInput};
 use link::codec::{self, MAX_FRAME, TooLong};
 use link::device::{Endpoint, Identity};
 use link::frames::{
@@ -22,7 +22,7 @@ struct Device {
 
 impl Device {
     fn new() -> Self {
-        let plan = Plan::new(&Config::default()).expect("the default is sound");
+        let plan = Config::default().plan().expect("the default is sound");
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             endpoint: Endpoint::new(identity, &plan, None),
@@ -161,7 +161,7 @@ fn times_are_passed_on_and_its_own_counts_are_kept() {
 fn a_configuration_is_known_by_its_hash() {
     let default = Config::default();
     let mut other = default.clone();
-    other.limits.fade_in_ms += 1;
+    other.device.limits.fade_in_ms += 1;
     assert_eq!(codec::hash(&default), codec::hash(&default.clone()));
     assert_ne!(codec::hash(&default), codec::hash(&other));
 }
@@ -175,6 +175,9 @@ fn what_fits_the_longest_frame_is_encoded_and_a_byte_more_is_not() {
     assert_eq!(codec::encode(&bytes(MAX_FRAME - 10), &mut out), Err(TooLong));
 }
 
+/// A needle straight into the skin: lengths along it are depths.
+const STRAIGHT: Milliradians = Milliradians(1_571);
+
 /// What happened while the needle went to `counts` one after the other, a count a tick.
 fn events(device: &mut Device, counts: &[i32]) -> Vec<EventKind> {
     let mut at = 0;
@@ -183,7 +186,7 @@ fn events(device: &mut Device, counts: &[i32]) -> Vec<EventKind> {
         while at != target {
             at += (target - at).signum();
             device.controller.order(Order::Heartbeat);
-            let output = device.controller.tick(TickInput { count: Counts(at), ..TickInput::default() });
+            let output = device.controller.tick(TickInput { count: Counts(at), tilt: STRAIGHT });
             device.endpoint.record(device.tick, &output);
             device.tick += 1;
             kinds.extend(device.heard().into_iter().filter_map(|frame| match frame {
@@ -198,15 +201,16 @@ fn events(device: &mut Device, counts: &[i32]) -> Vec<EventKind> {
 #[test]
 fn a_needle_that_goes_in_and_out_is_told_layer_by_layer() {
     let mut device = Device::in_session();
-    // 11 mm in, and out again.
-    let seen = events(&mut device, &[700, -50]);
+    // 7 mm in, and out again.
+    let seen = events(&mut device, &[450, -50]);
     let wanted = [
         EventKind::Contact { layer: 0 },
-        EventKind::Contact { layer: 1 },
         EventKind::Puncture { layer: 0 },
+        EventKind::Contact { layer: 1 },
         EventKind::Contact { layer: 2 },
         EventKind::Puncture { layer: 2 },
         EventKind::Vessel { layer: 2 },
+        EventKind::Flashback { layer: 2 },
         EventKind::Exit { layer: 2 },
         EventKind::Exit { layer: 1 },
         EventKind::Exit { layer: 0 },

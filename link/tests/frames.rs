@@ -3,7 +3,7 @@
 use control_core::config::{Config, MAX_LAYERS};
 use control_core::controller::Sample;
 use control_core::event::Fault;
-use control_core::{Controller, Order, Plan, TickInput};
+use control_core::{Controller, Device, Order, Patient, TickInput};
 use link::codec::{self, Decoder, Garbage, MAX_FRAME};
 use link::device::{Endpoint, Identity};
 use link::frames::{
@@ -90,16 +90,16 @@ fn the_largest_frames_fit() {
     let sample = Sample { count: i32::MIN, dac: u16::MAX, state: u8::MAX, tilt_mrad: i16::MIN };
     encoded(&Numbered { sequence: u32::MAX, frame: block(u64::MAX, &[sample; BLOCK_SAMPLES]) });
     let mut config = Config::default();
-    let mut layer = config.layers[0];
+    let mut layer = config.patient.layers[0];
     let wall = layer.wall.as_mut().expect("skin has a wall");
     let most = fixed::types::I16F16::MIN;
     for parabola in [&mut wall.elastic, &mut wall.relief] {
         (parabola.vertex.0, parabola.compliance.0, parabola.base.0) = (most, most, most);
     }
     (wall.puncture_travel.0, wall.unload.0) = (most, most);
-    (layer.top.0, layer.friction.0) = (most, most);
-    config.layers = [layer; MAX_LAYERS].into_iter().collect();
-    encoded(&HostFrame { id: u32::MAX, command: Command::Configure(config) });
+    (layer.depth.0, layer.friction.0) = (most, most);
+    config.patient.layers = [layer; MAX_LAYERS].into_iter().collect();
+    encoded(&HostFrame { id: u32::MAX, command: Command::ConfigurePatient(config.patient) });
 }
 
 /// A device with its control law, and the PC's end.
@@ -113,7 +113,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let plan = Plan::new(&Config::default()).expect("the default is sound");
+        let plan = Config::default().plan().expect("the default is sound");
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             device: Endpoint::new(identity, &plan, None),
@@ -224,16 +224,54 @@ fn a_repeated_command_is_answered_again_and_carried_out_once() {
 fn torque_and_configuration_exclude_each_other() {
     let mut bench = Bench::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
-    assert_eq!(bench.send(Command::Configure(Config::default())), Ok(()));
+    assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Ok(()));
     assert_eq!(bench.send(Command::Start), Ok(()));
-    assert_eq!(bench.send(Command::Configure(Config::default())), Err(Rejection::Powered));
+    assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Err(Rejection::Powered));
     bench.run(10, |_| 0);
     assert_eq!(bench.send(Command::Zero), Err(Rejection::Powered));
     assert_eq!(bench.send(Command::Stop), Ok(()));
     bench.run(10, |_| 0);
     assert_eq!(bench.send(Command::Zero), Ok(()));
-    let empty = Config { layers: heapless::Vec::new(), ..Config::default() };
-    assert!(matches!(bench.send(Command::Configure(empty)), Err(Rejection::Config(_))));
+    let empty = Patient { layers: heapless::Vec::new(), ..Patient::default() };
+    assert!(matches!(bench.send(Command::ConfigurePatient(empty)), Err(Rejection::Config(_))));
+}
+
+#[test]
+fn a_patient_leaves_the_device_alone_and_a_device_that_does_not_suit_one_sends_one_away() {
+    let mut bench = Bench::new();
+    let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
+    let ask = |bench: &mut Bench, command: Command| {
+        let bytes = bench.bytes(command);
+        bench.device.receive(&bytes);
+        bench.drain()
+    };
+    let hello = |frames: &[DeviceFrame]| {
+        let hello =
+            frames.iter().find_map(|f| if let DeviceFrame::Hello(h) = f { Some(h.clone()) } else { None });
+        hello.expect("a new configuration is told")
+    };
+    let hash = |device: Device, patient: Patient| codec::hash(&Config { device, patient });
+    let mut device = Device { motor_reversed: true, dac_zero: 3, ..Device::default() };
+    let told = hello(&ask(&mut bench, Command::ConfigureDevice(device)));
+    assert_eq!(told.config_hash, hash(device, Patient::default()), "the patient stays");
+    assert_eq!(told.device_hash, codec::hash(&device));
+
+    let mut patient = Patient::default();
+    patient.layers[0].friction.0 /= 2;
+    let told = hello(&ask(&mut bench, Command::ConfigurePatient(patient.clone())));
+    assert_eq!(told.config_hash, hash(device, patient.clone()), "the device stays");
+    let reported = ask(&mut bench, Command::ReportDevice);
+    assert!(reported.contains(&DeviceFrame::Device(device)), "{reported:?}");
+
+    // Refused whole: neither part changes.
+    let refused = Device { counts_per_turn: 3, ..device };
+    assert!(matches!(bench.send(Command::ConfigureDevice(refused)), Err(Rejection::Config(_))));
+    assert_eq!(bench.device.hello().config_hash, hash(device, patient));
+    // A ceiling of 0.2 N bears no adult.
+    device.limits.torque.0 = fixed::types::I16F16::from_num(2);
+    let told = hello(&ask(&mut bench, Command::ConfigureDevice(device)));
+    assert_eq!(told.config_hash, hash(device, Patient::nobody()));
+    assert!(matches!(bench.send(Command::ConfigurePatient(Patient::default())), Err(Rejection::Config(_))));
 }
 
 #[test]

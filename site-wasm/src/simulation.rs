@@ -38,7 +38,7 @@ impl Simulation {
         let procedure = Procedure::find(PROCEDURE, &profile)?;
         let scene = profile.scene(Source::Virtual, Some(PROCEDURE.to_owned()));
         let (session, publisher) = session::open(scene);
-        let mut driver = Driver::new(profile.config.clone());
+        let mut driver = Driver::new(profile.config.patient.clone());
         driver.connected(Duration::ZERO);
         Ok(Self {
             device: VirtualDevice::new(&profile, procedure),
@@ -170,7 +170,7 @@ fn publish(publisher: &Publisher, frame: &DeviceFrame) {
         DeviceFrame::Pose(pose) => publisher.pose(*pose),
         DeviceFrame::Event(event) => publisher.event(*event),
         DeviceFrame::Timing(timing) => publisher.timing(*timing),
-        DeviceFrame::Ack(_) => {}
+        DeviceFrame::Ack(_) | DeviceFrame::Device(_) => {}
     }
 }
 

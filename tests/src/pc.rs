@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use control_core::Config;
+use control_core::config::Device;
 use control_core::controller::Sample;
 use link::codec::MAX_FRAME;
 use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
@@ -27,6 +29,8 @@ const HELLOS: u64 = 2;
 pub struct Heard {
     /// The latest hello.
     pub hello: Option<Hello>,
+    /// The device's part of the configuration, where it was asked for.
+    pub device: Option<Device>,
     /// Every sample, with its tick.
     pub samples: Vec<(u64, Sample)>,
     /// Every event.
@@ -156,6 +160,16 @@ impl Pc {
         assert_eq!(ack.result, Ok(()), "the device refuses");
     }
 
+    /// Configures the device, both parts.
+    ///
+    /// # Panics
+    ///
+    /// When it refuses or does not answer.
+    pub fn configure(&mut self, board: &mut Board, config: &Config) {
+        self.must(board, Command::ConfigureDevice(config.device));
+        self.must(board, Command::ConfigurePatient(config.patient.clone()));
+    }
+
     /// Lets `milliseconds` pass, with the heartbeat going.
     pub fn run_ms(&mut self, board: &mut Board, milliseconds: u64) {
         for _ in 0..milliseconds {
@@ -188,6 +202,7 @@ impl Pc {
         let heard = &mut self.heard;
         match frame {
             DeviceFrame::Hello(hello) => heard.hello = Some(hello),
+            DeviceFrame::Device(device) => heard.device = Some(device),
             DeviceFrame::Samples(block) => {
                 if self.keep_samples {
                     heard.samples.extend((block.first_tick..).zip(block.samples));

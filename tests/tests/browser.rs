@@ -5,7 +5,6 @@
 
 use control_core::config::Config;
 use control_core::controller::{Controller, Order, TickInput};
-use control_core::plan::Plan;
 use control_core::units::{Counts, Milliradians};
 use serde_json::{Value, json};
 use std::fs;
@@ -190,7 +189,7 @@ fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Failure> {
     let mm_per_count = mm_per_turn / f64::from(device.counts_per_turn);
     let target = (depth_mm / mm_per_count).round() as i32;
     let beyond = target + (0.3 / mm_per_count) as i32;
-    let mut core = Controller::new(Plan::new(&config).map_err(|e| e.to_string())?);
+    let mut core = Controller::new(config.plan().map_err(|e| e.to_string())?);
     core.order(Order::Start);
     let mut count: i32 = -100;
     let mut force = |target: i32| -> f64 {

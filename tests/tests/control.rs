@@ -3,7 +3,7 @@
 use control_core::controller::{Order, TickInput};
 use control_core::event::State;
 use control_core::units::{Counts, Milliradians};
-use control_core::{Config, Controller, Plan};
+use control_core::{Config, Controller};
 use link::Command;
 use link::frames::EventKind;
 use tests::pc::Pc;
@@ -61,7 +61,7 @@ fn the_board_writes_the_codes_that_control_core_computes() {
         let sample = tick.checked_sub(first).and_then(|place| pc.heard.samples.get(place as usize));
         sample.map_or(0, |&(_, sample)| sample.tilt_mrad)
     };
-    let mut controller = Controller::new(Plan::new(&Config::default()).expect("the default may run"));
+    let mut controller = Controller::new(Config::default().plan().expect("the default may run"));
     let mut states = [0_u32; 8];
     for (tick, pins) in (0_u64..).zip(&ticks) {
         if tick == started {

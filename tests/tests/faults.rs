@@ -138,8 +138,9 @@ fn a_storm_of_valid_commands_changes_nothing() {
     let mut rig = Rig::pressed();
     let since = rig.board.now();
     for _ in 0..1_000 {
-        let config = control_core::Config::default();
-        for command in [Command::Start, Command::Zero, Command::Heartbeat, Command::Configure(config)] {
+        let patient = control_core::Patient::default();
+        for command in [Command::Start, Command::Zero, Command::Heartbeat, Command::ConfigurePatient(patient)]
+        {
             if rig.board.at_stop(|stopped| stopped.usb().host.unsent()) < 4_096 {
                 rig.pc.send(&mut rig.board, command);
             }

@@ -32,7 +32,7 @@ fn eight_lines_carry_the_codes_of_an_eight_bit_configuration_and_never_another()
     pc.connect(&mut board);
     let mut config = Config::default();
     config.device.dac = DacWidth::Bits8;
-    pc.must(&mut board, Command::Configure(config));
+    pc.configure(&mut board, &config);
     pc.run_ms(&mut board, 50);
     board.at_stop(|stopped| stopped.log().put_out.clear());
     let first = pc.heard.samples.len();

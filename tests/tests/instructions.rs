@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use control_core::Config;
-use control_core::config::{DacWidth, FrictionLaw, Layer, MAX_LAYERS, Parabola, SpeedMethod, Tissue, Wall};
+use control_core::config::{
+    DacWidth, FrictionLaw, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall,
+};
 use control_core::event::State;
 use control_core::excitation::{Excitation, MAX_LINES, Servo, Signal};
 use control_core::units::{
@@ -48,7 +50,7 @@ impl Profile {
         let mut board = board(plant);
         let mut pc = Pc::new();
         pc.connect(&mut board);
-        pc.must(&mut board, Command::Configure(config));
+        pc.configure(&mut board, &config);
         pc.must(&mut board, begin);
         let handler = board.symbols().iter().find(|symbol| symbol.name == TICK);
         let handler = handler.expect("the image has the tick's handler").address;
@@ -108,12 +110,13 @@ fn walls(apart: f64) -> Vec<Layer> {
     // 0.2 N at the puncture, and less than that once the wall has given way.
     let layer = |number: usize| Layer {
         tissue: Tissue::Other,
-        top: Millimetres(q(apart * number as f64)),
+        depth: Millimetres(q(apart * number as f64)),
         wall: Some(Wall {
             elastic: parabola(0.0, travel * travel / 0.2, 0.0),
             puncture_travel: Millimetres(q(travel)),
             relief: parabola(8.0, 1_000.0, 0.02),
             unload: Stiffness(q(0.05)),
+            spring_back: SPRING_BACK,
         }),
         friction: FrictionPerMillimetre(q(0.02)),
     };
@@ -133,17 +136,17 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
     let cone = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
     (0..8_u8).map(move |choice| {
         let is = |bit: u8| choice & 1 << bit != 0;
-        let mut config = Config {
-            friction: if is(0) { paper } else { cone },
-            speed: if is(1) { SpeedMethod::EdgeTiming } else { SpeedMethod::Window },
-            damping: Damping(I8F24::from_num(0.0002)),
-            layers: walls(apart).into_iter().collect(),
-            ..Config::default()
-        };
+        let mut config = Config::default();
+        config.patient.friction = if is(0) { paper } else { cone };
+        config.patient.layers = walls(apart).into_iter().collect();
+        config.device.speed = if is(1) { SpeedMethod::EdgeTiming } else { SpeedMethod::Window };
+        config.device.damping = Damping(I8F24::from_num(0.0002));
+        config.device.encoder_reversed = is(0);
+        config.device.motor_reversed = is(1);
         config.device.dac = if is(2) { DacWidth::Bits8 } else { DacWidth::Bits12 };
-        config.limits.continuous_torque = MillinewtonMetres(q(10.0));
-        config.limits.stiffness = Stiffness(q(3.0));
-        config.limits.max_counts_per_tick = 400;
+        config.device.limits.continuous_torque = MillinewtonMetres(q(10.0));
+        config.device.limits.stiffness = Stiffness(q(3.0));
+        config.device.limits.max_counts_per_tick = 400;
         config
     })
 }

@@ -53,12 +53,12 @@ fn three_hundred_configurations_are_all_saved() {
     let mut rig = connected(Wiring::default());
     let config = |number: u16| {
         let mut config = Config::default();
-        config.limits.fade_in_ms = 300 + number;
+        config.device.limits.fade_in_ms = 300 + number;
         config
     };
     for number in 1..=300 {
         // An erasure takes longer than a PC waits for an answer.
-        rig.pc.send(&mut rig.board, Command::Configure(config(number)));
+        rig.pc.send(&mut rig.board, Command::ConfigureDevice(config(number).device));
         let before = rig.pc.heard.acks.len();
         while rig.pc.heard.acks.len() == before {
             rig.pc.run_ms(&mut rig.board, 20);
@@ -86,8 +86,8 @@ fn a_sector_is_erased_with_the_amplifier_off_only() {
         rig.pc.send(&mut rig.board, Command::Start);
         rig.pc.run_ms(&mut rig.board, 3);
         rig.pc.send(&mut rig.board, Command::Stop);
-        config.limits.fade_in_ms = 300 + number;
-        rig.pc.send(&mut rig.board, Command::Configure(config.clone()));
+        config.device.limits.fade_in_ms = 300 + number;
+        rig.pc.send(&mut rig.board, Command::ConfigureDevice(config.device));
         rig.pc.run_ms(&mut rig.board, 12);
     }
     rig.pc.run_ms(&mut rig.board, 2_000);
@@ -106,8 +106,8 @@ fn a_configuration_that_is_not_saved_is_reported() {
     let mut rig = connected(Wiring::default());
     rig.board.flash().array().worn = true;
     let mut config = Config::default();
-    config.limits.fade_in_ms = 400;
-    rig.pc.must(&mut rig.board, Command::Configure(config));
+    config.device.limits.fade_in_ms = 400;
+    rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
     rig.pc.run_ms(&mut rig.board, 50);
     let cause = SaveFailure::Flash;
     assert!(rig.pc.heard_event(|kind| *kind == EventKind::NotSaved { cause }), "{:?}", rig.pc.heard.events);

@@ -11,7 +11,8 @@ use tests::scenario::board;
 /// A configuration that differs from the default.
 fn changed() -> Config {
     let mut config = Config::default();
-    config.limits.fade_in_ms = 400;
+    config.device.limits.fade_in_ms = 400;
+    config.patient.layers[0].friction.0 += fixed::types::I16F16::ONE / 64;
     config
 }
 
@@ -31,7 +32,7 @@ fn a_configuration_outlives_a_reset() {
     pc.connect(&mut board);
     let default = link::codec::hash(&Config::default());
     assert_eq!(pc.heard.hello.as_ref().map(|hello| hello.config_hash), Some(default));
-    pc.must(&mut board, Command::Configure(changed()));
+    pc.configure(&mut board, &changed());
     pc.run_ms(&mut board, 50);
     assert_eq!(hash_after_reset(&mut board, &mut pc), (link::codec::hash(&changed()), None));
     let violations = board.flash().array().violations.clone();
@@ -40,66 +41,82 @@ fn a_configuration_outlives_a_reset() {
 
 #[test]
 fn power_that_goes_at_any_write_leaves_the_old_or_the_new() {
-    let (old, new) = (link::codec::hash(&Config::default()), link::codec::hash(&changed()));
+    let hash = |device, patient| link::codec::hash(&Config { device, patient });
+    let (default, changed_one) = (Config::default(), changed());
+    let (old, new) = (
+        hash(default.device, default.patient.clone()),
+        hash(changed_one.device, changed_one.patient.clone()),
+    );
+    // The records are apart: the device's may be there and the patient's not yet.
+    let half = hash(changed_one.device, default.patient);
     // How many writes a save takes.
     let mut board = board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);
     let before = board.flash().array().operations;
-    pc.must(&mut board, Command::Configure(changed()));
+    pc.configure(&mut board, &changed());
     pc.run_ms(&mut board, 50);
     let writes = board.flash().array().operations - before;
     assert!(writes > 10, "{writes} writes");
     drop(board);
 
-    let mut seen = [0, 0];
+    let mut seen = [0, 0, 0];
     // Every write in turn, on a board that keeps its flash: each save finds what the cut left.
     let mut board = tests::scenario::board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);
     for write in 0..writes {
-        pc.must(&mut board, Command::Configure(Config::default()));
+        pc.configure(&mut board, &Config::default());
         pc.run_ms(&mut board, 30);
         {
             let flash = board.flash();
             let mut array = flash.array();
             array.cut_before = Some(array.operations + write);
         }
-        pc.send(&mut board, Command::Configure(changed()));
+        pc.send(&mut board, Command::ConfigureDevice(changed().device));
+        pc.send(&mut board, Command::ConfigurePatient(changed().patient));
         board.run_ms(30);
         assert!(board.flash().array().cut_before.is_none(), "the power went before write {write}");
         board.run_ms(20);
         pc.connect(&mut board);
         let hello = pc.heard.hello.clone().expect("a hello");
-        assert!([old, new].contains(&hello.config_hash), "neither after a cut before write {write}");
+        let which = [old, half, new].into_iter().position(|hash| hash == hello.config_hash);
         assert_ne!(hello.fault, Some(Fault::StoredConfig), "write {write}");
-        seen[usize::from(hello.config_hash == new)] += 1;
+        seen[which.unwrap_or_else(|| panic!("none of them after a cut before write {write}"))] += 1;
     }
     println!(
-        "{writes} writes a save; after a cut the old one {} times, the new one {} times",
-        seen[0], seen[1]
+        "{writes} writes a save; after a cut the old ones {} times, the new device alone {} times, both {} times",
+        seen[0], seen[1], seen[2]
     );
-    assert!(seen[0] > 0);
+    assert!(seen[0] > 0 && seen[1] > 0);
 }
 
 #[test]
-fn a_flipped_bit_in_flash_is_reported_and_the_default_is_used() {
-    let mut rig = {
-        let mut board = board(plant::held());
-        let mut pc = Pc::new();
-        pc.connect(&mut board);
-        Rig { board, pc }
-    };
-    rig.pc.must(&mut rig.board, Command::Configure(changed()));
-    rig.pc.run_ms(&mut rig.board, 50);
-    {
-        let flash = rig.board.flash();
-        let mut array = flash.array();
-        let words = array.written();
-        let middle = words[words.len() / 2];
-        array.flip(middle, 1 << 7);
+fn a_flipped_bit_in_flash_is_reported_and_costs_the_record_that_it_is_in() {
+    let (default, other) = (Config::default(), changed());
+    // A word of the record that was written first, and one of the last.
+    for is_patients in [false, true] {
+        let mut rig = {
+            let mut board = board(plant::held());
+            let mut pc = Pc::new();
+            pc.connect(&mut board);
+            Rig { board, pc }
+        };
+        rig.pc.configure(&mut rig.board, &other);
+        rig.pc.run_ms(&mut rig.board, 50);
+        {
+            let flash = rig.board.flash();
+            let mut array = flash.array();
+            let words = array.written();
+            array.flip(words[if is_patients { words.len() - 3 } else { 4 }], 1 << 7);
+        }
+        let (hash, fault) = hash_after_reset(&mut rig.board, &mut rig.pc);
+        let left = if is_patients {
+            Config { patient: default.patient.clone(), ..other.clone() }
+        } else {
+            Config { device: default.device, ..other.clone() }
+        };
+        assert_eq!(hash, link::codec::hash(&left), "patient's: {is_patients}");
+        assert_eq!(fault, Some(Fault::StoredConfig));
     }
-    let (hash, fault) = hash_after_reset(&mut rig.board, &mut rig.pc);
-    assert_eq!(hash, link::codec::hash(&Config::default()));
-    assert_eq!(fault, Some(Fault::StoredConfig));
 }

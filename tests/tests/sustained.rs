@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex};
 
 use control_core::Config;
-use control_core::config::{FrictionLaw, Layer, Parabola, Tissue, Wall};
+use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::Limits;
 use control_core::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
@@ -38,21 +38,20 @@ fn stiff_wall() -> Config {
     };
     let layer = Layer {
         tissue: Tissue::Other,
-        top: Millimetres(q(0.0)),
+        depth: Millimetres(q(0.0)),
         wall: Some(Wall {
             elastic: parabola(-5.0, 1.8, -25.0 / 1.8),
             puncture_travel: Millimetres(q(0.4)),
             relief: parabola(1.0, 1.0, 0.0),
             unload: Stiffness(q(1.0)),
+            spring_back: SPRING_BACK,
         }),
         friction: FrictionPerMillimetre(q(0.0)),
     };
-    let mut config = Config {
-        friction: FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) },
-        layers: [layer].into_iter().collect(),
-        ..Config::default()
-    };
-    config.limits.stiffness = Stiffness(q(7.0));
+    let mut config = Config::default();
+    config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
+    config.patient.layers = [layer].into_iter().collect();
+    config.device.limits.stiffness = Stiffness(q(7.0));
     config
 }
 
@@ -69,10 +68,10 @@ fn hold_strong(continuous_mnm: f64) -> (Vec<f64>, bool) {
     const FULL_SCALE_MNM: f64 = 60.0;
     let mut config = stiff_wall();
     config.device.full_scale_torque = MillinewtonMetres(q(FULL_SCALE_MNM));
-    config.limits.torque = MillinewtonMetres(q(FULL_SCALE_MNM));
-    config.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
-    config.limits.winding_time_s = 2;
-    if let Some(wall) = &mut config.layers[0].wall {
+    config.device.limits.torque = MillinewtonMetres(q(FULL_SCALE_MNM));
+    config.device.limits.continuous_torque = MillinewtonMetres(q(continuous_mnm));
+    config.device.limits.winding_time_s = 2;
+    if let Some(wall) = &mut config.patient.layers[0].wall {
         wall.puncture_travel = Millimetres(q(0.75));
     }
     // 0.7 mm into 6 N/mm: 4.3 N, 43 mN·m.
@@ -81,7 +80,7 @@ fn hold_strong(continuous_mnm: f64) -> (Vec<f64>, bool) {
     let mut board = board(plant::by_hand(hand));
     let mut pc = Pc::new();
     pc.connect(&mut board);
-    pc.must(&mut board, Command::Configure(config));
+    pc.configure(&mut board, &config);
     pc.must(&mut board, Command::Start);
     board.at_stop(|stopped| stopped.log().written.clear());
     pc.run_ms(&mut board, 9_000);
@@ -166,7 +165,7 @@ fn ringing(config: Config) -> (f64, Option<u64>) {
     let mut board: Board = board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);
-    pc.must(&mut board, Command::Configure(config));
+    pc.configure(&mut board, &config);
     pc.must(&mut board, Command::Start);
     let now = board.now();
     let leans_from = now.next_multiple_of(Needle::STEP);
@@ -186,7 +185,9 @@ fn ringing(config: Config) -> (f64, Option<u64>) {
 #[test]
 fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
     let (quiet, told) = ringing(stiff_wall());
-    let (loud, never) = ringing(Config { passivity_damping: Damping::default(), ..stiff_wall() });
+    let mut unobserved = stiff_wall();
+    unobserved.device.passivity_damping = Damping::default();
+    let (loud, never) = ringing(unobserved);
     println!("| ringing wall | {loud:.1} µm, with the observer {quiet:.1} µm |");
     assert!(loud > 50.0, "it should ring without the observer: {loud} µm");
     assert!(quiet < 8.0, "it should be quiet with the observer: {quiet} µm, one count is 15.7 µm");

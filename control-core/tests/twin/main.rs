@@ -4,15 +4,15 @@
 mod model;
 
 use control_core::config::{
-    Config, DacWidth, Device, FrictionLaw, Layer, MAX_LAYERS, Parabola, SafetyConfig, SpeedMethod, Tissue,
-    Wall,
+    Config, DacWidth, Device, FrictionLaw, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SafetyConfig,
+    SpeedMethod, Tissue, Wall,
 };
 use control_core::event::{Fault, State};
 use control_core::units::{
     Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
     Newtons, Stiffness,
 };
-use control_core::{Controller, Order, Plan, TickInput};
+use control_core::{Controller, Order, Patient, Plan, TickInput};
 use fixed::types::{I8F24, I16F16};
 use proptest::prelude::*;
 
@@ -21,12 +21,17 @@ fn q(value: f64) -> I16F16 {
 }
 
 fn device() -> impl Strategy<Value = Device> {
-    (4.0..25.0_f64, 256..=65_535_u16, 10.0..500.0_f64, any::<bool>()).prop_map(
-        |(radius, counts, torque, narrow)| Device {
+    let signs = (any::<bool>(), any::<bool>(), -7..=7_i16);
+    (4.0..25.0_f64, 256..=65_535_u16, 10.0..500.0_f64, any::<bool>(), signs).prop_map(
+        |(radius, counts, torque, narrow, (encoder_reversed, motor_reversed, dac_zero))| Device {
+            encoder_reversed,
+            motor_reversed,
+            dac_zero,
             roller_radius: Millimetres(q(radius)),
             counts_per_turn: counts,
             full_scale_torque: MillinewtonMetres(q(torque)),
             dac: if narrow { DacWidth::Bits8 } else { DacWidth::Bits12 },
+            ..Device::default()
         },
     )
 }
@@ -95,6 +100,7 @@ fn wall(stiffest: f64, strongest: f64) -> impl Strategy<Value = Option<Wall>> {
             puncture_travel: Millimetres(q(puncture)),
             relief: parabola(puncture + beyond, relief_compliance, base),
             unload: Stiffness(q((unload * stiffest).max(0.05))),
+            spring_back: SPRING_BACK,
         }
     });
     prop::option::weighted(0.7, wall)
@@ -108,7 +114,7 @@ fn layers(stiffest: f64, strongest: f64, travel: f64) -> impl Strategy<Value = V
             top += gap;
             let layer = Layer {
                 tissue: Tissue::Other,
-                top: Millimetres(q(top)),
+                depth: Millimetres(q(top)),
                 wall,
                 friction: FrictionPerMillimetre(q(friction * strongest / travel)),
             };
@@ -130,17 +136,23 @@ fn valid_config() -> impl Strategy<Value = (Config, Plan)> {
             let laws =
                 (friction(stiffest, strongest), layers(stiffest, strongest, travel), speed, 0..=8_389_i32);
             laws.prop_map(move |(friction, layers, speed, damping)| Config {
-                device,
-                limits,
-                speed,
-                damping: Damping(I8F24::from_bits(damping)),
-                // The observer decides by the sign of an energy; `passivity.rs` tests it by itself.
-                passivity_damping: Damping::default(),
-                friction,
-                layers: layers.into_iter().collect(),
+                device: Device {
+                    limits,
+                    speed,
+                    damping: Damping(I8F24::from_bits(damping)),
+                    // The observer decides by the sign of an energy; `passivity.rs` tests it by itself.
+                    passivity_damping: Damping::default(),
+                    ..device
+                },
+                patient: Patient {
+                    largest_force: None,
+                    friction,
+                    layers: layers.into_iter().collect(),
+                    vessel: None,
+                },
             })
         });
-    config.prop_filter_map("refused", |config| Plan::new(&config).ok().map(|plan| (config, plan)))
+    config.prop_filter_map("refused", |config| config.plan().ok().map(|plan| (config, plan)))
 }
 
 /// Legs of a walk: counts a tick (as a share of the largest) and ticks.
@@ -174,20 +186,29 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, max_global_rejects: 2_000_000, max_shrink_iters: 2_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn fixed_point_stays_within_one_step_of_its_twin((config, plan) in valid_config(), legs in legs()) {
+    fn fixed_point_stays_within_one_step_of_its_twin(
+        (config, plan) in valid_config(),
+        legs in legs(),
+        tilts in prop::collection::vec(60..1_700_i16, 1..4),
+    ) {
         let mm_per_count = plan.mm_per_count().to_num::<f64>();
-        let furthest = (config.limits.travel.0.to_num::<f64>() / mm_per_count) as i32 - 1;
+        let furthest = (config.device.limits.travel.0.to_num::<f64>() / mm_per_count) as i32 - 1;
         // A sixth is too fast.
-        let largest = f64::from(config.limits.max_counts_per_tick) / 6.5;
+        let largest = f64::from(config.device.limits.max_counts_per_tick) / 6.5;
         let mut twin = model::Twin::new(&config, mm_per_count);
         let mut controller = Controller::new(plan);
         controller.order(Order::Start);
-        let zero = f64::from(config.device.dac.mid_scale());
+        let zero = f64::from(config.device.dac.mid_scale() as i16 + config.device.dac_zero);
+        let sign = |reversed: bool| if reversed { -1 } else { 1 };
+        let (counts_sign, codes_sign) =
+            (sign(config.device.encoder_reversed), sign(config.device.motor_reversed));
         for (tick, count) in walk(&legs, largest, furthest).into_iter().enumerate() {
+            // The needle turns now and then.
+            let tilt = Milliradians(tilts[tick / 2_000 % tilts.len()]);
             controller.order(Order::Heartbeat);
-            let output = controller.tick(TickInput { count: Counts(count), ..TickInput::default() });
+            let output = controller.tick(TickInput { count: Counts(count * counts_sign), tilt });
             prop_assert_eq!(output.tripped, None);
-            let (got, wanted) = (f64::from(output.dac.0) - zero, twin.tick(count));
+            let (got, wanted) = ((f64::from(output.dac.0) - zero) * f64::from(codes_sign), twin.tick(count, output.angle, output.transitions));
             let allowed = 1.0 + twin.steps_of_heat();
             prop_assert!((got - wanted).abs() <= allowed, "tick {tick}, count {count}: {got} for {wanted}");
         }
@@ -199,7 +220,7 @@ proptest! {
         steps in prop::collection::vec((any::<i32>(), 0_u32..32, 0_u8..12, any::<i16>()), 1..600),
     ) {
         let mut controller = Controller::new(plan.clone());
-        let limit = plan.config().device.dac.span();
+        let limit = plan.device().dac.span();
         for (count, shift, order, tilt) in steps {
             match order {
                 0 => controller.order(Order::Stop),
@@ -223,8 +244,8 @@ proptest! {
         let mut config = Config::default();
         config.device.roller_radius = Millimetres(q(radius));
         config.device.counts_per_turn = counts;
-        config.limits.stiffness = Stiffness(q(7.0));
-        if let Ok(plan) = Plan::new(&config) {
+        config.device.limits.stiffness = Stiffness(q(7.0));
+        if let Ok(plan) = config.plan() {
             let exact = 2.0 * std::f64::consts::PI * q(radius).to_num::<f64>() / f64::from(counts);
             prop_assert!((plan.mm_per_count().to_num::<f64>() - exact).abs() < 2e-9);
         }

@@ -1,7 +1,15 @@
 //! The floating-point twin of the whole tick, written from the equations (seed 001 and the force laws of the design), not
 //! from the fixed-point code. It takes the configuration's own quantised values as exact.
 
-use control_core::config::{Config, FrictionLaw, Layer, Parabola, SpeedMethod};
+use control_core::config::{Config, FrictionLaw, Parabola, SpeedMethod};
+use control_core::event::Transitions;
+use control_core::units::Milliradians;
+
+/// What the fixed-point lengths along a slanted needle may be off by, in mm: within it, the twin takes the core's word for
+/// which side of a threshold the tip is.
+const LENGTH_DOUBT_MM: f64 = 3e-4;
+/// The tip has left a layer when it is this far outside, in mm.
+const EXIT_MM: f64 = 13_107.0 / 65_536.0;
 
 /// What the twin remembers from tick to tick.
 pub(crate) struct Twin {
@@ -17,15 +25,21 @@ pub(crate) struct Twin {
     allowed: f64,
     /// What of the heat the places make that forces lose: half of the last one of each wall, of friction and of damping.
     heat_doubt: f64,
+    /// The tip was past the next layer in the last tick, and that was not to be touched yet.
+    carrying: bool,
     ticks: u32,
     counts: Vec<i32>,
     edges: Vec<(usize, i32)>,
     last_edge: (usize, i32),
 }
 
+/// What the needle has done to one layer; the next one is met only once its wall has given way.
 #[derive(Clone, Copy, Default)]
 struct LayerState {
+    touched: bool,
     open: bool,
+    /// How much later than at its top the wall was met, because it was carried along.
+    carried: f64,
     frontier: f64,
 }
 
@@ -36,7 +50,7 @@ fn force(p: &Parabola, travel: f64) -> f64 {
 
 impl Twin {
     pub(crate) fn new(config: &Config, mm_per_count: f64) -> Self {
-        let layers = vec![LayerState::default(); config.layers.len()];
+        let layers = vec![LayerState::default(); config.patient.layers.len()];
         let config = config.clone();
         Self {
             config,
@@ -48,6 +62,7 @@ impl Twin {
             squared: 0.0,
             allowed: f64::MAX,
             heat_doubt: 0.0,
+            carrying: false,
             ticks: 0,
             counts: Vec::new(),
             edges: vec![(0, 0)],
@@ -55,15 +70,18 @@ impl Twin {
         }
     }
 
-    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call.
-    pub(crate) fn tick(&mut self, count: i32) -> f64 {
+    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call. `angle` and what `told` the
+    /// core has made of the tip's way are checked against the anatomy.
+    pub(crate) fn tick(&mut self, count: i32, angle: Milliradians, told: Transitions) -> f64 {
         let depth = f64::from(count) * self.mm_per_count;
         let speed = self.speed(count);
-        let force = self.walls(count, depth) + self.friction(count, depth);
-        let force = force + speed * self.config.damping.0.to_num::<f64>();
+        let stretch = 1.0 / (f64::from(angle.0) * 1e-3).sin();
+        self.meet(depth, stretch, told);
+        let force = self.walls(depth, stretch) + self.friction(depth, stretch);
+        let force = force + speed * self.config.device.damping.0.to_num::<f64>();
         let device = self.config.device;
-        let limits = self.config.limits;
-        let largest = self.allowed.min(self.config.limits.torque.0.to_num());
+        let limits = self.config.device.limits;
+        let largest = self.allowed.min(self.config.device.limits.torque.0.to_num());
         let wanted = (-force * device.roller_radius.0.to_num::<f64>()).clamp(-largest, largest);
         self.ticks += 1;
         let faded = wanted * (f64::from(self.ticks) / (f64::from(limits.fade_in_ms) * 10.0)).min(1.0);
@@ -83,17 +101,18 @@ impl Twin {
         let lost = 0.5 / 65_536.0 * (self.layers.len() + 2) as f64 * device.roller_radius.0.to_num::<f64>();
         self.heat_doubt += (2.0 * self.given.abs() * lost - self.heat_doubt) / (seconds * 10_000.0);
         let span = f64::from(device.dac.span());
-        (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-span, span)
+        let furthest = span - f64::from(device.dac_zero.abs());
+        (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-furthest, furthest)
     }
 
     /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat limits. The limit falls over a
     /// fifth of the heat, so that where a weak motor hangs on a strong amplifier the last places of long ago show.
     pub(crate) fn steps_of_heat(&self) -> f64 {
-        let (most, largest) = (self.config.limits.torque.0.to_num::<f64>(), self.allowed);
+        let (most, largest) = (self.config.device.limits.torque.0.to_num::<f64>(), self.allowed);
         if largest >= most {
             return 0.0;
         }
-        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>();
+        let continuous = self.config.device.limits.continuous_torque.0.to_num::<f64>();
         let device = self.config.device;
         let steps = f64::from(device.dac.span()) / device.full_scale_torque.0.to_num::<f64>();
         self.heat_doubt * (most - continuous) / (continuous * continuous / 5.0) * steps
@@ -101,55 +120,119 @@ impl Twin {
 
     /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
     fn largest_torque(&self) -> f64 {
-        let most = self.config.limits.torque.0.to_num::<f64>();
-        let continuous = self.config.limits.continuous_torque.0.to_num::<f64>().min(most);
+        let most = self.config.device.limits.torque.0.to_num::<f64>();
+        let continuous = self.config.device.limits.continuous_torque.0.to_num::<f64>().min(most);
         let allowed = continuous * continuous;
         continuous + (most - continuous) * ((allowed - self.heat) / (allowed / 5.0)).clamp(0.0, 1.0)
     }
 
-    fn counts_at(&self, depth: f64) -> i32 {
-        (depth / self.mm_per_count).ceil() as i32
+    /// Where layer `index` begins along the needle.
+    fn top(&self, index: usize, stretch: f64) -> f64 {
+        self.config
+            .patient
+            .layers
+            .get(index)
+            .map_or(f64::INFINITY, |layer| layer.depth.0.to_num::<f64>() * stretch)
     }
 
-    fn walls(&mut self, count: i32, depth: f64) -> f64 {
+    /// Where the tip began to push in the wall of layer `index`.
+    fn origin(&self, index: usize, stretch: f64) -> f64 {
+        self.top(index, stretch) + self.layers[index].carried
+    }
+
+    /// One layer touched or left, and one wall that gives way, a tick at the most.
+    fn meet(&mut self, depth: f64, stretch: f64, told: Transitions) {
+        let is = |margin: f64, told: bool| if margin.abs() < LENGTH_DOUBT_MM { told } else { margin >= 0.0 };
+        let bit = |index: usize| 1_u8 << index;
+        let mut puncture = 0;
+        let next = self
+            .layers
+            .iter()
+            .zip(&self.config.patient.layers)
+            .position(|(s, l)| !s.open && l.wall.is_some());
+        if let Some(next) = next
+            && self.layers[next].touched
+        {
+            let wall = self.config.patient.layers[next].wall.expect("it has one");
+            let travel = depth - self.origin(next, stretch);
+            if is(travel - wall.puncture_travel.0.to_num::<f64>(), told.puncture != 0) {
+                puncture = bit(next);
+                self.layers[next].open = true;
+                self.layers[next].frontier = travel;
+            }
+        }
+        assert_eq!(puncture, told.puncture, "at {depth} mm");
+        let touched = self.layers.iter().filter(|layer| layer.touched).count();
+        let (past_next, is_free, left) = (
+            depth - self.top(touched, stretch),
+            self.layers[..touched]
+                .iter()
+                .zip(&self.config.patient.layers)
+                .all(|(s, l)| s.open || l.wall.is_none()),
+            touched.checked_sub(1).map_or(-1.0, |last| self.top(last, stretch) - EXIT_MM - depth),
+        );
+        let (mut contact, mut exit) = (0, 0);
+        let is_past = is(past_next, told.contact != 0 || self.carrying);
+        let indented = self.indentation(depth, stretch);
+        if is_past && is_free && is(past_next - indented, told.contact != 0) {
+            contact = bit(touched);
+            let walled = self.config.patient.layers[touched].wall.is_some();
+            let carried = if self.carrying && walled { depth - self.top(touched, stretch) } else { 0.0 };
+            self.layers[touched] = LayerState { touched: true, carried, ..LayerState::default() };
+            self.carrying = false;
+        } else if is_past {
+            self.carrying = true;
+        } else {
+            self.carrying = false;
+            if let Some(last) = touched.checked_sub(1)
+                && is(left, told.exit != 0)
+            {
+                exit = bit(last);
+                self.layers[last] = LayerState::default();
+            }
+        }
+        assert_eq!((contact, exit), (told.contact, told.exit), "at {depth} mm");
+    }
+
+    /// What is left of the indentation of the wall that gave way last.
+    fn indentation(&self, depth: f64, stretch: f64) -> f64 {
+        let Some(last) = self.layers.iter().rposition(|layer| layer.open) else { return 0.0 };
+        let wall = self.config.patient.layers[last].wall.expect("it has given way");
+        let (puncture, relieved) =
+            (wall.puncture_travel.0.to_num::<f64>(), wall.relief.vertex.0.to_num::<f64>());
+        let travel = (depth - self.origin(last, stretch)).max(puncture);
+        let share = ((relieved - travel) / (relieved - puncture)).max(0.0);
+        share * wall.spring_back.to_num::<f64>() * puncture
+    }
+
+    fn walls(&mut self, depth: f64, stretch: f64) -> f64 {
         let mut sum = 0.0;
         for index in 0..self.layers.len() {
-            let layer: Layer = self.config.layers[index];
-            let top = layer.top.0.to_num::<f64>();
-            let mut state = self.layers[index];
-            if count < self.counts_at(top - 13_107.0 / 65_536.0) {
-                state = LayerState::default();
+            let travel = depth - self.origin(index, stretch);
+            let state = &mut self.layers[index];
+            let Some(wall) = self.config.patient.layers[index].wall else { continue };
+            if state.open {
+                state.frontier = state.frontier.max(travel);
+                let cut = force(&wall.relief, state.frontier.min(wall.relief.vertex.0.to_num()));
+                let drawn_back = state.frontier - travel;
+                sum += (cut - drawn_back * wall.unload.0.to_num::<f64>()).max(0.0);
+            } else if state.touched && travel >= 0.0 {
+                sum += force(&wall.elastic, travel);
             }
-            if let Some(wall) = layer.wall {
-                let travel = depth - top;
-                let puncture = wall.puncture_travel.0.to_num::<f64>();
-                if !state.open && count >= self.counts_at(top + puncture) {
-                    state = LayerState { open: true, frontier: travel };
-                }
-                if state.open {
-                    state.frontier = state.frontier.max(travel);
-                    let cut = force(&wall.relief, state.frontier.min(wall.relief.vertex.0.to_num()));
-                    let drawn_back = state.frontier - travel;
-                    sum += (cut - drawn_back * wall.unload.0.to_num::<f64>()).max(0.0);
-                } else if count >= self.counts_at(top) {
-                    sum += force(&wall.elastic, travel);
-                }
-            }
-            self.layers[index] = state;
         }
         sum
     }
 
-    fn friction(&mut self, count: i32, depth: f64) -> f64 {
-        let layers = &self.config.layers;
+    fn friction(&mut self, depth: f64, stretch: f64) -> f64 {
+        let layers = &self.config.patient.layers;
         let first_wall = layers.iter().position(|l| l.wall.is_some());
         let open = first_wall.is_none_or(|i| self.layers[i].open);
-        let entry = layers[0].top.0.to_num::<f64>();
-        if !open || count < self.counts_at(entry) {
+        let entry = self.top(0, stretch);
+        if !open || depth < entry {
             self.anchor = depth;
             return 0.0;
         }
-        match self.config.friction {
+        match self.config.patient.friction {
             FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => {
                 let follow = 1.0 - (-0.1 / f64::from(anchor_ms)).exp();
                 self.anchor += (depth - self.anchor) * follow;
@@ -159,9 +242,14 @@ impl Twin {
             }
             FrictionLaw::Cone { stiffness } => {
                 let mut limit = 0.0;
+                // Only of layers that were touched: on what is carried along nothing rubs yet.
                 for (index, layer) in layers.iter().enumerate() {
-                    let end = layers.get(index + 1).map_or(f64::INFINITY, |l| l.top.0.to_num());
-                    let inside = (depth.min(end) - layer.top.0.to_num::<f64>()).max(0.0);
+                    if !self.layers[index].touched {
+                        break;
+                    }
+                    let next = self.layers.get(index + 1).is_some_and(|next| next.touched);
+                    let end = if next { self.top(index + 1, stretch) } else { f64::INFINITY };
+                    let inside = (depth.min(end) - self.top(index, stretch)).max(0.0);
                     limit += inside * layer.friction.0.to_num::<f64>();
                 }
                 let stiffness = stiffness.0.to_num::<f64>();
@@ -173,7 +261,7 @@ impl Twin {
 
     fn speed(&mut self, count: i32) -> f64 {
         self.counts.push(count);
-        let speed = match self.config.speed {
+        let speed = match self.config.device.speed {
             SpeedMethod::Window => self.speed_over_window(count),
             SpeedMethod::EdgeTiming => self.speed_between_edges(count),
         };

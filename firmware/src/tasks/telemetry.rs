@@ -7,7 +7,7 @@ use crate::board::BoardStore;
 use crate::board::usb::resume_interrupt;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
-use control_core::{Config, Order, Plan};
+use control_core::{Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use cortex_m::peripheral::DWT;
 use firmware::store::StoreError;
@@ -31,6 +31,8 @@ struct TorqueIsOn;
 pub(crate) struct Telemetry {
     endpoint: Endpoint,
     store: BoardStore,
+    /// CRC-32 of the device's and of the patient's part that a reset would bring back.
+    saved: (u32, u32),
     ends: TelemetryEnds,
     /// An order that the tick had no room for.
     held: Option<Order>,
@@ -53,6 +55,7 @@ impl Telemetry {
         Self {
             endpoint: Endpoint::new(identity, plan, reset_cause),
             store,
+            saved: (link::codec::hash(plan.device()), link::codec::hash(plan.patient())),
             ends,
             held: None,
             next_tick: 0,
@@ -140,7 +143,7 @@ impl Telemetry {
                         return;
                     }
                     if let Order::Configure(plan) = &large
-                        && self.save(plan.config()).is_err()
+                        && self.save(plan).is_err()
                     {
                         self.held = Some(large);
                         return;
@@ -164,12 +167,13 @@ impl Telemetry {
         }
     }
 
-    /// The configuration outlives a reset. The link takes none while torque is on; a start and a stop may still be on
-    /// their way to the tick, though, and an erasure would stop the processor with the amplifier on: not before it is off.
-    fn save(&mut self, config: &Config) -> Result<(), TorqueIsOn> {
+    /// Each part outlives a reset; one that has not changed costs no flash. The link takes none while torque is on; a start
+    /// and a stop may still be on their way to the tick, though, and an erasure would stop the processor with the amplifier
+    /// on: not before it is off.
+    fn save(&mut self, plan: &Plan) -> Result<(), TorqueIsOn> {
         shared::CONDITIONS.set(Interlock::Saving, true);
         let is_off = !shared::POWERED.load(Relaxed);
-        let saved = if is_off { self.store.save(config) } else { Ok(()) };
+        let saved = if is_off { self.save_parts(plan) } else { Ok(()) };
         shared::CONDITIONS.set(Interlock::Saving, false);
         let failure = match saved {
             Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
@@ -179,6 +183,19 @@ impl Telemetry {
         };
         defmt::warn!("the configuration was not saved: {}", failure as u8);
         self.endpoint.not_saved(self.next_tick, failure);
+        Ok(())
+    }
+
+    fn save_parts(&mut self, plan: &Plan) -> Result<(), StoreError> {
+        let (device, patient) = (link::codec::hash(plan.device()), link::codec::hash(plan.patient()));
+        if device != self.saved.0 {
+            self.store.save_device(plan.device())?;
+            self.saved.0 = device;
+        }
+        if patient != self.saved.1 {
+            self.store.save_patient(plan.patient())?;
+            self.saved.1 = patient;
+        }
         Ok(())
     }
 

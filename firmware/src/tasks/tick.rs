@@ -47,7 +47,7 @@ impl Tick {
             encoder,
             drive,
             controller: Controller::warm(plan.clone(), heat),
-            width: plan.config().device.dac,
+            width: plan.device().dac,
             ends,
             tick: 0,
             has_ticked: false,

@@ -50,7 +50,7 @@ impl<'a> Conductor<'a> {
     /// Nothing is connected yet.
     pub fn new(config: Config, programme: &'a Programme) -> Self {
         Self {
-            driver: Driver::new(config),
+            driver: Driver::new(config.patient),
             programme,
             phase: Phase::Greeting { since: Duration::ZERO },
             now: Duration::ZERO,

@@ -2,7 +2,7 @@
 //! The plant's laws are the ones that the diagnosis names, so a patched rig runs here as it stands.
 
 use control_core::units::{Counts, Milliradians};
-use control_core::{Controller, Plan, TICK_HZ, TickInput};
+use control_core::{Controller, TICK_HZ, TickInput};
 use diagnosis::rig::{Kind, Rig};
 use diagnosis::simulation::{Plant, Surroundings};
 use link::codec::MAX_FRAME;
@@ -32,7 +32,7 @@ impl BareDevice {
                 "{file}: the virtual device is rotary and commanded in DAC steps; give a rig with kind = \"rotary\" and command_unit = \"dac\", such as one that characterise has written"
             )));
         }
-        let plan = Plan::new(&super::configuration()).map_err(Failure::failed)?;
+        let plan = super::configuration().plan().map_err(Failure::failed)?;
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Ok(Self {
             plant: Plant::new(rig),

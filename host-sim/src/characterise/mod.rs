@@ -10,7 +10,7 @@ use crate::device::{Port, Wire};
 use crate::failure::Failure;
 use crate::recording::messages::Hello;
 use conductor::Conductor;
-use control_core::{Config, Plan};
+use control_core::Config;
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use mechanism::BareDevice;
@@ -31,7 +31,7 @@ pub fn configuration() -> Config {
 
 /// The scale of a device that is configured with `config`.
 pub fn scale(config: &Config) -> Result<Hello, Failure> {
-    let plan = Plan::new(config).map_err(Failure::failed)?;
+    let plan = config.plan().map_err(Failure::failed)?;
     let device = Endpoint::new(Identity { serial: [0; 12], firmware: [0, 1, 0] }, &plan, None);
     Ok(Hello::from(&device.hello()))
 }
@@ -133,6 +133,6 @@ pub fn on_port(
 pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
     let refuse =
         |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));
-    let plan = Plan::new(config).map_err(refuse)?;
+    let plan = config.plan().map_err(refuse)?;
     programmes.iter().flat_map(|p| &p.steps).try_for_each(|step| step.excitation.check(&plan).map_err(refuse))
 }

@@ -3,7 +3,8 @@
 use super::progress::Progress;
 use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
-use control_core::TICK_HZ;
+use control_core::{Device, TICK_HZ};
+use host_sim::device::part::DevicePart;
 use host_sim::device::serial::SerialPort;
 use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::driver::Driver;
@@ -41,9 +42,15 @@ pub(crate) struct Run {
     /// The patient: adult, thin-elderly, high-body-mass, firm-skin, or a TOML file like those in host-sim/profiles
     #[arg(long, default_value = "adult", value_name = "NAME|FILE")]
     profile: String,
+    /// How the device is built: a TOML file as commissioning writes it; without it, a real device keeps what it has
+    #[arg(long, value_name = "FILE")]
+    device_config: Option<PathBuf>,
     /// The force model
     #[arg(long, value_enum, default_value_t = Model::Jog)]
     model: Model,
+    /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the patient's
+    #[arg(long, value_name = "DEG")]
+    angle: Option<f64>,
     /// Serve no page; a real device is then powered up at once
     #[arg(long)]
     headless: bool,
@@ -76,7 +83,13 @@ enum Model {
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let seconds = self.check()?;
-        let profile = Profile::find(&self.profile)?;
+        let part = self.device_config.as_deref().map(DevicePart::read).transpose()?;
+        let device = part.as_ref().map_or_else(Device::default, |part| part.device);
+        let profile = Profile::find_for(&self.profile, &device)?;
+        let profile = match self.angle {
+            Some(degrees) => profile.at_angle(degrees)?,
+            None => profile,
+        };
         let procedure = Procedure::find(&self.procedure, &profile)?;
         let is_virtual = self.device == "virtual";
         let mut serial = if is_virtual { None } else { Some(SerialPort::find(&self.device)?) };
@@ -93,6 +106,7 @@ impl Run {
             profile_toml: profile.source.text.clone(),
             profile_origin: profile.source.origin.clone(),
             procedure: shown_procedure,
+            device_toml: part.as_ref().map(|part| part.source.text.clone()),
         };
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
@@ -100,7 +114,9 @@ impl Run {
         stop_on_signals(&stop)?;
 
         let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
-        let station = Station::new(Driver::new(profile.config.clone()), outlets, &stop);
+        let driver = Driver::new(profile.config.patient.clone());
+        let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.device));
+        let station = Station::new(driver, outlets, &stop);
         let station = if is_virtual || self.headless {
             station
         } else {
@@ -138,6 +154,11 @@ impl Run {
             Model::Jog => {}
             Model::Sparte => return not_yet("sparte"),
             Model::Xr => return not_yet("xr"),
+        }
+        if self.angle.is_some() && self.device != "virtual" {
+            return Err(Failure::input(
+                "--angle is for the virtual device: a real needle is turned by a hand",
+            ));
         }
         if self.fast && self.device != "virtual" {
             return Err(Failure::input("--fast is for the virtual device: a real one keeps its own time"));

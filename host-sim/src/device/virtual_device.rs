@@ -7,7 +7,7 @@ use crate::profile::Profile;
 use crate::session::Control;
 use control_core::event::Fault;
 use control_core::units::{Counts, DacCode, Milliradians};
-use control_core::{Config, Controller, Order, Plan, TICK_HZ, TickInput};
+use control_core::{Controller, Order, Patient, Plan, TICK_HZ, TickInput};
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use link::frames::{Stage, StageTime, Timing};
@@ -55,17 +55,16 @@ pub struct VirtualDevice {
 impl VirtualDevice {
     /// Powered down, the needle where `procedure` begins, the device configured as it leaves the bench: with the defaults.
     pub fn new(profile: &Profile, procedure: Procedure) -> Self {
-        let factory = Config { device: profile.config.device, ..Config::default() };
-        // A profile whose roller is too large for the default tissue brings its own.
-        let plan = Plan::new(&factory).unwrap_or_else(|_| profile.plan.clone());
         let device = &profile.config.device;
+        // A device that is too weak for the default patient waits for the one that it is for.
+        let plan = Plan::new(device, &Patient::default()).unwrap_or_else(|_| profile.plan.clone());
         let mechanism = PlantConfig::new(
             device.roller_radius.0.to_num::<f64>() * 1e-3,
             device.counts_per_turn,
             device.full_scale_torque.0.to_num::<f64>() * 1e-3,
         );
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
-        plant.set_tilt(profile.entry_rad);
+        plant.set_tilt(profile.tilt_rad());
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             plant,
@@ -133,7 +132,7 @@ impl VirtualDevice {
         }
         let begin = (self.timed && self.tick.is_multiple_of(TIMED_TICKS)).then(Instant::now);
         let output = self.controller.tick(TickInput {
-            count: Counts(self.plant.count()),
+            count: Counts(self.encoder_count()),
             tilt: Milliradians((self.plant.tilt() * 1e3).round() as i16),
         });
         if let Some(begin) = begin {
@@ -174,7 +173,7 @@ impl VirtualDevice {
     pub fn control(&mut self, control: Control) {
         match control {
             Control::Drag { depth_mm } if depth_mm.is_finite() => {
-                let travel = self.controller.plan().config().limits.travel.0.to_num::<f64>() - 1.0;
+                let travel = self.controller.plan().device().limits.travel.0.to_num::<f64>() - 1.0;
                 self.hand = Hand::Drag { wanted_mm: depth_mm.clamp(-travel, travel) + self.zero_mm };
             }
             Control::Release => self.hand = Hand::Drag { wanted_mm: self.hand_mm },
@@ -202,8 +201,16 @@ impl VirtualDevice {
 
     /// The converter's code as a share of full scale, as the amplifier sees it.
     fn share(&self, code: DacCode) -> f64 {
-        let width = self.controller.plan().config().device.dac;
-        (f64::from(code.0) - f64::from(width.mid_scale())) / f64::from(width.span())
+        let device = self.controller.plan().device();
+        let zero = f64::from(self.controller.plan().zero_torque_code().0);
+        let share = (f64::from(code.0) - zero) / f64::from(device.dac.span());
+        if device.motor_reversed { -share } else { share }
+    }
+
+    /// As the encoder is mounted.
+    fn encoder_count(&self) -> i32 {
+        let count = self.plant.count();
+        if self.controller.plan().device().encoder_reversed { count.wrapping_neg() } else { count }
     }
 
     /// Where the hand wants the tip and how fast, in m and m/s.

@@ -31,6 +31,9 @@ pub struct Setup {
     pub profile_origin: String,
     /// Name of the scripted procedure, where a hand followed one.
     pub procedure: Option<String>,
+    /// The device's part as it was given, which the configuration can be made from again; none where it was the device's own.
+    #[serde(default)]
+    pub device_toml: Option<String>,
 }
 
 /// Who spoke and in which scale.
@@ -42,8 +45,11 @@ pub struct Hello {
     pub identity: String,
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// CRC-32 of the configuration in force.
+    /// CRC-32 of the configuration in force, both parts.
     pub config_hash: u32,
+    /// CRC-32 of its device's part; 0 in a recording from before it was told.
+    #[serde(default)]
+    pub device_hash: u32,
     /// Samples a second.
     pub tick_hz: u32,
     /// Poses a second.
@@ -92,6 +98,12 @@ pub struct Pose {
     pub state: u8,
     /// What held torque back, a bit each.
     pub limits: u8,
+    /// Angle to the skin that the layers were met at; 0 in a recording from before it was told.
+    #[serde(default)]
+    pub angle_mrad: i16,
+    /// Where the tip was as seen from the vessel, by its number.
+    #[serde(default)]
+    pub vessel: u8,
 }
 
 /// Totals of the link since the session began.
@@ -140,6 +152,7 @@ impl From<&frames::Hello> for Hello {
             identity: hello.identity.iter().map(|byte| format!("{byte:02x}")).collect(),
             firmware: hello.firmware,
             config_hash: hello.config_hash,
+            device_hash: hello.device_hash,
             tick_hz: hello.tick_hz,
             pose_hz: hello.pose_hz,
             mm_per_count: hello.mm_per_count.to_num(),
@@ -185,6 +198,7 @@ impl Hello {
             identity,
             firmware: self.firmware,
             config_hash: self.config_hash,
+            device_hash: self.device_hash,
             tick_hz: self.tick_hz,
             pose_hz: self.pose_hz,
             mm_per_count: I2F30::saturating_from_num(self.mm_per_count),
@@ -235,6 +249,8 @@ impl From<&frames::Pose> for Pose {
             tilt_mrad: pose.tilt.0,
             state: pose.state,
             limits: pose.limits.0,
+            angle_mrad: pose.angle.0,
+            vessel: pose.vessel,
         }
     }
 }
@@ -250,6 +266,8 @@ impl Pose {
             tilt: Milliradians(self.tilt_mrad),
             state: self.state,
             limits: Limits(self.limits),
+            angle: Milliradians(self.angle_mrad),
+            vessel: self.vessel,
         }
     }
 }

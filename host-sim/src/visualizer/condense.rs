@@ -1,7 +1,7 @@
 //! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure: no clock, no socket.
 
 use super::messages::{self, Bucket, Device, Range, Timing};
-use crate::session::{Batch, Happening, state_name};
+use crate::session::{Batch, Happening, state_name, vessel_name};
 use control_core::config::DacWidth;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
@@ -111,6 +111,8 @@ impl Condenser {
             motor_n: fine(self.last_motor_n),
             torque_mnm: fine(self.last_torque_mnm),
             tilt_rad: f64::from(pose.tilt.0) / 1000.0,
+            angle_rad: f64::from(pose.angle.0) / 1000.0,
+            vessel: vessel_name(pose.vessel),
             state: state_name(pose.state),
             limits: pose.limits.0,
         }
@@ -127,6 +129,8 @@ impl Condenser {
             EventKind::Started => ("started", None, None, None),
             EventKind::Stopped => ("stopped", None, None, None),
             EventKind::NotSaved { cause } => ("not_saved", None, Some(cause.to_string()), None),
+            EventKind::Flashback { layer } => ("flashback", Some(layer), None, None),
+            EventKind::FarWall { layer } => ("far_wall", Some(layer), None, None),
         };
         messages::Event {
             t_s: self.seconds(event.tick),
@@ -218,6 +222,7 @@ mod tests {
             identity: [0; 12],
             firmware: [1, 2, 3],
             config_hash: 0xabcd,
+            device_hash: 0xef,
             tick_hz: 10_000,
             pose_hz: 1_000,
             mm_per_count: I2F30::from_num(0.0157),
@@ -237,6 +242,8 @@ mod tests {
             tilt: Milliradians(524),
             state: State::Elastic as u8,
             limits: Limits::default(),
+            angle: Milliradians(0),
+            vessel: 0,
         }
     }
 

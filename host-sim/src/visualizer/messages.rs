@@ -74,6 +74,10 @@ pub struct Pose {
     pub torque_mnm: f64,
     /// Inclination below the horizontal in rad.
     pub tilt_rad: f64,
+    /// Angle to the skin that the layers are met at, smoothed, in rad.
+    pub angle_rad: f64,
+    /// Where the tip is as seen from the vessel: `outside`, `touching`, `in_lumen`, `through`, `beside` or `unknown`.
+    pub vessel: &'static str,
     /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault` or `unknown`.
     pub state: &'static str,
     /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity.
@@ -103,7 +107,7 @@ impl Range {
 pub struct Event {
     /// When, in s.
     pub t_s: f64,
-    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped` or `other`.
+    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`, `flashback`, `far_wall` or `other`.
     pub kind: &'static str,
     /// The layer it is about, outermost 0.
     pub layer: Option<u8>,

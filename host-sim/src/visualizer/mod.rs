@@ -25,6 +25,8 @@ pub(crate) fn test_scene() -> crate::session::Scene {
         travel_mm: 60.0,
         largest_force_n: 2.88,
         tilt_rad: 0.5,
+        skin_tilt_rad: 0.0,
+        vessel: None,
         hand: true,
     }
 }

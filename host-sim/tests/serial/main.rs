@@ -177,7 +177,7 @@ fn a_killed_program_leaves_a_device_without_torque() {
     // Who looks next is told why.
     let mut port = host_sim::device::serial::SerialPort::find(text(&path)).expect("it is there");
     let mut wire = port.open().expect("it opens");
-    let mut driver = Driver::new(Profile::find("adult").expect("it is built in").config);
+    let mut driver = Driver::new(Profile::find("adult").expect("it is built in").config.patient);
     let begin = Instant::now();
     driver.connected(Duration::ZERO);
     let (mut fault, mut powered, mut samples) = (None, 0, 0);

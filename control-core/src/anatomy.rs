@@ -1,0 +1,345 @@
+//! Where the layers lie along the needle and what the tip has done to them so far: touched, pushed in, given way, left. It
+//! stands before the laws of force, which all ask here, and knows none of them.
+//!
+//! A layer has its depth perpendicular to the skin and stays there. Along the needle it is met at depth / sin(angle to the
+//! skin), which changes when the needle turns. A wall that has not given way is pushed in and carries what lies under it
+//! along: the next layer is touched only once the wall above it has given way. Then the wall springs back to a stated part
+//! of how far it was pushed in, and that part goes as its relief goes. So the order of events is the order of the anatomy.
+//!
+//! The angle is the measured tilt less what the tilt reads with the needle laid on the skin. It is smoothed over 51 ms and
+//! taken over in steps of a milliradian with three quarters of one as dead band; a layer that was touched is left only
+//! 0.2 mm further out. Noise of a milliradian therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
+
+use crate::config::{MAX_LAYERS, Tissue};
+use crate::event::{Transitions, VesselState};
+use crate::math::{reciprocal, scaled, sine};
+use crate::units::{Millimetres, Milliradians};
+use fixed::types::{I8F24, I16F16};
+use heapless::Vec;
+
+/// The smallest angle to the skin that is told apart: 5°. Below it, layers stay where they are met at 5°.
+pub const SMALLEST_ANGLE: Milliradians = Milliradians(87);
+/// Straight in.
+pub const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
+/// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor does not heal a wall.
+const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
+/// Ticks between two looks at the tilt.
+const LOOK_TICKS: u32 = 16;
+/// Share of the way to the measured tilt at each look, as a shift: with [`LOOK_TICKS`], a time constant of 51 ms.
+const SMOOTHING: u32 = 5;
+/// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
+const DEAD_BAND: u32 = 49_152;
+
+/// One layer that the tip can meet. Outermost first, each deeper than the one before.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layer {
+    /// Its number in the configuration.
+    pub(crate) number: u8,
+    /// Perpendicular to the skin.
+    pub(crate) depth: Millimetres,
+    /// Walls in the layers above.
+    pub(crate) walls_above: usize,
+    /// It begins with a wall that gives way.
+    pub(crate) has_wall: bool,
+}
+
+/// How far a wall is pushed in before it gives way, and how it springs back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wall {
+    /// Which layer begins with it.
+    pub(crate) layer: usize,
+    /// Travel past contact, along the needle.
+    pub(crate) puncture: I16F16,
+    /// Travel past contact at which nothing is left of it.
+    pub(crate) relieved: I16F16,
+    /// What is left of its indentation for each mm before that.
+    pub(crate) indented_per_mm: I16F16,
+}
+
+/// A vessel among the layers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Vessel {
+    /// Layers of its near and of its far wall.
+    Met { near: usize, far: Option<usize> },
+    /// The needle passes beside it from this depth on, perpendicular to the skin.
+    Beside { depth: Millimetres },
+}
+
+/// The anatomy ready for the tick. [`crate::plan`] has checked it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Anatomy {
+    pub(crate) layers: Vec<Layer, MAX_LAYERS>,
+    pub(crate) walls: Vec<Wall, MAX_LAYERS>,
+    pub(crate) vessel: Option<Vessel>,
+    /// What the tilt reads with the needle laid on the skin.
+    pub(crate) skin_tilt: i16,
+}
+
+/// The angle to the skin.
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    taken: Milliradians,
+    /// Milliradians, Q16.
+    smoothed: i32,
+    /// 1/sin of what is taken: length along the needle for each length perpendicular to the skin.
+    path_per_depth: I8F24,
+}
+
+impl Angle {
+    fn new(angle: Milliradians) -> Self {
+        Self { taken: angle, smoothed: i32::from(angle.0) << 16, path_per_depth: reciprocal(sine(angle)) }
+    }
+}
+
+/// Where the tip is among the layers. It comes through layers and walls in their order, so that two numbers say which it has
+/// touched and which have given way; it meets or leaves one layer a tick at the most.
+#[derive(Clone, Debug)]
+pub(crate) struct Insertion {
+    angle: Angle,
+    /// The next look takes the tilt over as it is.
+    is_new: bool,
+    next_look: u32,
+    /// Of each layer, where it begins along the needle.
+    tops: [I16F16; MAX_LAYERS],
+    /// Of each wall, where the tip began to push it in.
+    origins: [I16F16; MAX_LAYERS],
+    /// How much later than at its top that was, because it was carried along.
+    carried: [I16F16; MAX_LAYERS],
+    touched: usize,
+    given: usize,
+    /// The tip is past where the next layer lies at rest, which the wall above has carried along.
+    is_carrying: bool,
+    /// The tip has touched the wall that gives way next.
+    is_pressing: bool,
+    /// Along the needle, where the tip passes beside the vessel.
+    beside: I16F16,
+    vessel: VesselState,
+}
+
+impl Insertion {
+    /// Outside, at the angle of the next tick.
+    pub(crate) fn new(anatomy: &Anatomy) -> Self {
+        let mut insertion = Self {
+            angle: Angle::new(LARGEST_ANGLE),
+            is_new: true,
+            next_look: 1,
+            tops: [I16F16::ZERO; MAX_LAYERS],
+            origins: [I16F16::ZERO; MAX_LAYERS],
+            carried: [I16F16::ZERO; MAX_LAYERS],
+            touched: 0,
+            given: 0,
+            is_carrying: false,
+            is_pressing: false,
+            beside: I16F16::MAX,
+            vessel: VesselState::Outside,
+        };
+        insertion.place(anatomy);
+        insertion
+    }
+
+    /// The angle to the skin that the layers are met at.
+    pub(crate) fn angle(&self) -> Milliradians {
+        self.angle.taken
+    }
+
+    /// Length along the needle for each length perpendicular to the skin.
+    pub(crate) fn path_per_depth(&self) -> I8F24 {
+        self.angle.path_per_depth
+    }
+
+    /// Where the tip is as seen from the vessel.
+    pub(crate) fn vessel(&self) -> VesselState {
+        self.vessel
+    }
+
+    /// Whether the tip is in the layer of the wall that gives way next, and that wall is pushed in.
+    pub(crate) fn presses(&self) -> bool {
+        self.is_pressing
+    }
+
+    /// How many walls have given way.
+    pub(crate) fn given(&self) -> usize {
+        self.given
+    }
+
+    /// Where layer `index` begins along the needle; of one that there is not, nowhere.
+    pub(crate) fn top(&self, index: usize) -> I16F16 {
+        self.tops.get(index).copied().unwrap_or(I16F16::MAX)
+    }
+
+    /// How far the tip at `depth` is past where it met wall `index`.
+    pub(crate) fn travel(&self, index: usize, depth: Millimetres) -> I16F16 {
+        depth.0.saturating_sub(self.origins.get(index).copied().unwrap_or(I16F16::MAX))
+    }
+
+    /// The layer that the tip is in. A touched one may be a little deeper than the tip that draws back.
+    pub(crate) fn innermost(&self, depth: Millimetres) -> usize {
+        let last = self.touched.saturating_sub(1);
+        if depth.0 >= self.top(last) { last } else { self.innermost_above(last, depth) }
+    }
+
+    /// Out of the way, for it is seldom wanted.
+    #[inline(never)]
+    fn innermost_above(&self, last: usize, depth: Millimetres) -> usize {
+        let above = self.tops.get(..last).unwrap_or_default();
+        above.iter().rposition(|&top| depth.0 >= top).unwrap_or(0)
+    }
+
+    /// Takes over the tilt of the next tick as it is, without smoothing: what was before does not matter.
+    pub(crate) fn begin(&mut self) {
+        self.is_new = true;
+        self.next_look = 1;
+    }
+
+    /// One tick with the tip at `depth` along the needle.
+    pub(crate) fn tick(&mut self, anatomy: &Anatomy, tilt: Milliradians, depth: Millimetres) -> Transitions {
+        self.next_look -= 1;
+        if self.next_look == 0 {
+            self.next_look = LOOK_TICKS;
+            self.look(anatomy, tilt);
+        }
+        let puncture = self.puncture(anatomy, depth);
+        let mut transitions = Transitions { puncture, ..self.cross_layer(anatomy, depth) };
+        self.is_pressing = anatomy.walls.get(self.given).is_some_and(|wall| wall.layer < self.touched);
+        self.watch_vessel(anatomy, depth, &mut transitions);
+        transitions
+    }
+
+    /// Follows the tilt.
+    fn look(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
+        let measured = i32::from(anatomy.angle(tilt).0) << 16;
+        let smoothed = if core::mem::take(&mut self.is_new) {
+            measured
+        } else {
+            self.angle.smoothed + ((measured - self.angle.smoothed) >> SMOOTHING)
+        };
+        self.angle.smoothed = smoothed;
+        let off = smoothed - (i32::from(self.angle.taken.0) << 16);
+        if off.unsigned_abs() > DEAD_BAND {
+            let taken = Milliradians(((smoothed + (1 << 15)) >> 16) as i16);
+            self.angle = Angle { smoothed, ..Angle::new(taken) };
+            self.place(anatomy);
+        }
+    }
+
+    /// Along the needle, for a depth perpendicular to the skin of up to 2,000 mm.
+    fn along(&self, depth: Millimetres) -> I16F16 {
+        I16F16::from_bits(scaled(depth.0.to_bits(), self.angle.path_per_depth.to_bits(), 24))
+    }
+
+    /// Finds where the layers are met at a new angle.
+    fn place(&mut self, anatomy: &Anatomy) {
+        let mut tops = self.tops;
+        for (top, layer) in tops.iter_mut().zip(&anatomy.layers) {
+            *top = self.along(layer.depth);
+        }
+        self.tops = tops;
+        for ((origin, carried), wall) in self.origins.iter_mut().zip(self.carried).zip(&anatomy.walls) {
+            let top = tops.get(wall.layer).copied().unwrap_or(I16F16::MAX);
+            *origin = top.saturating_add(carried);
+        }
+        if let Some(Vessel::Beside { depth }) = anatomy.vessel {
+            self.beside = self.along(depth);
+        }
+    }
+
+    /// What is left of the last wall's indentation: the next layer lies this much deeper than at rest.
+    fn indentation(&self, anatomy: &Anatomy, depth: Millimetres) -> I16F16 {
+        let Some(last) = self.given.checked_sub(1) else { return I16F16::ZERO };
+        let Some(wall) = anatomy.walls.get(last) else { return I16F16::ZERO };
+        let before = wall.relieved.saturating_sub(self.travel(last, depth).max(wall.puncture));
+        let before = before.max(I16F16::ZERO);
+        // At most what the wall was pushed in.
+        I16F16::from_bits(scaled(before.to_bits(), wall.indented_per_mm.to_bits(), 16))
+    }
+
+    /// The layer that the tip touches or leaves; a wall is whole again once the tip has left its layer.
+    fn cross_layer(&mut self, anatomy: &Anatomy, depth: Millimetres) -> Transitions {
+        if let Some(next) = anatomy.layers.get(self.touched)
+            && depth.0 >= self.top(self.touched)
+        {
+            let is_free = self.given >= next.walls_above;
+            if is_free && depth.0 >= self.top(self.touched).saturating_add(self.indentation(anatomy, depth)) {
+                self.touch(next, depth);
+                return Transitions { contact: 1 << next.number, ..Transitions::default() };
+            }
+            self.is_carrying = true;
+        } else if let Some(last) = self.touched.checked_sub(1)
+            && let Some(layer) = anatomy.layers.get(last)
+            && depth.0 < self.top(last).saturating_sub(EXIT_DISTANCE)
+        {
+            self.touched = last;
+            self.given = self.given.min(layer.walls_above);
+            self.is_carrying = false;
+            return Transitions { exit: 1 << layer.number, ..Transitions::default() };
+        } else {
+            self.is_carrying = false;
+        }
+        Transitions::default()
+    }
+
+    /// A wall that was carried along is pushed in from here; any other from where it lies.
+    fn touch(&mut self, layer: &Layer, depth: Millimetres) {
+        let top = self.top(self.touched);
+        self.touched += 1;
+        if layer.has_wall
+            && let Some(origin) = self.origins.get_mut(layer.walls_above)
+            && let Some(carried) = self.carried.get_mut(layer.walls_above)
+        {
+            *carried = if self.is_carrying { depth.0.saturating_sub(top) } else { I16F16::ZERO };
+            *origin = top.saturating_add(*carried);
+        }
+        self.is_carrying = false;
+    }
+
+    /// The wall that gives way, a bit for its layer.
+    fn puncture(&mut self, anatomy: &Anatomy, depth: Millimetres) -> u8 {
+        let Some(wall) = anatomy.walls.get(self.given) else { return 0 };
+        if !self.is_pressing || self.travel(self.given, depth) < wall.puncture {
+            return 0;
+        }
+        self.given += 1;
+        anatomy.layers.get(wall.layer).map_or(0, |layer| 1 << layer.number)
+    }
+
+    fn watch_vessel(&mut self, anatomy: &Anatomy, depth: Millimetres, transitions: &mut Transitions) {
+        let state = match anatomy.vessel {
+            None => return,
+            Some(Vessel::Beside { .. }) if depth.0 >= self.beside => VesselState::Beside,
+            Some(Vessel::Beside { .. }) => VesselState::Outside,
+            Some(Vessel::Met { .. }) if transitions.is_empty() => return,
+            Some(Vessel::Met { near, far }) => {
+                let is_past = |index: usize| self.is_past(anatomy, index);
+                if far.is_some_and(is_past) {
+                    VesselState::Through
+                } else if is_past(near) {
+                    VesselState::InLumen
+                } else if self.touched > near {
+                    VesselState::Touching
+                } else {
+                    VesselState::Outside
+                }
+            }
+        };
+        transitions.flashback = state == VesselState::InLumen && self.vessel != VesselState::InLumen;
+        self.vessel = state;
+    }
+
+    /// Whether the tip is past the wall of layer `index`, or in the layer where it has none.
+    fn is_past(&self, anatomy: &Anatomy, index: usize) -> bool {
+        let layer = anatomy.layers.get(index);
+        layer.is_some_and(|layer| self.touched > index && (!layer.has_wall || self.given > layer.walls_above))
+    }
+}
+
+impl Anatomy {
+    /// The angle to the skin at a measured tilt, within what is told apart.
+    fn angle(&self, tilt: Milliradians) -> Milliradians {
+        Milliradians(tilt.0.saturating_sub(self.skin_tilt).clamp(SMALLEST_ANGLE.0, LARGEST_ANGLE.0))
+    }
+}
+
+/// Whether the tissue is a wall of a vessel.
+pub(crate) fn is_vessel_wall(tissue: Tissue) -> bool {
+    matches!(tissue, Tissue::Vessel | Tissue::FarWall)
+}

@@ -1,0 +1,267 @@
+//! The device's part of a configuration as a person or `commission` writes it (TOML, decimal numbers with their unit in the
+//! key), and as the control law takes it ([`Device`], fixed point). It knows nothing of patients. Every key may be left
+//! out: the built-in device's value stands then.
+
+use crate::failure::Failure;
+use crate::library::{self, Text};
+use crate::profile::fix;
+use control_core::config::{DacWidth, SafetyConfig, SpeedMethod};
+use control_core::units::{Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
+use control_core::{Device, Patient, Plan};
+use fixed::types::I8F24;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A device's part from a file.
+#[derive(Clone, Debug)]
+pub struct DevicePart {
+    /// What it is called.
+    pub name: String,
+    /// As the control law takes it, checked.
+    pub device: Device,
+    /// The text that it came from, for recordings.
+    pub source: Text,
+}
+
+impl DevicePart {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        Self::parse(library::find("device", &path.display().to_string(), &[])?)
+    }
+
+    /// Checks the text of one.
+    pub fn parse(source: Text) -> Result<Self, Failure> {
+        let file: File = library::parse(&source)?;
+        let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
+        if file.format != 1 {
+            return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
+        }
+        let device = file.device().map_err(refuse)?;
+        Plan::new(&device, &Patient::nobody()).map_err(|why| refuse(why.to_string()))?;
+        Ok(Self { name: file.name, device, source })
+    }
+}
+
+/// The text of a device's part, which [`DevicePart::parse`] reads again to the last place.
+pub fn to_toml(name: &str, device: &Device) -> Result<String, Failure> {
+    toml::to_string(&File::new(name, device)).map_err(Failure::failed)
+}
+
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: u32,
+    name: String,
+    #[serde(default)]
+    drive: Drive,
+    #[serde(default)]
+    limits: Limits,
+    #[serde(default)]
+    control: Control,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Drive {
+    roller_radius_mm: Option<f64>,
+    counts_per_turn: Option<u16>,
+    encoder_reversed: Option<bool>,
+    full_scale_torque_mnm: Option<f64>,
+    dac_bits: Option<u8>,
+    dac_zero_codes: Option<i16>,
+    motor_reversed: Option<bool>,
+    skin_tilt_deg: Option<f64>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Limits {
+    torque_mnm: Option<f64>,
+    continuous_torque_mnm: Option<f64>,
+    winding_time_s: Option<u16>,
+    slew_mnm_per_tick: Option<f64>,
+    fade_in_ms: Option<u16>,
+    max_counts_per_tick: Option<u16>,
+    travel_mm: Option<f64>,
+    stiffness_n_per_mm: Option<f64>,
+    heartbeat_ms: Option<u16>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Control {
+    speed: Option<Speed>,
+    damping_n_s_per_mm: Option<f64>,
+    passivity_damping_n_s_per_mm: Option<f64>,
+}
+
+#[derive(Clone, Copy, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Speed {
+    Window,
+    EdgeTiming,
+}
+
+fn damping(key: &str, value: f64) -> Result<Damping, String> {
+    let held = I8F24::checked_from_num(value);
+    held.map(Damping).ok_or_else(|| format!("{key} is {value}; it must be a small number: 0.00002 is usual"))
+}
+
+fn tilt(key: &str, degrees: f64) -> Result<Milliradians, String> {
+    if !(-90.0..=90.0).contains(&degrees) {
+        return Err(format!("{key} is {degrees}; it must lie from -90 to 90"));
+    }
+    Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
+}
+
+impl File {
+    fn device(&self) -> Result<Device, String> {
+        let (mut device, drive, control) = (Device::default(), &self.drive, &self.control);
+        if let Some(radius) = drive.roller_radius_mm {
+            device.roller_radius = Millimetres(fix("roller_radius_mm", radius)?);
+        }
+        if let Some(torque) = drive.full_scale_torque_mnm {
+            device.full_scale_torque = MillinewtonMetres(fix("full_scale_torque_mnm", torque)?);
+        }
+        match drive.dac_bits {
+            Some(8) => device.dac = DacWidth::Bits8,
+            Some(12) => device.dac = DacWidth::Bits12,
+            None => {}
+            Some(other) => return Err(format!("dac_bits is {other}; it must be 8 or 12")),
+        }
+        if let Some(degrees) = drive.skin_tilt_deg {
+            device.skin_tilt = tilt("skin_tilt_deg", degrees)?;
+        }
+        device.counts_per_turn = drive.counts_per_turn.unwrap_or(device.counts_per_turn);
+        device.encoder_reversed = drive.encoder_reversed.unwrap_or(device.encoder_reversed);
+        device.dac_zero = drive.dac_zero_codes.unwrap_or(device.dac_zero);
+        device.motor_reversed = drive.motor_reversed.unwrap_or(device.motor_reversed);
+        self.limits.set(&mut device.limits)?;
+        if let Some(speed) = control.speed {
+            device.speed = match speed {
+                Speed::Window => SpeedMethod::Window,
+                Speed::EdgeTiming => SpeedMethod::EdgeTiming,
+            };
+        }
+        if let Some(value) = control.damping_n_s_per_mm {
+            device.damping = damping("damping_n_s_per_mm", value)?;
+        }
+        if let Some(value) = control.passivity_damping_n_s_per_mm {
+            device.passivity_damping = damping("passivity_damping_n_s_per_mm", value)?;
+        }
+        Ok(device)
+    }
+
+    fn new(name: &str, device: &Device) -> Self {
+        let limits = &device.limits;
+        Self {
+            format: 1,
+            name: name.to_owned(),
+            drive: Drive {
+                roller_radius_mm: Some(device.roller_radius.0.to_num()),
+                counts_per_turn: Some(device.counts_per_turn),
+                encoder_reversed: Some(device.encoder_reversed),
+                full_scale_torque_mnm: Some(device.full_scale_torque.0.to_num()),
+                dac_bits: Some(match device.dac {
+                    DacWidth::Bits8 => 8,
+                    DacWidth::Bits12 => 12,
+                }),
+                dac_zero_codes: Some(device.dac_zero),
+                motor_reversed: Some(device.motor_reversed),
+                skin_tilt_deg: Some((f64::from(device.skin_tilt.0) * 1e-3).to_degrees()),
+            },
+            limits: Limits {
+                torque_mnm: Some(limits.torque.0.to_num()),
+                continuous_torque_mnm: Some(limits.continuous_torque.0.to_num()),
+                winding_time_s: Some(limits.winding_time_s),
+                slew_mnm_per_tick: Some(limits.slew_per_tick.0.to_num()),
+                fade_in_ms: Some(limits.fade_in_ms),
+                max_counts_per_tick: Some(limits.max_counts_per_tick),
+                travel_mm: Some(limits.travel.0.to_num()),
+                stiffness_n_per_mm: Some(limits.stiffness.0.to_num()),
+                heartbeat_ms: Some(limits.heartbeat_ms),
+            },
+            control: Control {
+                speed: Some(match device.speed {
+                    SpeedMethod::Window => Speed::Window,
+                    SpeedMethod::EdgeTiming => Speed::EdgeTiming,
+                }),
+                damping_n_s_per_mm: Some(device.damping.0.to_num()),
+                passivity_damping_n_s_per_mm: Some(device.passivity_damping.0.to_num()),
+            },
+        }
+    }
+}
+
+impl Limits {
+    fn set(&self, limits: &mut SafetyConfig) -> Result<(), String> {
+        if let Some(value) = self.torque_mnm {
+            limits.torque = MillinewtonMetres(fix("torque_mnm", value)?);
+        }
+        if let Some(value) = self.continuous_torque_mnm {
+            limits.continuous_torque = MillinewtonMetres(fix("continuous_torque_mnm", value)?);
+        }
+        if let Some(value) = self.slew_mnm_per_tick {
+            limits.slew_per_tick = MillinewtonMetres(fix("slew_mnm_per_tick", value)?);
+        }
+        if let Some(value) = self.travel_mm {
+            limits.travel = Millimetres(fix("travel_mm", value)?);
+        }
+        if let Some(value) = self.stiffness_n_per_mm {
+            limits.stiffness = Stiffness(fix("stiffness_n_per_mm", value)?);
+        }
+        limits.winding_time_s = self.winding_time_s.unwrap_or(limits.winding_time_s);
+        limits.fade_in_ms = self.fade_in_ms.unwrap_or(limits.fade_in_ms);
+        limits.max_counts_per_tick = self.max_counts_per_tick.unwrap_or(limits.max_counts_per_tick);
+        limits.heartbeat_ms = self.heartbeat_ms.unwrap_or(limits.heartbeat_ms);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<DevicePart, Failure> {
+        DevicePart::parse(Text { origin: "device.toml".into(), text: text.into() })
+    }
+
+    #[test]
+    fn what_is_left_out_is_the_built_in_devices() {
+        let part = parse("format = 1\nname = \"bench 3\"\n[drive]\nmotor_reversed = true\n").expect("sound");
+        assert_eq!(part.device, Device { motor_reversed: true, ..Device::default() });
+        assert_eq!(part.name, "bench 3");
+    }
+
+    #[test]
+    fn what_is_written_is_read_again_to_the_last_place() {
+        let mut device = Device {
+            encoder_reversed: true,
+            dac: DacWidth::Bits8,
+            dac_zero: -3,
+            skin_tilt: Milliradians(-123),
+            speed: SpeedMethod::EdgeTiming,
+            counts_per_turn: 2_048,
+            ..Device::default()
+        };
+        device.limits.winding_time_s = 30;
+        device.limits.torque.0 /= 3;
+        let text = to_toml("mine", &device).expect("it can be written");
+        assert_eq!(parse(&text).expect("sound").device, device);
+    }
+
+    #[test]
+    fn mistakes_and_a_patients_keys_are_refused_by_name() {
+        for (wrong, hint) in [
+            ("format = 1\nname = \"x\"\n[[layer]]\ntissue = \"skin\"", "layer"),
+            ("format = 1\nname = \"x\"\n[drive]\nroller_radius_mm = 90.0", "RollerRadius"),
+            ("format = 1\nname = \"x\"\n[drive]\nroller_radius_mm = nan", "roller_radius_mm"),
+            ("format = 1\nname = \"x\"\n[drive]\ndac_bits = 10", "dac_bits"),
+            ("format = 1\nname = \"x\"\n[drive]\nskin_tilt_deg = 120.0", "skin_tilt_deg"),
+            ("format = 2\nname = \"x\"", "format is 2"),
+        ] {
+            let said = parse(wrong).expect_err(hint).to_string();
+            assert!(said.contains(hint) && said.contains("device.toml") && !said.contains('\n'), "{said}");
+        }
+    }
+}
