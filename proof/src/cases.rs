@@ -73,7 +73,7 @@ impl Amounts {
             strengths: 1,
             pairs: 2,
             triples: 1,
-            nulls: 4,
+            nulls: 8,
             disturbances: 1,
             parameters_only: 2,
             outside: 3,

@@ -130,35 +130,38 @@ impl Record {
         }
     }
 
-    /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own inverse dynamics; `None`
-    /// where there is nothing to improve or the judge cannot run the patched rig.
-    pub(crate) fn gain(&self) -> Option<Gain> {
-        self.share(self.left.as_ref().ok().copied())
+    /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own inverse dynamics and on the
+    /// rows that it judges; `None` where there is nothing to improve or the judge cannot run the patched rig.
+    pub(crate) fn gain(&self) -> Option<f64> {
+        let (floor, _) = self.room()?;
+        // A tool that fails improves nothing.
+        if self.answer.is_err() {
+            return Some(0.0);
+        }
+        let left = self.left.as_ref().ok()?;
+        share(left.refit, left.patched, floor)
     }
 
-    /// The same by the residuals that the report gives.
+    /// The same by the residuals that the report gives, over the whole recording.
     pub(crate) fn reported_gain(&self) -> Option<Gain> {
+        let (floor, room) = self.room()?;
         // A report without residuals improves nothing.
-        self.share(self.reported.or(Some(Left { refit: 0.0, patched: 0.0 })))
+        let Some(left) = self.reported.filter(|_| self.answer.is_ok()) else { return Some(Gain::default()) };
+        let gain = left.refit.powi(2) - left.patched.powi(2);
+        Some(Gain {
+            of_oracle: gain / room,
+            of_own: gain / (left.refit.powi(2) - floor.powi(2)).max(0.5 * room),
+        })
     }
 
-    fn share(&self, left: Option<Left>) -> Option<Gain> {
+    /// The noise's rms and what an oracle gains in mean square, where there is something to gain.
+    fn room(&self) -> Option<(f64, f64)> {
         if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
             return None;
         }
         let oracle = self.key.oracle.as_ref()?;
-        let (floor, refit) = (oracle.floor.powi(2), oracle.refit.powi(2));
-        let room = refit - floor;
-        if room < EXPLAINABLE * floor || room <= 0.0 {
-            return None;
-        }
-        // A tool that fails improves nothing.
-        if self.answer.is_err() {
-            return Some(Gain::default());
-        }
-        let left = left?;
-        let gain = left.refit.powi(2) - left.patched.powi(2);
-        Some(Gain { of_oracle: gain / room, of_own: gain / (left.refit.powi(2) - floor).max(0.5 * room) })
+        let room = oracle.refit.powi(2) - oracle.floor.powi(2);
+        (room >= EXPLAINABLE * oracle.floor.powi(2) && room > 0.0).then_some((oracle.floor, room))
     }
 
     /// Whether each 95 % interval of a parameter with a known truth holds it. Where the unit has force in it the truth is
@@ -183,7 +186,15 @@ impl Record {
     }
 }
 
-/// A held-out improvement.
+/// Share of what an oracle, which leaves `floor`, takes off the mean square of what `refit` leaves; `None` of nothing. Two
+/// at most either way: beyond, it is a ratio of two small numbers.
+pub(crate) fn share(refit: f64, left: f64, floor: f64) -> Option<f64> {
+    let room = refit.powi(2) - floor.powi(2);
+    let gain = refit.powi(2) - left.powi(2);
+    (gain.is_finite() && room >= EXPLAINABLE * floor.powi(2)).then(|| (gain / room).clamp(-2.0, 2.0))
+}
+
+/// A held-out improvement by the report.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Gain {
     /// Over what the oracle gains, whatever noise the tool's own estimator adds.
@@ -302,19 +313,22 @@ pub(crate) mod tests {
     fn a_gain_is_measured_against_the_oracles() {
         let mut r = record(key(Category::Single, &[S], 3.0), says(&[(S, 0.9)]));
         // From 2² to 1², which is what the oracle leaves.
-        assert_eq!(r.gain(), Some(Gain { of_oracle: 1.0, of_own: 1.0 }));
-        // The tool's own noise counts against it in one of the two figures.
-        r.left = Ok(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
-        let gain = r.gain().unwrap();
-        assert!((gain.of_oracle - 1.0).abs() < 1e-9 && (gain.of_own - 1.0 / 3.0).abs() < 1e-9, "{gain:?}");
+        assert_eq!(r.gain(), Some(1.0));
         assert_eq!(r.reported_gain(), Some(Gain::default()), "it reports no residuals");
-        let judged = std::mem::replace(&mut r.left, Err("a law that the judge does not know".into()));
+        r.left = Ok(Left { refit: 2.0, patched: 2.5_f64.sqrt() });
+        assert_eq!(r.gain(), Some(0.5));
+        // The tool's own noise counts against it in one of the two figures of its report.
+        r.reported = Some(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
+        let gain = r.reported_gain().unwrap();
+        assert!((gain.of_oracle - 1.0).abs() < 1e-9 && (gain.of_own - 1.0 / 3.0).abs() < 1e-9, "{gain:?}");
+        r.left = Ok(Left { refit: 1.05, patched: 1.0 });
+        assert_eq!(r.gain(), None, "nothing to get on the rows that are judged");
+        r.left = Err("a law that the judge does not know".into());
         assert_eq!(r.gain(), None);
-        r.left = judged;
         r.answer = Err("broken".into());
-        assert_eq!(r.gain(), Some(Gain::default()), "a tool that fails improves nothing");
+        assert_eq!(r.gain(), Some(0.0), "a tool that fails improves nothing");
         r.key.oracle.as_mut().unwrap().refit = 1.05;
-        assert_eq!(r.gain(), None, "nothing to get");
+        assert_eq!((r.gain(), r.reported_gain()), (None, None), "nothing to get");
     }
 
     #[test]

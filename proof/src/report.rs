@@ -292,7 +292,7 @@ fn case_json(r: &Record) -> Value {
         "snr": r.key.snr, "rig": r.key.rig, "right": r.right(), "verdict": r.verdict(), "effects": effects,
         "answer": r.answer_text(), "refit": left.map(|l| l.refit), "patched": left.map(|l| l.patched), "unjudged": r.left.as_ref().err(),
         "reported_gain_over_oracle": r.reported_gain().map(|g| g.of_oracle),
-        "gain_over_oracle": gain.map(|g| g.of_oracle), "gain_over_own": gain.map(|g| g.of_own),
+        "gain": gain,
         "seconds": r.seconds, "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
     })
 }

@@ -365,28 +365,32 @@ fn lines(records: &[Record]) -> Vec<Line> {
         let some = of(records, &[Category::CannotTell]).filter(|r| r.key.poverty.as_deref() == Some(word));
         put(key, &format!("… handled right, {word}"), "–", Figure::Rate(rate(some, Record::right)));
     }
-    let gains: Vec<(&Record, crate::judge::Gain)> =
-        records.iter().filter_map(|r| Some((r, r.gain()?))).collect();
+    let gains: Vec<(&Record, f64)> = records.iter().filter_map(|r| Some((r, r.gain()?))).collect();
     put(
         "gain",
         "held-out gain over the oracle's",
         "median ≥ 95 %, tenth percentile ≥ 60 %",
-        Figure::Shares(gains.iter().map(|g| g.1.of_oracle).collect()),
+        Figure::Shares(gains.iter().map(|g| g.1).collect()),
     );
     put(
         "gain_right",
         "… where the name is right",
         "–",
-        Figure::Shares(gains.iter().filter(|g| g.0.classy()).map(|g| g.1.of_oracle).collect()),
+        Figure::Shares(gains.iter().filter(|g| g.0.classy()).map(|g| g.1).collect()),
+    );
+    let reported: Vec<crate::judge::Gain> = records.iter().filter_map(Record::reported_gain).collect();
+    put(
+        "gain_reported",
+        "… as the report's residuals have it, over the key's",
+        "–",
+        Figure::Shares(reported.iter().map(|g| g.of_oracle).collect()),
     );
     put(
-        "gain_of_own",
-        "… of what its own refit leaves above the noise",
+        "gain_reported_of_own",
+        "… as the report's residuals have it, over what its own refit leaves above the noise",
         "–",
-        Figure::Shares(gains.iter().map(|g| g.1.of_own).collect()),
+        Figure::Shares(reported.iter().map(|g| g.of_own).collect()),
     );
-    let reported: Vec<f64> = records.iter().filter_map(|r| Some(r.reported_gain()?.of_oracle)).collect();
-    put("gain_reported", "… as the report's residuals have it", "–", Figure::Shares(reported));
     let unjudged = records.iter().filter(|r| r.answer.is_ok() && r.key.oracle.is_some() && r.left.is_err());
     put("unjudged", "patched rigs that the judge cannot run", "–", Figure::Count(unjudged.count()));
     let mut coverage = Rate::default();

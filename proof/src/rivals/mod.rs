@@ -7,6 +7,7 @@ mod score_test;
 
 use crate::dynamics::Bench;
 use crate::generator::case::Case;
+use crate::judge;
 use crate::key::{Category, Key};
 use crate::rng::Rng;
 use crate::signal::Normal;
@@ -50,12 +51,8 @@ pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Optio
     }
     let (bench, oracle) = (bench.as_ref().ok()?, key.oracle.as_ref()?);
     let left = bench.known_structure(key).ok()?;
-    let room = oracle.refit.powi(2) - oracle.floor.powi(2);
-    if room < EXPLAINABLE_BY_KEY * oracle.floor.powi(2) {
-        return None;
-    }
-    let share = ((bench.refit().powi(2) - left.powi(2)) / room).clamp(-2.0, 2.0);
-    Some(Opinion { rival: 0, names: Vec::new(), share: Some(share) })
+    let share = judge::share(bench.refit(), left, oracle.floor);
+    Some(Opinion { rival: 0, names: Vec::new(), share })
 }
 
 /// Every rival on the case.
@@ -104,8 +101,6 @@ pub(crate) fn judge(case: &Case) -> [Opinion; 5] {
 
 /// Less than this part of the refit's mean square left to an oracle, and there is nothing to gain.
 const EXPLAINABLE: f64 = 0.05;
-/// The same against the noise's mean square, as the judge has it.
-const EXPLAINABLE_BY_KEY: f64 = 0.15;
 
 /// Share of what an oracle, which has the true model and leaves the noise, takes off the held-out mean square.
 fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {
