@@ -133,6 +133,18 @@ impl Record {
     /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own inverse dynamics and on the
     /// rows that it judges; `None` where there is nothing to improve or the judge cannot run the patched rig.
     pub(crate) fn gain(&self) -> Option<f64> {
+        if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
+            return None;
+        }
+        self.taken()
+    }
+
+    /// The same outside the library: what a patched rig takes by a force that has no name.
+    pub(crate) fn unnamed_gain(&self) -> Option<f64> {
+        (self.key.category == Category::Outside).then(|| self.taken())?
+    }
+
+    fn taken(&self) -> Option<f64> {
         let (floor, _) = self.room()?;
         // A tool that fails improves nothing.
         if self.answer.is_err() {
@@ -144,6 +156,9 @@ impl Record {
 
     /// The same by the residuals that the report gives, over the whole recording.
     pub(crate) fn reported_gain(&self) -> Option<Gain> {
+        if self.key.category == Category::Outside {
+            return None;
+        }
         let (floor, room) = self.room()?;
         // A report without residuals improves nothing.
         let Some(left) = self.reported.filter(|_| self.answer.is_ok()) else { return Some(Gain::default()) };
@@ -156,7 +171,8 @@ impl Record {
 
     /// The noise's rms and what an oracle gains in mean square, where there is something to gain.
     fn room(&self) -> Option<(f64, f64)> {
-        if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
+        use Category as C;
+        if !matches!(self.key.category, C::Single | C::Pair | C::Triple | C::Outside) {
             return None;
         }
         let oracle = self.key.oracle.as_ref()?;
@@ -315,8 +331,8 @@ pub(crate) mod tests {
         // From 2² to 1², which is what the oracle leaves.
         assert_eq!(r.gain(), Some(1.0));
         assert_eq!(r.reported_gain(), Some(Gain::default()), "it reports no residuals");
-        r.left = Ok(Left { refit: 2.0, patched: 2.5_f64.sqrt() });
-        assert_eq!(r.gain(), Some(0.5));
+        r.left = Ok(Left { refit: 2.0, patched: 1.5 });
+        assert_eq!(r.gain(), Some(1.75 / 3.0));
         // The tool's own noise counts against it in one of the two figures of its report.
         r.reported = Some(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
         let gain = r.reported_gain().unwrap();

@@ -330,6 +330,13 @@ fn lines(records: &[Record]) -> Vec<Line> {
     );
     put("outside_likely", "… wrong with 0.5 or more", "–", rated(false, &|r| confident(r, LIKELY)));
     put("outside_named", "… names anything", "–", rated(false, &Record::names_physics));
+    let unnamed: Vec<f64> = outside(false).filter_map(Record::unnamed_gain).collect();
+    put(
+        "outside_gain",
+        "… held-out gain of its force without a name, over the oracle's",
+        "–",
+        Figure::Shares(unnamed),
+    );
     put(
         "detector_abstains",
         "kinds that the tool has a detector for: no name, told as such",

@@ -169,7 +169,7 @@ mod tests {
 
     fn entry(name: &str, shape: &[(&str, f64)]) -> Entry {
         let shape = shape.iter().map(|(k, v)| ((*k).to_string(), *v)).collect();
-        Entry { name: name.into(), shape, coefficients: Default::default() }
+        Entry { name: name.into(), shape, coefficients: Default::default(), table: None }
     }
 
     #[test]

@@ -96,7 +96,11 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
         }
         other => return Err(format!("nothing is fitted to {other}")),
     }
-    Ok(Form { entry: Entry { name: name.into(), shape, coefficients: Numbers::new() }, axes, coefficients })
+    Ok(Form {
+        entry: Entry { name: name.into(), shape, coefficients: Numbers::new(), table: None },
+        axes,
+        coefficients,
+    })
 }
 
 /// The rig with the fitted values and effects, and what it leaves of the fit recordings in mean square.

@@ -31,7 +31,12 @@ pub(crate) fn is_along_travel(entry: &Entry) -> bool {
     matches!(
         entry.name.as_str(),
         "position_dependent_friction" | "position_dependent_damping" | "position_spring"
-    )
+    ) || is_over(entry, "travel")
+}
+
+/// Whether it is a table over this variable.
+pub(crate) fn is_over(entry: &Entry, variable: &str) -> bool {
+    entry.table.as_ref().is_some_and(|t| t.over.iter().any(|v| v == variable))
 }
 
 /// The command after the drive's own limit and the effects on it.
@@ -238,8 +243,34 @@ fn law<'a>(rig: &'a Rig, entry: &'a Entry, along: f64) -> Result<Term<'a>, Strin
             let (ratio, mut resonance) = (c("inertia_ratio"), Resonance::new(entry));
             Box::new(move |m, u, i| ratio * resonance.term(gain * u[i], m.step()))
         }
+        "table" => table(rig, entry, along)?,
         other => return Err(format!("the judge cannot run the effect `{other}`")),
     })
+}
+
+/// A force over one or two variables.
+fn table<'a>(rig: &Rig, entry: &'a Entry, along: f64) -> Result<Term<'a>, String> {
+    let table = entry.table.as_ref().ok_or("the effect `table` has no table")?;
+    let turn = entry.shape.get("turn").copied().or(rig.turn).unwrap_or(TAU);
+    let known = ["speed", "travel", "angle", "command", "since_reversal", "time"];
+    if let Some(other) = table.over.iter().find(|v| !known.contains(&v.as_str())) {
+        return Err(format!("the judge cannot run a table over `{other}`"));
+    }
+    let mut turned = 0.0;
+    Ok(Box::new(move |m, u, i| {
+        if i > 0 && m.speed[i] * m.speed[i - 1] < 0.0 {
+            turned = m.time[i];
+        }
+        let value = |variable: &String| match variable.as_str() {
+            "speed" => m.speed[i],
+            "travel" => m.place[i] + along,
+            "angle" => (m.place[i] + along).rem_euclid(turn),
+            "command" => u[i],
+            "since_reversal" => m.time[i] - turned,
+            _ => m.time[i],
+        };
+        table.at(&table.over.iter().map(value).collect::<Vec<_>>())
+    }))
 }
 
 /// A sum of Legendre polynomials along the travel, against `what` of the row.

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use super::known;
-use super::laws::{Forces, effective_command, forces, is_along_travel};
+use super::laws::{Forces, effective_command, forces, is_along_travel, is_over};
 use super::motion::{Motion, widened};
 use super::recording::Recording;
 use super::rig::Rig;
@@ -20,6 +20,8 @@ const LAW_BAND: f64 = 2.0;
 /// Encoder zeros that are tried along the shortest wave, and along the spread of starts to either side.
 const PHASES: f64 = 24.0;
 const PLACES: i32 = 8;
+/// Encoder zeros that are tried round a turn for a table over the angle.
+const ANGLES: i32 = 64;
 /// Relative standard deviations where the rig declares none.
 const EASY: f64 = 0.1;
 const FRICTION: f64 = 0.5;
@@ -265,6 +267,9 @@ pub(super) fn run(nominal: &Rig, patched: &Rig, band: &Band) -> Result<f64, Stri
             let place = span * f64::from(i) / f64::from(PLACES);
             [place, -place]
         }));
+    }
+    if let (true, Some(turn)) = (patched.effects.iter().any(|e| is_over(e, "angle")), nominal.turn) {
+        places.extend((1..ANGLES).map(|i| turn * f64::from(i) / f64::from(ANGLES)));
     }
     let mut best = f64::INFINITY;
     for along in places {

@@ -2,10 +2,57 @@
 
 use std::collections::BTreeMap;
 
-use toml::{Table, Value};
+use toml::Value;
 
 /// Numbers by name.
 pub(crate) type Numbers = BTreeMap<String, f64>;
+
+/// A force over one or two variables: straight between its places, level beyond its ends, the last variable fastest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Table {
+    pub(crate) over: Vec<String>,
+    pub(crate) grid: Vec<Vec<f64>>,
+    pub(crate) force: Vec<f64>,
+}
+
+impl Table {
+    /// The force at one value a variable.
+    pub(crate) fn at(&self, values: &[f64]) -> f64 {
+        // Every corner of the cell by its share of the way there.
+        let (mut first, mut shares) = (vec![(0, 1.0)], Vec::new());
+        for (places, value) in self.grid.iter().zip(values) {
+            let above = places.partition_point(|p| p <= value).clamp(1, places.len() - 1);
+            let (low, high) = (places[above - 1], places[above]);
+            let part = if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 };
+            shares.clear();
+            for (index, share) in &first {
+                let row = index * places.len() + above;
+                shares.extend([(row - 1, share * (1.0 - part)), (row, share * part)]);
+            }
+            std::mem::swap(&mut first, &mut shares);
+        }
+        first.iter().map(|(index, share)| share * self.force[*index]).sum()
+    }
+
+    fn parse(value: &Value) -> Result<Self, String> {
+        let table = value.as_table().ok_or("an effect's `table` is no table")?;
+        let list = |value: &Value| -> Vec<f64> {
+            value.as_array().into_iter().flatten().filter_map(as_number).collect()
+        };
+        let array = |key: &str| table.get(key).and_then(Value::as_array).into_iter().flatten();
+        let read = Self {
+            over: array("over").filter_map(|v| v.as_str().map(String::from)).collect(),
+            grid: array("grid").map(list).collect(),
+            force: table.get("force").map(list).unwrap_or_default(),
+        };
+        let places: usize = read.grid.iter().map(Vec::len).product();
+        let usable = !read.over.is_empty()
+            && read.over.len() == read.grid.len()
+            && read.grid.iter().all(|g| g.len() > 1)
+            && read.force.len() == places;
+        if usable { Ok(read) } else { Err("a table's over, grid and force do not go together".into()) }
+    }
+}
 
 /// An effect of a patched rig.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +60,7 @@ pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) shape: Numbers,
     pub(crate) coefficients: Numbers,
+    pub(crate) table: Option<Table>,
 }
 
 impl Entry {
@@ -54,7 +102,7 @@ impl Rig {
     /// # Errors
     /// What is missing, without the file's name.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        let table: Table = text.parse().map_err(|e: toml::de::Error| e.message().to_string())?;
+        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| e.message().to_string())?;
         let section = |name: &str| table.get(name).and_then(Value::as_table);
         let number = |name: &str, key: &str| section(name).and_then(|t| t.get(key)).and_then(as_number);
         let needed = |name: &str, key: &str| number(name, key).ok_or(format!("[{name}] has no `{key}`"));
@@ -72,6 +120,7 @@ impl Rig {
                 name: t.get("name").and_then(Value::as_str).ok_or("an [[effect]] has no name")?.to_string(),
                 shape: numbers(t.get("shape")),
                 coefficients: numbers(t.get("coefficients")),
+                table: t.get("table").map(Table::parse).transpose()?,
             })
         };
         Ok(Self {
@@ -124,5 +173,29 @@ mod tests {
         assert_eq!((rig.effects[0].shape("speed", 0.0), rig.effects[0].coefficient("peak")), (3.0, 0.2));
         assert_eq!((rig.sigma("coulomb", 0.5), rig.sigma("inertia", 0.1)), (0.3, 0.1));
         assert!(Rig::parse("[model]\n").unwrap_err().contains("inertia"));
+        let table = format!(
+            "{text}[[effect]]\nname = \"table\"\n[effect.table]\nover = [\"speed\"]\ngrid = [[0, 1]]\n"
+        );
+        assert!(Rig::parse(&table).unwrap_err().contains("do not go together"));
+        let rig = Rig::parse(&(table + "force = [1, 3]\n")).unwrap();
+        assert_eq!(rig.effects[1].table.as_ref().unwrap().at(&[0.25]), 1.5);
+    }
+
+    #[test]
+    fn a_table_is_straight_between_its_places_and_level_beyond() {
+        let table = Table {
+            over: vec!["speed".into(), "time".into()],
+            grid: vec![vec![0.0, 1.0], vec![-1.0, 1.0, 3.0]],
+            force: vec![0.0, 2.0, 4.0, 10.0, 12.0, 14.0],
+        };
+        for (at, force) in [([0.0, 0.0], 1.0), ([0.5, 2.0], 8.0), ([7.0, 9.0], 14.0), ([-7.0, -9.0], 0.0)] {
+            assert!((table.at(&at) - force).abs() < 1e-12, "{at:?}: {}", table.at(&at));
+        }
+        let jump = Table {
+            over: vec!["speed".into()],
+            grid: vec![vec![-1.0, 0.0, 0.0, 1.0]],
+            force: vec![-2.0, -2.0, 2.0, 2.0],
+        };
+        assert_eq!([jump.at(&[-0.1]), jump.at(&[0.1])], [-2.0, 2.0]);
     }
 }
