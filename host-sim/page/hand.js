@@ -26,6 +26,7 @@ export class Hand {
     this.pointer = null;
     this.unsent = false;
     this.takenAt = -Infinity;
+    this.skinTilt = 0; // what the tilt reads with the needle laid on the skin, rad
     canvas.addEventListener("pointerdown", (event) => this.take(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.letGo(event));
@@ -43,8 +44,9 @@ export class Hand {
   }
 
   /** Whether there is a simulated hand at all, and a device that has a zero. */
-  allow(movable, isDevice, travel) {
+  allow(movable, isDevice, travel, skinTilt) {
     this.movable = movable;
+    this.skinTilt = skinTilt;
     document.getElementById("turn").hidden = !movable;
     this.zero.hidden = !isDevice;
     this.canvas.dataset.fixed = String(!movable);
@@ -56,7 +58,7 @@ export class Hand {
   /** What the server says of who moves the needle, and where it is. */
   follow(hand, depth, tilt) {
     this.actual = depth;
-    const degrees = ((tilt * 180) / Math.PI).toFixed(0);
+    const degrees = (((tilt - this.skinTilt) * 180) / Math.PI).toFixed(0);
     if (this.angle.value !== degrees && performance.now() - this.turnedAt > NEWS_MS) this.angle.value = degrees;
     const person = this.movable && hand === "person";
     if (person === this.person || this.pointer !== null) return;
@@ -124,7 +126,8 @@ export class Hand {
 
   turn() {
     this.turnedAt = performance.now();
-    this.link.send({ do: "tilt", rad: (Number(this.angle.value) * Math.PI) / 180 });
+    const tilt = (Number(this.angle.value) * Math.PI) / 180 + this.skinTilt;
+    this.link.send({ do: "tilt", rad: Math.max(0, Math.min(Math.PI / 2, tilt)) });
   }
 
   stop() {

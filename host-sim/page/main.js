@@ -6,9 +6,10 @@ import { EventList } from "./events.js";
 import { Hand } from "./hand.js";
 import { Link } from "./link.js";
 import { Panel } from "./panel.js";
+import { PatientEditor } from "./patient.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
 import { Scrub } from "./scrub.js";
-import { FLATTEST, Section } from "./section.js";
+import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
 import { Clock, Trace } from "./trace.js";
 
@@ -25,12 +26,12 @@ const events = new EventList(byId("events"));
 const panel = new Panel();
 const body = new BodyView(palette);
 
-let scene = { layers: [] };
-let tissue = new Tissue([]);
+let scene = { layers: [], vessel: null, skin_tilt_rad: 0 };
+let tissue = new Tissue(scene);
 let linkStatus = null;
 /** What is drawn; the latest of everything. */
 const view = {
-  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, state: "idle",
+  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, vessel: "outside", state: "idle",
   hand: 0, person: false, canDrag: false, seconds: 0,
 };
 /** How often a recording that is played had jumped when this was drawn. */
@@ -41,14 +42,18 @@ const receive = {
     scene = message;
     view.known = false;
     view.tilt = scene.tilt_rad;
+    view.angle = scene.tilt_rad - scene.skin_tilt_rad;
     view.canDrag = scene.hand;
     forget();
-    hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm);
+    hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm, scene.skin_tilt_rad);
     panel.scene(scene);
     body.setScene(scene);
   },
   device(message) {
     panel.device(message);
+  },
+  patient(message) {
+    patient.follow(message);
   },
   frame(message) {
     linkStatus = message.link;
@@ -81,7 +86,7 @@ const receive = {
 
 /** Nothing has happened yet: another scene, or another place in a recording. */
 function forget() {
-  tissue = new Tissue(scene.layers);
+  tissue = new Tissue(scene);
   trace.clear();
   timePlot.clear();
   events.clear();
@@ -101,9 +106,13 @@ const link = new Link((message) => receive[message.type]?.(message));
 const hand = new Hand(byId("section"), section, link);
 body.setHand(hand);
 const scrub = new Scrub(link);
+const patient = new PatientEditor(link);
 
 /** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
-const stats = { fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN };
+const stats = {
+  fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN,
+  drawn: section.drawn, vessel: "outside", flashback: false,
+};
 window.__stats = stats;
 const counting = { since: performance.now(), frames: 0 };
 
@@ -119,7 +128,7 @@ function draw(nowMs) {
   view.person = hand.person;
   const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
-  tissue.move(view.depth, view.force, view.seconds, Math.sin(Math.max(view.tilt, FLATTEST)));
+  tissue.move(view.depth, view.angle, view.force, view.vessel, view.seconds);
   if (!body.open) section.draw(view, tissue);
   body.draw(view);
   timePlot.draw(trace, now);
@@ -169,6 +178,8 @@ function count(nowMs) {
   stats.depthMm = view.depth;
   stats.forceN = view.force;
   stats.motorN = view.motor;
+  stats.vessel = tissue.place;
+  stats.flashback = tissue.flashback;
   if (Number.isNaN(stats.firstFrameMs)) stats.firstFrameMs = performance.now();
 }
 

@@ -92,7 +92,7 @@ export class Panel {
     write(byId("force"), known ? number(view.force, 2) : "–");
     write(byId("speed"), known ? number(view.speed, 1) : "–");
     write(byId("torque"), known ? number(view.torque, 1) : "–");
-    write(byId("tilt"), known ? number((view.tilt * 180) / Math.PI, 0) : "–");
+    write(byId("tilt"), known ? number((view.angle * 180) / Math.PI, 0) : "–");
     write(byId("peak"), known ? number(view.peak, 2) : "–");
     this.lamps.forEach((lamp, i) => {
       const tone = condition === "live" && nowMs - this.lit[i] < LAMP_MS ? "warn" : "off";

@@ -1,5 +1,5 @@
-// What the needle does to the layers in the picture: which are touched, which have given way, how far each is dented.
-// Only a picture: the force comes from the device, and this follows its events and depths.
+// What the needle does to the layers in the picture: which are touched, which have given way, how far each is dented, where the tip
+// is as seen from the vessel. Only a picture: the force comes from the device, and this follows its events and depths.
 
 /** How fast tissue springs back after a puncture. */
 const RECOVERY_S = 0.12;
@@ -9,47 +9,65 @@ const REACH_VESSEL_MM = 1.6;
 /** Friction drags a punctured surface along: mm for each N. */
 const DRAG_MM_PER_N = 0.35;
 const LARGEST_DRAG_MM = 0.7;
-/** Antecubital vein, mean of 461: 10.1177/11297298231186651. */
-export const VESSEL_MM = { wide: 4.46, high: 3.01 };
+/** Less than this is not seen. */
+const SMALLEST_DENT_MM = 0.002;
+/** Layers are met along the needle at depth / sin(angle); flatter than this the device tells no angles apart. */
+const FLATTEST = 0.087;
 
 export class Tissue {
-  constructor(layers) {
-    this.layers = layers.map((layer) => ({ ...layer, touched: false, given: false, dent: 0 }));
+  /** @param {object} scene depths are perpendicular to the skin; `vessel` is null or { axis_mm, height_mm, width_mm, offset_mm } */
+  constructor(scene) {
+    this.layers = scene.layers.map((layer) => ({
+      ...layer, of_vessel: layer.is_vessel || layer.is_far_wall, touched: false, given: false, dent: 0, along: 0,
+    }));
+    const vessel = scene.vessel;
+    this.vessel = vessel && {
+      ...vessel, near_mm: vessel.axis_mm - vessel.height_mm / 2, far_mm: vessel.axis_mm + vessel.height_mm / 2,
+    };
+    /** "outside", "touching", "in_lumen", "through" or "beside". */
+    this.place = "outside";
+    /** Blood in the hub: it stays until the needle has left the skin. */
+    this.flashback = false;
   }
 
   /** Follows an event of the device. */
   happen(event) {
+    if (event.kind === "flashback") this.flashback = true;
     if (event.kind === "started" || event.layer === null) return;
     const layer = this.layers[event.layer];
     if (!layer) return;
     if (event.kind === "contact") layer.touched = true;
     if (event.kind === "puncture" || event.kind === "vessel") layer.touched = layer.given = true;
-    if (event.kind === "exit") layer.touched = layer.given = false;
-  }
-
-  /** Follows the depth; also finds out by itself what happened before this page was opened. */
-  move(depth, force, seconds, steepness) {
-    const relaxed = 1 - Math.exp(-seconds / RECOVERY_S);
-    for (const layer of this.layers) {
-      if (layer.puncture_travel_mm === null) continue;
-      // Depths lie in the body; the tip goes along the needle.
-      const top = layer.depth_mm / steepness;
-      const wall = top + layer.puncture_travel_mm;
-      if (depth > wall + 0.3) layer.given = true;
-      if (depth < top - 0.3) layer.given = false;
-      if (!layer.given && depth > top) {
-        layer.dent = depth - top;
-        continue;
-      }
-      const inside = layer.given && depth > top;
-      const drag = inside ? Math.max(-LARGEST_DRAG_MM, Math.min(LARGEST_DRAG_MM, DRAG_MM_PER_N * force)) : 0;
-      layer.dent += relaxed * (drag - layer.dent);
+    if (event.kind === "exit") {
+      layer.touched = layer.given = false;
+      if (event.layer === 0) this.flashback = false;
     }
   }
 
-  /** Whether the tip is in the vessel. */
-  get inVessel() {
-    return this.layers.some((layer) => layer.is_vessel && layer.given) && !this.layers.some((layer) => layer.is_far_wall && layer.given);
+  /** Follows the depth along the needle at `angle` to the skin, and what the device says of the vessel. */
+  move(depth, angle, force, place, seconds) {
+    this.place = place;
+    if (place === "in_lumen") this.flashback = true;
+    const relaxed = 1 - Math.exp(-seconds / RECOVERY_S);
+    const sine = Math.sin(Math.max(angle, FLATTEST));
+    for (const layer of this.layers) {
+      layer.along = layer.depth_mm / sine;
+      if (layer.puncture_travel_mm === null) continue;
+      const past = depth - layer.along;
+      if (layer.touched && !layer.given && past > 0) {
+        layer.dent = past;
+        continue;
+      }
+      const inside = layer.given && past > 0;
+      const drag = inside ? Math.max(-LARGEST_DRAG_MM, Math.min(LARGEST_DRAG_MM, DRAG_MM_PER_N * force)) : 0;
+      layer.dent += relaxed * (drag - layer.dent);
+      if (drag === 0 && Math.abs(layer.dent) < SMALLEST_DENT_MM) layer.dent = 0;
+    }
+  }
+
+  /** Whether the tip is in the vessel's lumen. */
+  get inLumen() {
+    return this.place === "in_lumen";
   }
 }
 
@@ -62,9 +80,9 @@ export function displace(tissue, axis, x, y, out) {
   out.y = y;
   for (const layer of tissue.layers) {
     if (layer.dent === 0) continue;
-    const reach = layer.is_vessel ? REACH_VESSEL_MM : REACH_SKIN_MM;
-    const dx = (x - (layer.depth_mm * axis.x) / axis.y) / reach;
-    const dy = (y - layer.depth_mm) / reach;
+    const reach = layer.of_vessel ? REACH_VESSEL_MM : REACH_SKIN_MM;
+    const dx = (x - layer.along * axis.x) / reach;
+    const dy = (y - layer.along * axis.y) / reach;
     const share = layer.dent / (1 + dx * dx + dy * dy);
     out.x += share * axis.x;
     out.y += share * axis.y;

@@ -30,6 +30,8 @@ pub enum Request {
     Zero,
     /// Play an excitation, with nobody's hand on the needle.
     Excite(Excitation),
+    /// Another patient; torque goes off for it.
+    Patient(Box<Patient>),
 }
 
 /// The PC's side of a conversation.
@@ -49,6 +51,8 @@ pub struct Driver {
     last_heartbeat: Option<Duration>,
     notice: Option<String>,
     refused: Option<String>,
+    /// What became of the last other patient that was asked for.
+    changed: Option<Result<(), String>>,
     out: Vec<u8>,
 }
 
@@ -77,6 +81,7 @@ impl Driver {
             last_heartbeat: None,
             notice: None,
             refused: None,
+            changed: None,
             out: Vec::new(),
         }
     }
@@ -125,6 +130,7 @@ impl Driver {
             Request::Start => self.waiting.push_back(Command::Start),
             Request::Zero => self.waiting.push_back(Command::Zero),
             Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
+            Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
         }
     }
 
@@ -196,6 +202,11 @@ impl Driver {
         self.refused.as_deref()
     }
 
+    /// Whether the other patient that was asked for has been taken, once it is known; why not, where it was refused.
+    pub fn take_change(&mut self) -> Option<Result<(), String>> {
+        self.changed.take()
+    }
+
     fn greet(&mut self, now: Duration) {
         self.ready = false;
         self.last_samples = now;
@@ -230,6 +241,14 @@ impl Driver {
         }
         let Some(pending) = self.pending.take() else { return };
         match (ack.result, &pending.command) {
+            // One that came later than the first: the first still counts where this is refused.
+            (Ok(()), Command::ConfigurePatient(patient)) if self.ready => {
+                self.patient = patient.clone();
+                self.changed = Some(Ok(()));
+            }
+            (Err(why @ Rejection::Config(_)), Command::ConfigurePatient(_)) if self.ready => {
+                self.changed = Some(Err(format!("the device refused: {why}")));
+            }
             (Ok(()), Command::ConfigurePatient(_)) => self.ready = true,
             (Ok(()), Command::Start) => {
                 self.has_started = true;

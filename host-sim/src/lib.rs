@@ -3,7 +3,9 @@
 //!
 //! It speaks to any device, virtual or not, through the same `link` bytes, and leaves force laws to `control-core`.
 
+pub mod bedside;
 pub mod characterise;
+pub mod debrief;
 pub mod device;
 pub mod driver;
 pub mod failure;
@@ -11,11 +13,14 @@ pub mod force_fit;
 pub mod import;
 pub mod library;
 pub mod pace;
+pub mod patients;
 pub mod plant;
 pub mod procedure;
 pub mod profile;
 pub mod recording;
+pub mod rehearsal;
 pub mod replay;
+pub mod reproduce;
 pub mod score;
 pub mod session;
 pub mod sheet;

@@ -40,6 +40,18 @@ pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Failure> {
     toml::from_str(&source.text).map_err(|cause| {
         let before = cause.span().map_or(0, |span| span.start.min(source.text.len()));
         let line = source.text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count() + 1;
-        Failure::input(format_args!("{}, line {line}: {}; correct the file", source.origin, cause.message()))
+        // Whoever edits a form does not see lines: the key that stands there is named too.
+        let key = source
+            .text
+            .lines()
+            .nth(line - 1)
+            .and_then(|text| text.split_once('='))
+            .map(|(key, _)| key.trim());
+        let key = key.map(|key| format!(" ({key})")).unwrap_or_default();
+        Failure::input(format_args!(
+            "{}, line {line}{key}: {}; correct the file",
+            source.origin,
+            cause.message()
+        ))
     })
 }

@@ -30,6 +30,8 @@ pub struct Profile {
     pub config: Config,
     /// The same, checked.
     pub plan: Plan,
+    /// Layers, by their numbers, that the needle is to spare.
+    pub spared: Vec<u8>,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
@@ -60,7 +62,16 @@ impl Profile {
         check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
         let config = Config { device: *device, patient: file.patient().map_err(refuse)? };
         let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
-        Ok(Self { name: file.name, entry_rad: file.entry_deg.to_radians(), config, plan, source })
+        let spared =
+            (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
+        Ok(Self {
+            spared: spared.collect(),
+            name: file.name,
+            entry_rad: file.entry_deg.to_radians(),
+            config,
+            plan,
+            source,
+        })
     }
 
     /// What a picture needs to know.
@@ -195,6 +206,8 @@ enum Friction {
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
+    /// Whether the needle is to spare it; without it, what seed 002 has trainees avoid: tendon and cartilage.
+    spare: Option<bool>,
     depth_mm: f64,
     wall: Option<Wall>,
     friction_n_per_mm: f64,
@@ -301,6 +314,10 @@ impl Friction {
 }
 
 impl Layer {
+    fn is_spared(&self) -> bool {
+        self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
+    }
+
     fn config(&self) -> Result<config::Layer, String> {
         let wall = self.wall.as_ref().map(|wall| {
             Ok::<_, String>(config::Wall {

@@ -158,6 +158,26 @@ impl Happening {
     }
 }
 
+/// Whom the needle goes into, as a page shows and edits it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PatientStatus {
+    /// Patients that come with the program.
+    pub names: Vec<String>,
+    /// The profile that counts, key by key as in its file.
+    pub profile: serde_json::Value,
+    /// What became of the last wish.
+    pub answer: Option<PatientAnswer>,
+}
+
+/// What became of a wish for another patient.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PatientAnswer {
+    /// Whether the device has taken it, whole.
+    pub taken: bool,
+    /// Why not, in one sentence.
+    pub reason: String,
+}
+
 /// How the link is doing, in totals since the session began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatus {
@@ -206,6 +226,10 @@ pub struct RecordingStatus {
 /// All that arrived since the last drain.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
+    /// What is simulated, where that has changed (a subscriber's first batch says it too).
+    pub scene: Option<Scene>,
+    /// The patient, where anything about it has changed.
+    pub patient: Option<PatientStatus>,
     /// The latest hello, where there was one (a subscriber's first batch repeats it).
     pub hello: Option<Hello>,
     /// Samples with their tick, 10 kHz.
@@ -222,8 +246,17 @@ pub struct Batch {
     pub skipped_samples: u64,
 }
 
+/// Another patient.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PatientWish {
+    /// One that comes with the program.
+    Named(String),
+    /// An edited profile, key by key as in a profile's file.
+    Edited(serde_json::Value),
+}
+
 /// What a person may ask.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Control {
     /// Power up; torque fades in, a latched fault is cleared.
     Start,
@@ -245,6 +278,8 @@ pub enum Control {
         /// In rad.
         rad: f64,
     },
+    /// The needle goes into somebody else from now on; torque is off meanwhile.
+    Patient(PatientWish),
     /// A recording goes on from here, or stays here where it is paused.
     Seek {
         /// Time into the recording, s.
@@ -271,7 +306,7 @@ pub struct Publisher {
 }
 
 struct Hub {
-    scene: Scene,
+    scene: Mutex<Scene>,
     state: Mutex<HubState>,
     controls: mpsc::Sender<Control>,
 }
@@ -285,10 +320,13 @@ struct HubState {
     events: VecDeque<Happening>,
     link: LinkStatus,
     jumps: u64,
+    patient: Option<PatientStatus>,
 }
 
 #[derive(Default)]
 struct Buffer {
+    scene: Option<Scene>,
+    patient: Option<PatientStatus>,
     hello: Option<Hello>,
     samples: VecDeque<(u64, Sample)>,
     poses: VecDeque<Pose>,
@@ -301,7 +339,7 @@ struct Buffer {
 /// A session and the end that feeds it.
 pub fn open(scene: Scene) -> (Session, Publisher) {
     let (sender, receiver) = mpsc::channel();
-    let hub = Arc::new(Hub { scene, state: Mutex::default(), controls: sender });
+    let hub = Arc::new(Hub { scene: Mutex::new(scene), state: Mutex::default(), controls: sender });
     (Session { hub: hub.clone() }, Publisher { hub, controls: receiver })
 }
 
@@ -328,6 +366,8 @@ impl Session {
     pub fn subscribe(&self) -> Subscription {
         let mut state = lock(&self.hub.state);
         let buffer = Arc::new(Mutex::new(Buffer {
+            scene: Some(lock(&self.hub.scene).clone()),
+            patient: state.patient.clone(),
             hello: state.hello.clone(),
             timing: state.timing,
             events: state.events.clone(),
@@ -346,7 +386,7 @@ impl Session {
 
     /// What a picture needs to know before anything moves.
     pub fn scene(&self) -> Scene {
-        self.hub.scene.clone()
+        lock(&self.hub.scene).clone()
     }
 }
 
@@ -362,6 +402,8 @@ impl Subscription {
         // With the samples of the new place, not with the last ones of the old.
         link.replay.iter_mut().for_each(|replay| replay.jumps = taken.jumps);
         Batch {
+            scene: taken.scene,
+            patient: taken.patient,
             hello: taken.hello,
             samples: taken.samples.into(),
             poses: taken.poses.into(),
@@ -436,6 +478,22 @@ impl Publisher {
             buffer.poses = poses.iter().copied().collect();
             buffer.events = happenings.clone();
         });
+    }
+
+    /// Another tissue is simulated from now on: what happened to the old one is no longer shown.
+    pub fn scene(&self, scene: &Scene) {
+        *lock(&self.hub.scene) = scene.clone();
+        lock(&self.hub.state).events.clear();
+        self.each(|buffer| {
+            buffer.scene = Some(scene.clone());
+            buffer.events.clear();
+        });
+    }
+
+    /// Whom the needle goes into, and what became of the last wish.
+    pub fn patient(&self, patient: &PatientStatus) {
+        lock(&self.hub.state).patient = Some(patient.clone());
+        self.each(|buffer| buffer.patient = Some(patient.clone()));
     }
 
     /// Times of the stages.

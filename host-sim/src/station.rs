@@ -1,6 +1,7 @@
 //! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives (pages, the recording, the
 //! totals). In step with a simulated device, or in real time over a wire that may be pulled and come back.
 
+use crate::bedside::Bedside;
 use crate::device::virtual_device::VirtualDevice;
 use crate::device::{Port, Wire};
 use crate::driver::{Driver, Request};
@@ -8,7 +9,7 @@ use crate::failure::Failure;
 use crate::pace::Pace;
 use crate::recording::messages::Hello;
 use crate::recording::write::Recorder;
-use crate::session::{Control, LinkStatus, Publisher, RecordingStatus};
+use crate::session::{Control, LinkStatus, PatientAnswer, PatientWish, Publisher, RecordingStatus};
 use crate::tally::Tally;
 use link::codec::MAX_FRAME;
 use link::frames::DeviceFrame;
@@ -117,6 +118,8 @@ pub struct Station<'a> {
     was_ready: bool,
     /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
     person_starts: bool,
+    /// Where the patient may be changed.
+    bedside: Option<Bedside>,
 }
 
 /// What a run came to.
@@ -132,12 +135,19 @@ pub struct Outcome {
 impl<'a> Station<'a> {
     /// Not connected yet.
     pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
-        Self { driver, outlets, stop, was_ready: false, person_starts: false }
+        Self { driver, outlets, stop, was_ready: false, person_starts: false, bedside: None }
     }
 
     /// The torque stays off until a person asks for it in the page.
     pub fn wait_for_a_person(mut self) -> Self {
         self.person_starts = true;
+        self
+    }
+
+    /// A person may change the patient in the page.
+    pub fn with_bedside(mut self, bedside: Bedside) -> Self {
+        self.outlets.publisher.patient(&bedside.status(None));
+        self.bedside = Some(bedside);
         self
     }
 
@@ -165,6 +175,14 @@ impl<'a> Station<'a> {
                 match device.transmit(&mut bytes) {
                     0 => break,
                     count => self.driver.receive(now, &bytes[..count], |f| self.outlets.frame(f)),
+                }
+            }
+            if let Some(taken) = self.patient_answer() {
+                let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
+                procedure.into_iter().for_each(|procedure| device.follow(procedure));
+                // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
+                if !self.person_starts {
+                    self.driver.request(Request::Start);
                 }
             }
             if device.ticks().is_multiple_of(1_000) {
@@ -215,6 +233,7 @@ impl<'a> Station<'a> {
                 // The hand on a real needle is nobody's to move.
                 self.control(control, |_| {});
             }
+            self.patient_answer();
             self.start_once(now);
             self.outlets.status(&self.driver, now);
             progress(self.outlets.tally.samples);
@@ -271,8 +290,40 @@ impl<'a> Station<'a> {
                 self.driver.request(Request::Stop);
             }
             Control::Zero => self.driver.request(Request::Zero),
+            Control::Patient(wish) => self.wish_patient(&wish),
             other => hand(other),
         }
+    }
+
+    fn wish_patient(&mut self, wish: &PatientWish) {
+        let Some(bedside) = &mut self.bedside else { return };
+        match bedside.ask(wish) {
+            Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
+            Err(why) => {
+                let answer = PatientAnswer { taken: false, reason: why.to_string() };
+                self.outlets.publisher.patient(&bedside.status(Some(answer)));
+            }
+        }
+    }
+
+    /// Tells everybody what the device has said to another patient, where it has: whether it has taken it.
+    fn patient_answer(&mut self) -> Option<bool> {
+        let answer = self.driver.take_change()?;
+        let bedside = self.bedside.as_mut()?;
+        let taken = answer.is_ok() && bedside.taken();
+        if taken {
+            self.outlets.publisher.scene(&bedside.scene());
+            let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(bedside.setup()));
+            if let Err(failure) = written {
+                self.outlets.recorder = None;
+                self.outlets.failure = Some(failure);
+            }
+        } else {
+            bedside.refused();
+        }
+        let answer = PatientAnswer { taken, reason: answer.err().unwrap_or_default() };
+        self.outlets.publisher.patient(&bedside.status(Some(answer)));
+        Some(taken)
     }
 
     fn is_over(&self) -> bool {

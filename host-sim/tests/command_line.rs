@@ -30,7 +30,7 @@ fn a_minute_takes_seconds_and_loses_nothing() {
     assert_eq!(figure(&scored, "punctures"), figure(&stdout, "punctures"));
     assert_eq!(figure(&scored, "vessels"), figure(&scored, "insertions"));
     assert!((figure(&scored, "peak_force_n") - figure(&stdout, "peak_force_n")).abs() < 1e-3);
-    // Twice 13 mm along a needle at 30°, and a tremor on top.
+    // Twice 12.8 mm along the needle, and a tremor on top.
     assert!((25.0..28.0).contains(&figure(&scored, "mean_path_mm")), "{scored}");
     assert!(run_well(&["score", text(&mcap), "--json"]).contains("\"angle_error_deg\""));
 

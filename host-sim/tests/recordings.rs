@@ -49,7 +49,7 @@ fn a_cut_at_any_place_and_any_flipped_byte_is_survived() {
     let whole = std::fs::read(&mcap).expect("it was recorded");
     let samples = |bytes: &[u8]| -> Option<usize> {
         let recording = Recording::parse("a.mcap".into(), bytes).ok()?;
-        let insertions = score(&recording, &recording.profile().ok()?);
+        let insertions = score(&recording, None).ok()?.insertions;
         assert!(insertions.len() < 10);
         Some(stretches(&recording).iter().map(|s| s.samples.len()).sum())
     };
@@ -99,10 +99,8 @@ fn events_belong_to_their_own_session_even_where_ticks_begin_again() {
     assert_eq!(recording.cut, None);
     let lengths: Vec<_> = stretches(&recording).iter().map(|s| (s.first_tick, s.samples.len())).collect();
     assert_eq!(lengths, [(0, 3200), (10_000, 320), (0, 3200), (10_000, 320)]);
-    let punctures: Vec<_> = score(&recording, &recording.profile().expect("it was recorded"))
-        .iter()
-        .map(|one| one.punctures)
-        .collect();
+    let scored = score(&recording, None).expect("its profile was recorded");
+    let punctures: Vec<_> = scored.insertions.iter().map(|one| one.punctures).collect();
     assert_eq!(punctures, [1, 0]);
 
     let dir = folder("sessions");

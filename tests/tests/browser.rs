@@ -58,6 +58,8 @@ fn visit() -> Result<(), Failure> {
     rows.extend(latency(&mut page)?);
     stop(&mut page)?;
     zero_and_turn(&mut page)?;
+    turn_and_go_through(&mut page, &scratch)?;
+    patients(&mut page, &scratch)?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)?;
     come_back(&mut page, &mut program, &places.program)?;
@@ -101,7 +103,7 @@ fn watch(page: &mut Page) -> Result<Vec<Value>, Failure> {
             A_FEW_INSERTIONS,
             &format!(
                 "[...document.querySelectorAll('#events [data-kind=puncture] span')].some(e => \
-                 /^{layer} punctured at \\d\\.\\d\\smm, \\d\\.\\d\\d\\sN$/.test(e.textContent))"
+                 /^{layer} punctured at \\d+\\.\\d\\smm, \\d\\.\\d\\d\\sN$/.test(e.textContent))"
             ),
         )?;
     }
@@ -312,6 +314,85 @@ fn zero_and_turn(page: &mut Page) -> Result<(), Failure> {
     page.wait("the needle turned", SOON, "document.getElementById('tilt').textContent === '33'")?;
     page.click("start")?;
     page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
+}
+
+/// The needle turns and the layers stay where they are; steeper, the same way along the needle goes through the far wall, and is
+/// told as that.
+fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+    let turn = |degrees: u32| {
+        format!(
+            "(() => {{ const angle = document.getElementById('angle'); angle.value = '{degrees}'; \
+             angle.dispatchEvent(new Event('input')); }})()"
+        )
+    };
+    let drawn = |degrees: f64| {
+        format!("__stats.depthMm < -3 && Math.abs(__stats.drawn.angle - {}) < 0.004", degrees.to_radians())
+    };
+    // Layers on the right, below the skin, names and all, and where the lines between them are.
+    let layers = "(() => { const c = document.getElementById('section'), r = c.width / c.clientWidth, d = __stats.drawn; \
+         const x = Math.round((c.clientWidth - 100) * r), y = Math.round((d.entry.y + 8) * r); let hash = 7; \
+         for (const v of c.getContext('2d').getImageData(x, y, c.width - x, c.height - y).data) hash = (hash * 31 + v) | 0; \
+         return JSON.stringify([d.tops, d.entry, d.scale, hash]); })()";
+    page.evaluate(&turn(30))?;
+    page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))?;
+    std::thread::sleep(Duration::from_millis(500));
+    let flat = page.text(layers)?;
+    photograph(page, &scratch.join("turned-30.png"))?;
+    page.evaluate(&turn(60))?;
+    page.wait("the needle outside at 60°", A_FEW_INSERTIONS, &drawn(60.0))?;
+    std::thread::sleep(Duration::from_millis(500));
+    let steep = page.text(layers)?;
+    photograph(page, &scratch.join("turned-60.png"))?;
+    check("layers that stay where they are", flat == steep, (flat, &steep))?;
+    page.wait("blood in the hub", A_FEW_INSERTIONS, "__stats.vessel === 'in_lumen' && __stats.flashback")?;
+    page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
+    photograph(page, &scratch.join("through.png"))?;
+    page.wait(
+        "a through-puncture told as one",
+        SOON,
+        "document.querySelector('#events [data-kind=far_wall]')?.textContent.includes('far wall')",
+    )?;
+    page.evaluate(&turn(30))?;
+    page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))
+}
+
+/// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says why.
+fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+    page.click("patient")?;
+    page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
+    let taken = "document.getElementById('patient-answer').textContent === 'The device has taken it.'";
+    let is =
+        |name: &str| format!("document.getElementById('subtitle').textContent.includes('Profile {name} ')");
+    let choose = |name: &str| {
+        format!(
+            "(() => {{ const choice = document.getElementById('patient-choice'); choice.value = '{name}'; \
+             choice.dispatchEvent(new Event('change')); }})()"
+        )
+    };
+    page.evaluate(&choose("firm-skin"))?;
+    page.wait("firm skin taken", SOON, &format!("{taken} && {}", is("firm-skin")))?;
+    page.wait("the demo in firm skin", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
+    let edit = |value: &str| {
+        format!(
+            "(() => {{ const input = document.querySelector('#patient-fields [data-key=friction_n_per_mm]'); \
+             input.value = '{value}'; input.dispatchEvent(new Event('input')); \
+             document.getElementById('patient-send').click(); }})()"
+        )
+    };
+    page.evaluate(&edit("-5"))?;
+    page.wait(
+        "a refusal with its reason",
+        SOON,
+        "document.getElementById('patient-answer').dataset.tone === 'bad' && \
+         document.getElementById('patient-answer').textContent.includes('friction')",
+    )?;
+    photograph(page, &scratch.join("patient.png"))?;
+    page.evaluate(&edit("0.03"))?;
+    page.wait("an edited patient taken", SOON, taken)?;
+    page.wait("the demo in it", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
+    page.evaluate(&choose("adult"))?;
+    page.wait("the adult again", SOON, &format!("{taken} && {}", is("adult")))?;
+    page.click("patient-close")
 }
 
 /// The program ends and is started again: the page says so, shows old data as old, and is back by itself.

@@ -10,6 +10,7 @@ mod recordings;
 mod run;
 mod simulate;
 mod streams;
+mod training;
 
 use clap::{Parser, Subcommand};
 use host_sim::failure::Failure;
@@ -29,7 +30,10 @@ enum Command {
     Run(run::Run),
     Replay(recordings::Replay),
     Export(recordings::Export),
-    Score(recordings::Score),
+    Score(training::Score),
+    Debrief(training::Debrief),
+    Profiles(training::Profiles),
+    Reproduce(training::Reproduce),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
     Import(import::Import),
@@ -46,6 +50,9 @@ impl Cli {
             Some(Command::Replay(command)) => command.run(),
             Some(Command::Export(command)) => command.run(),
             Some(Command::Score(command)) => command.run(),
+            Some(Command::Debrief(command)) => command.run(),
+            Some(Command::Profiles(command)) => command.run(),
+            Some(Command::Reproduce(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),

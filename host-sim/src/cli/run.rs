@@ -4,6 +4,7 @@ use super::progress::Progress;
 use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
 use control_core::{Device, TICK_HZ};
+use host_sim::bedside::Bedside;
 use host_sim::device::part::DevicePart;
 use host_sim::device::serial::SerialPort;
 use host_sim::device::virtual_device::VirtualDevice;
@@ -96,7 +97,7 @@ impl Run {
 
         let source = if is_virtual { Source::Virtual } else { Source::Serial { path: self.device.clone() } };
         let shown_procedure = is_virtual.then(|| procedure.name.clone());
-        let (session, publisher) = session::open(profile.scene(source, shown_procedure.clone()));
+        let (session, publisher) = session::open(profile.scene(source.clone(), shown_procedure.clone()));
         // The port is taken before the file is made: a page that cannot be served must not cost a recording.
         let _streams = self.streams.serve(&session)?;
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
@@ -108,6 +109,8 @@ impl Run {
             procedure: shown_procedure,
             device_toml: part.as_ref().map(|part| part.source.text.clone()),
         };
+        let hand = is_virtual.then(|| self.procedure.clone());
+        let bedside = Bedside::new(profile.clone(), source, hand, setup.clone());
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
         let stop = Arc::new(AtomicBool::new(false));
@@ -116,7 +119,7 @@ impl Run {
         let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
         let driver = Driver::new(profile.config.patient.clone());
         let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.device));
-        let station = Station::new(driver, outlets, &stop);
+        let station = Station::new(driver, outlets, &stop).with_bedside(bedside);
         let station = if is_virtual || self.headless {
             station
         } else {

@@ -2,7 +2,7 @@
 //! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
 
 use crate::plant::{Plant, PlantConfig};
-use crate::procedure::Procedure;
+use crate::procedure::{Procedure, Target};
 use crate::profile::Profile;
 use crate::session::Control;
 use control_core::event::Fault;
@@ -45,6 +45,8 @@ pub struct VirtualDevice {
     hand_mm: f64,
     /// Where a person set the zero, mm past the plant's zero.
     zero_mm: f64,
+    /// By how much the procedure has turned the needle, rad.
+    turned_rad: f64,
     set_value: f64,
     enable: bool,
     powered_before: bool,
@@ -64,7 +66,7 @@ impl VirtualDevice {
             device.full_scale_torque.0.to_num::<f64>() * 1e-3,
         );
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
-        plant.set_tilt(profile.tilt_rad());
+        plant.set_tilt(procedure.entry_rad.unwrap_or(profile.entry_rad) + profile.skin_tilt_rad());
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             plant,
@@ -74,6 +76,7 @@ impl VirtualDevice {
             hand: Hand::Script { since: 0 },
             hand_mm: procedure.start_mm,
             zero_mm: 0.0,
+            turned_rad: 0.0,
             set_value: 0.0,
             enable: false,
             powered_before: false,
@@ -169,6 +172,14 @@ impl VirtualDevice {
         }
     }
 
+    /// The scripted hand does something else from now on, from its beginning; one that a person has taken it from waits with it.
+    pub fn follow(&mut self, procedure: Procedure) {
+        self.procedure = procedure;
+        if matches!(self.hand, Hand::Script { .. }) {
+            self.restart_script();
+        }
+    }
+
     /// Moves the simulated hand or the device. What concerns the control law goes over the link and not through here.
     pub fn control(&mut self, control: Control) {
         match control {
@@ -218,8 +229,9 @@ impl VirtualDevice {
         let (wanted_mm, speed) = match self.hand {
             Hand::Script { since } => {
                 let into = if self.enable { (self.tick - since) as f64 * TICK_S } else { 0.0 };
-                let (depth, speed) = self.procedure.target(into);
-                (depth + self.zero_mm, speed)
+                let Target { depth_mm, speed_mm_s, turned_rad } = self.procedure.target(into);
+                self.turn(turned_rad);
+                (depth_mm + self.zero_mm, speed_mm_s)
             }
             Hand::Rest => (self.hand_mm, 0.0),
             Hand::Drag { wanted_mm } => (wanted_mm, 0.0),
@@ -237,6 +249,15 @@ impl VirtualDevice {
                 self.hand_mm += step;
                 (self.hand_mm * 1e-3, step / TICK_S * 1e-3)
             }
+        }
+    }
+
+    /// The scripted hand turns the needle by what its procedure says, from wherever a person or the beginning has put it.
+    fn turn(&mut self, turned_rad: f64) {
+        if turned_rad != self.turned_rad {
+            let tilt = self.plant.tilt() + turned_rad - self.turned_rad;
+            self.plant.set_tilt(tilt.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
+            self.turned_rad = turned_rad;
         }
     }
 

@@ -1,7 +1,7 @@
 //! From a recording to what the diagnosis reads: `rig.toml` and a CSV file for every stretch without a gap. The command is
 //! the converter's code less its mid-scale, so that `gain · command` is the motor's torque.
 
-use super::messages::{Hello, Message, Samples};
+use super::messages::{Hello, Message, Samples, Setup};
 use super::read::Recording;
 use crate::failure::Failure;
 use crate::plant::{GRAVITY, PlantConfig};
@@ -24,6 +24,8 @@ pub struct Stretch {
     pub samples: Vec<Sample>,
     /// What happened during these samples.
     pub events: Vec<Event>,
+    /// What had been set up anew before them; none where it was the recording's beginning.
+    pub setup: Option<Setup>,
 }
 
 /// What was written.
@@ -40,6 +42,7 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let (mut all, mut hello): (Vec<Stretch>, Option<Hello>) = (Vec::new(), None);
     // An event is told before the block of samples that it happened in.
     let mut told = Vec::new();
+    let mut setup: Option<&Setup> = None;
     for message in &recording.messages {
         match message {
             Message::Hello(new) => {
@@ -48,9 +51,10 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
                 told.clear();
             }
             Message::Event(event) => told.push(*event),
+            Message::Setup(new) => setup = Some(new),
             Message::Samples(block) => {
                 let Some(hello) = &hello else { continue };
-                extend(&mut all, hello, block, &mut told);
+                extend(&mut all, (hello, setup), block, &mut told);
             }
             _ => {}
         }
@@ -58,15 +62,22 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     all
 }
 
-fn extend(all: &mut Vec<Stretch>, hello: &Hello, block: &Samples, told: &mut Vec<Event>) {
-    let follows =
-        all.last().is_some_and(|last| last.end_tick() == block.first_tick && same_scale(&last.hello, hello));
+fn extend(
+    all: &mut Vec<Stretch>,
+    (hello, setup): (&Hello, Option<&Setup>),
+    block: &Samples,
+    told: &mut Vec<Event>,
+) {
+    let follows = all.last().is_some_and(|last| {
+        last.end_tick() == block.first_tick && same_scale(&last.hello, hello) && last.setup.as_ref() == setup
+    });
     if !follows {
         all.push(Stretch {
             hello: hello.clone(),
             first_tick: block.first_tick,
             samples: Vec::new(),
             events: Vec::new(),
+            setup: setup.cloned(),
         });
     }
     if let Some(last) = all.last_mut() {

@@ -12,9 +12,9 @@ use std::path::Path;
 pub struct Recording {
     /// What errors call it.
     pub file: String,
-    /// What was set up.
+    /// What was set up at the beginning.
     pub setup: Setup,
-    /// Everything else, in the order in which it was written.
+    /// Everything else, later set-ups too, in the order in which it was written.
     pub messages: Vec<Message>,
     /// Why it ends early, where it does.
     pub cut: Option<String>,
@@ -50,7 +50,7 @@ impl Recording {
             };
             let topic = message.channel.topic.as_str();
             match parse(topic, &message.data) {
-                Ok(Some(Message::Setup(first))) => setup = Some(first),
+                Ok(Some(Message::Setup(first))) if setup.is_none() => setup = Some(first),
                 Ok(Some(other)) => messages.push(other),
                 // Somebody else's channel.
                 Ok(None) => {}
@@ -71,10 +71,15 @@ impl Recording {
         Ok(Self { file, setup, messages, cut })
     }
 
-    /// The profile that it was recorded with.
+    /// The profile that it was recorded with at the beginning.
     pub fn profile(&self) -> Result<Profile, Failure> {
-        let origin = format!("{}, {}", self.file, self.setup.profile_origin);
-        Profile::parse(Text { origin, text: self.setup.profile_toml.clone() })
+        self.profile_of(&self.setup)
+    }
+
+    /// The profile of one of its set-ups.
+    pub fn profile_of(&self, setup: &Setup) -> Result<Profile, Failure> {
+        let origin = format!("{}, {}", self.file, setup.profile_origin);
+        Profile::parse(Text { origin, text: setup.profile_toml.clone() })
     }
 }
 

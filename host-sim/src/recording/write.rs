@@ -80,6 +80,11 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(recorder)
     }
 
+    /// Set up anew: what follows is of another patient.
+    pub fn setup(&mut self, setup: &Setup) -> Result<(), Failure> {
+        self.put(0, setup)
+    }
+
     /// Who speaks.
     pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Failure> {
         self.put(1, &Hello::from(hello))

@@ -2,6 +2,7 @@
 //! nothing of needles; what stands on a page is its caller's.
 
 pub mod chart;
+pub mod section;
 
 use std::fmt::Write as _;
 

@@ -4,7 +4,7 @@
 use super::condense::Condenser;
 use super::messages::{FromPage, Hand, ToPage};
 use super::server::Shared;
-use crate::session::Control;
+use crate::session::{Control, PatientWish};
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
@@ -40,20 +40,20 @@ pub(super) async fn run(socket: WebSocket, shared: Shared) {
 async fn stream_to(sink: &mut SplitSink<WebSocket, Message>, shared: &Shared) {
     let mut subscription = shared.session.subscribe();
     let mut condenser = Condenser::default();
-    if !send(sink, &ToPage::Scene(shared.session.scene())).await {
-        return;
-    }
     let mut due = interval(FRAME_PERIOD);
     // A page that was slow gets the newest at once, not all that it missed.
     due.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut last_sent = Instant::now();
     loop {
         due.tick().await;
-        let (device, mut frame) = condenser.take(subscription.drain());
-        if let Some(device) = device
-            && !send(sink, &ToPage::Device(device)).await
-        {
-            return;
+        let mut batch = subscription.drain();
+        let scene = batch.scene.take().map(ToPage::Scene);
+        let patient = batch.patient.take().map(ToPage::Patient);
+        let (device, mut frame) = condenser.take(batch);
+        for news in scene.into_iter().chain(patient).chain(device.map(ToPage::Device)) {
+            if !send(sink, &news).await {
+                return;
+            }
         }
         let news = frame.pose.is_some() || !frame.trace.is_empty() || !frame.events.is_empty();
         if !news && last_sent.elapsed() < QUIET_PERIOD {
@@ -102,6 +102,8 @@ fn carry_out(message: FromPage, shared: &Shared) {
             Control::Script
         }
         FromPage::Tilt { rad } => Control::Tilt { rad },
+        FromPage::Choose { patient } => Control::Patient(PatientWish::Named(patient)),
+        FromPage::Edit { profile } => Control::Patient(PatientWish::Edited(profile)),
         FromPage::Seek { at_s } => Control::Seek { at_s },
     };
     shared.session.control(control);

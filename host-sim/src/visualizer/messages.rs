@@ -1,18 +1,20 @@
 //! Everything that server and page say to each other: JSON texts over the WebSocket at `/live`, one message a text.
 //!
-//! After connecting the page gets one `scene`, a `device` as soon as the device has said who it is, and then a `frame`
+//! After connecting the page gets a `scene`, a `patient` where it may be changed, a `device` as soon as the device has said who it is, and then a `frame`
 //! every 8 ms, every 250 ms while nothing arrives from the device, less often where the page is slow. The page sends a [`FromPage`] when a
 //! person does something. Times are seconds of the device's own clock, lengths are along the needle.
 
-use crate::session::{LinkStatus, Scene};
+use crate::session::{LinkStatus, PatientStatus, Scene};
 use serde::{Deserialize, Serialize};
 
 /// Server to page; `type` names the variant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToPage {
-    /// What is simulated; once, at the beginning. Its fields are those of [`Scene`].
+    /// What is simulated; at the beginning, and again whenever it is another patient. Its fields are those of [`Scene`].
     Scene(Scene),
+    /// The patient, where it may be changed; again with the answer to each wish.
+    Patient(PatientStatus),
     /// Who the device is; again whenever it starts anew.
     Device(Device),
     /// What has happened since the last frame.
@@ -154,7 +156,7 @@ pub struct Timing {
 }
 
 /// Page to server; `do` names the variant, e.g. `{"do":"drag","depth_mm":3.2}`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum FromPage {
     /// Power up.
@@ -176,6 +178,16 @@ pub enum FromPage {
     Tilt {
         /// Inclination below the horizontal in rad, 0 to π/2.
         rad: f64,
+    },
+    /// A patient that comes with the program.
+    Choose {
+        /// Its name.
+        patient: String,
+    },
+    /// The patient as a person has edited it.
+    Edit {
+        /// Key by key as in a profile's file.
+        profile: serde_json::Value,
     },
     /// A recording is to go on from here.
     Seek {

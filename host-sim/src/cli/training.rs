@@ -1,0 +1,198 @@
+//! `host-sim score`, `debrief`, `profiles` and `reproduce`: what a teacher asks for.
+
+use super::recordings::read;
+use clap::Args;
+use host_sim::debrief;
+use host_sim::failure::Failure;
+use host_sim::patients;
+use host_sim::profile::{BUILT_IN, Profile};
+use host_sim::reproduce::{PAPERS, Paper, reproduce};
+use host_sim::score::{Insertion, score};
+use std::path::PathBuf;
+
+/// Print a trainee's figures for every insertion and in all: time, path, force, the vessel, angle, smoothness.
+///
+/// What each figure means stands in docs/training.md.
+#[derive(Args)]
+#[command(after_help = examples!("Example: host-sim score session.mcap --profile adult"))]
+pub(crate) struct Score {
+    /// The recording
+    #[arg(value_name = "FILE.mcap")]
+    file: PathBuf,
+    /// The patient to judge by, instead of the one that was recorded
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Write a page to print: the gesture over the anatomy, force against depth, the figures, the first and the last attempt compared.
+#[derive(Args)]
+#[command(after_help = examples!("Example: host-sim debrief monday.mcap friday.mcap --out debrief"))]
+pub(crate) struct Debrief {
+    /// Recordings, in the order of the attempts
+    #[arg(value_name = "FILE.mcap", required = true)]
+    files: Vec<PathBuf>,
+    /// The patient to judge by, instead of the one that was recorded
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
+    /// Folder to write debrief.html to; made where there is none
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// List the patients, each with a picture of its layers to scale.
+#[derive(Args)]
+#[command(after_help = examples!("Example: host-sim profiles my-patient.toml"))]
+pub(crate) struct Profiles {
+    /// Patients to show, by name or as files; without any, all that come with the program
+    #[arg(value_name = "NAME|FILE")]
+    wanted: Vec<String>,
+}
+
+/// Run the papers' procedures on the virtual device and write a page for each, with every number of its text beside ours.
+#[derive(Args)]
+#[command(after_help = examples!("Example: host-sim reproduce --paper 001 --out papers"))]
+pub(crate) struct Reproduce {
+    /// One paper by its number: 000, 001 or 002; without it, all three
+    #[arg(long, value_name = "N")]
+    paper: Option<String>,
+    /// Folder to write the pages and their recordings to; made where there is none
+    #[arg(long, value_name = "DIR", default_value = "papers")]
+    out: PathBuf,
+}
+
+impl Score {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let recording = read(&self.file)?;
+        let profile = self.profile.as_deref().map(Profile::find).transpose()?;
+        let scored = score(&recording, profile.as_ref())?;
+        if self.json {
+            let text = serde_json::to_string_pretty(&scored).map_err(Failure::failed)?;
+            say!("{text}");
+            return Ok(());
+        }
+        say!(
+            "begin_s  time_s  lumen_s  path_mm  depth_mm  overshoot_mm  peak_force_n  punctures  vessel   passes  angle_deg (error, rms)  smoothness"
+        );
+        for one in &scored.insertions {
+            print_row(one);
+        }
+        print_total(&scored.insertions);
+        Ok(())
+    }
+}
+
+fn print_row(one: &Insertion) {
+    let optional = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
+    let vessel = match (one.through_far_wall, one.vessel) {
+        (true, _) => "through",
+        (false, true) => "yes",
+        (false, false) => "no",
+    };
+    say!(
+        "{:7.2}  {:6.2}  {:7.2}  {:7.2}  {:8.2}  {:>12}  {:12.3}  {:9}  {:>7}  {:>6}  {} ({}, {})  {}",
+        one.begin_s,
+        one.time_s,
+        one.in_lumen_s,
+        one.path_mm,
+        one.depth_mm,
+        optional(one.overshoot_mm),
+        one.peak_force_n,
+        one.punctures,
+        vessel,
+        format!("{}+{}", one.passes, one.redirections),
+        optional(one.angle_deg),
+        optional(one.angle_error_deg),
+        optional(one.angle_rms_error_deg),
+        optional(one.smoothness)
+    );
+}
+
+fn print_total(all: &[Insertion]) {
+    let count = all.len().max(1) as f64;
+    let mean = |value: fn(&Insertion) -> f64| all.iter().map(value).sum::<f64>() / count;
+    say!(
+        "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={} mean_in_lumen_s={:.2} through_far_wall={} redirections={} spared_hits={}",
+        all.len(),
+        mean(|one| one.time_s),
+        mean(|one| one.path_mm),
+        all.iter().map(|one| one.peak_force_n).fold(0.0, f64::max),
+        all.iter().map(|one| one.punctures).sum::<u32>(),
+        all.iter().filter(|one| one.vessel).count(),
+        mean(|one| one.in_lumen_s),
+        all.iter().filter(|one| one.through_far_wall).count(),
+        all.iter().map(|one| one.redirections).sum::<u32>(),
+        all.iter().map(|one| one.spared_hits).sum::<u32>()
+    );
+}
+
+impl Debrief {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let given = self.profile.as_deref().map(Profile::find).transpose()?;
+        let mut attempts = Vec::new();
+        for file in &self.files {
+            attempts.extend(debrief::attempts(&read(file)?, given.as_ref())?);
+        }
+        let Some(html) = debrief::html(&attempts) else {
+            return Err(Failure::input(format_args!(
+                "{}: no insertion in it: the needle never touched the skin; record one first",
+                self.files[0].display()
+            )));
+        };
+        std::fs::create_dir_all(&self.out).map_err(|cause| {
+            Failure::input(format_args!(
+                "{}: the folder cannot be made ({cause}); choose another --out",
+                self.out.display()
+            ))
+        })?;
+        let page = self.out.join("debrief.html");
+        std::fs::write(&page, html).map_err(|cause| {
+            Failure::failed(format_args!(
+                "{}: cannot be written ({cause}); choose another --out",
+                page.display()
+            ))
+        })?;
+        say!("{} insertions={}", page.display(), attempts.len());
+        Ok(())
+    }
+}
+
+impl Profiles {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let wanted: Vec<String> = match self.wanted {
+            none if none.is_empty() => BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            some => some,
+        };
+        let profiles = wanted.iter().map(|name| Profile::find(name)).collect::<Result<Vec<_>, _>>()?;
+        for profile in &profiles {
+            say!("{}", patients::picture(profile));
+        }
+        Ok(())
+    }
+}
+
+impl Reproduce {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let wanted: Vec<Paper> = match &self.paper {
+            None => PAPERS.to_vec(),
+            Some(number) => PAPERS.into_iter().filter(|p| p.number() == number).collect(),
+        };
+        if wanted.is_empty() {
+            return Err(Failure::input(format_args!(
+                "--paper is {}; it must be 000, 001 or 002",
+                self.paper.unwrap_or_default()
+            )));
+        }
+        // One that cannot be run must not cost the others.
+        let mut outcome = Ok(());
+        for paper in wanted {
+            match reproduce(paper, &self.out) {
+                Ok(page) => say!("{}", page.display()),
+                Err(why) => outcome = outcome.and(Err(why)),
+            }
+        }
+        outcome
+    }
+}

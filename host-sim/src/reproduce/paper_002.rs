@@ -1,0 +1,171 @@
+//! Seed 002, the joint injection simulator: the plateaus of both injections and of the withdrawal (its Fig. 5 and 6).
+
+use super::measure::{Trace, is_contact_with, is_exit_from};
+use super::{Row, Whose, numbers, row};
+use crate::debrief::anatomy;
+use crate::failure::Failure;
+use crate::procedure::Procedure;
+use crate::profile::Profile;
+use crate::rehearsal;
+use crate::session::{Source, tissue_name};
+use crate::sheet::chart::{Chart, Curve};
+use crate::sheet::section::{Section, Way};
+use crate::sheet::{Sheet, decimal};
+use control_core::config::Tissue;
+use std::path::Path;
+
+/// Cutting forces that the paper prints, N.
+const CUTTING: [(Tissue, f64); 6] = [
+    (Tissue::Skin, 0.8),
+    (Tissue::Fat, 1.5),
+    (Tissue::Muscle, 2.0),
+    (Tissue::Bursa, 2.5),
+    (Tissue::Tendon, 3.0),
+    (Tissue::Cartilage, 4.0),
+];
+
+/// The two injections, in the paper's order.
+const INJECTIONS: [(&str, &str); 2] = [
+    ("shoulder-redirected", "first injection: redirected"),
+    ("shoulder-straight", "second injection: straight"),
+];
+
+pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
+    let profile = Profile::find("shoulder").map_err(|_| {
+        Failure::failed(
+            "paper 002 cannot be reproduced yet: its cutting forces need the law sparte and the patient shoulder, which this program does not \
+             have; ask for --paper 000 or 001",
+        )
+    })?;
+    let traces = INJECTIONS
+        .iter()
+        .map(|(name, _)| {
+            let procedure = Procedure::find(name, &profile)?;
+            Trace::of(&rehearsal::record(&profile, procedure, &dir.join(format!("paper-002-{name}.mcap")))?)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut sheet = Sheet::new(
+        "Development of haptic simulator for practicing the intraarticular needle injection under echography (seed 002)",
+        "The paper prints one force for each layer and the largest force of its device. Its figures of the two injections have no numbers in \
+         the text; here both are run, on the same layers.",
+    );
+    sheet.heading("Numbers");
+    numbers(&mut sheet, &rows(&profile, &traces));
+    sheet.heading("Fig. 5 and 6: both injections");
+    let mut figures =
+        vec![(section(&profile, &traces), "Fig. 5: ways of the tip, in section, to scale.".to_owned())];
+    for (trace, (_, title)) in traces.iter().zip(INJECTIONS) {
+        figures.push((
+            over_time(trace, title),
+            "Fig. 6: positive resists insertion, negative holds the needle back on its way out.".into(),
+        ));
+    }
+    figures.push((
+        over_depth(&traces),
+        "The same over depth: a plateau a layer, and the opposite sign on the way out.".into(),
+    ));
+    sheet.figures(&figures);
+    sheet.heading("What the paper leaves open");
+    for words in [
+        "The forces of the withdrawal are “of the same kind, in the opposite direction”: no number. Ours have their own magnitudes in the patient's file.",
+        "The coefficients of the polynomial before the puncture and of the friction are other papers'. Depths of the layers are not given: ours stand in the patient's file with their sources.",
+        "The bursa cannot be missed in layers that go on for ever: in the first injection the needle is drawn back by 20 mm after it, turned by 8° and pushed in again.",
+        "Need 1 asks for a free entry point, and the conclusion says that it is fixed: here the procedure chooses it.",
+    ] {
+        sheet.paragraph(words);
+    }
+    Ok(sheet)
+}
+
+fn number(profile: &Profile, tissue: Tissue) -> Option<u8> {
+    profile.config.patient.layers.iter().position(|l| l.tissue == tissue).map(|at| at as u8)
+}
+
+fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
+    let newtons = |n: Option<f64>| n.map_or("–".into(), |n| format!("{} N", decimal(n, 2)));
+    let each = |value: &dyn Fn(&Trace) -> Option<f64>| -> String {
+        traces.iter().map(|t| newtons(value(t))).collect::<Vec<_>>().join(" and ")
+    };
+    let mut rows = Vec::new();
+    for (tissue, paper_n) in CUTTING {
+        let Some(layer) = number(profile, tissue) else { continue };
+        let name = tissue_name(tissue);
+        let said = format!("{} N", decimal(paper_n, 1));
+        rows.push(row(
+            &format!("cutting force, {name} (way in of both injections)"),
+            &said,
+            each(&|t| plateau_in(t, layer)),
+            Whose::Papers,
+        ));
+    }
+    for (tissue, _) in CUTTING {
+        let Some(layer) = number(profile, tissue) else { continue };
+        let what = format!("force on the way out, {} (both injections)", tissue_name(tissue));
+        rows.push(row(&what, "opposite direction", each(&|t| plateau_out(t, layer)), Whose::NoneGiven));
+    }
+    let largest = profile.plan.largest_force().0.to_num::<f64>();
+    rows.push(row(
+        "largest force of the device",
+        "10 N",
+        format!("{} N: one motor on a roller", decimal(largest, 2)),
+        Whose::Papers,
+    ));
+    rows
+}
+
+/// Mean force between the contact with a layer on the last way in and with the next one, its first third left out; N.
+fn plateau_in(trace: &Trace, layer: u8) -> Option<f64> {
+    let deepest = trace.deepest();
+    let begin = trace.last_event(deepest, is_contact_with(layer))?;
+    let end = trace.event(begin, is_contact_with(layer + 1)).unwrap_or(deepest).min(deepest);
+    trace.mean_n(begin + (end - begin) * 2 / 3..end)
+}
+
+/// Mean force between the exits from the layer below and from this one on the last way out, its first third left out; N.
+fn plateau_out(trace: &Trace, layer: u8) -> Option<f64> {
+    let deepest = trace.deepest();
+    let end = trace.event(deepest, is_exit_from(layer))?;
+    let begin =
+        trace.event(deepest, is_exit_from(layer + 1)).unwrap_or_else(|| trace.drawn_back(deepest)).min(end);
+    trace.mean_n(begin + (end - begin) / 3..end)
+}
+
+fn section(profile: &Profile, traces: &[Trace]) -> String {
+    let (bands, vessel) = anatomy(&profile.scene(Source::Virtual, None));
+    let ways = traces.iter().zip(INJECTIONS).zip(0..);
+    let way = |((trace, (_, name)), colour): ((&Trace, (&str, &str)), u8)| Way {
+        name: name.into(),
+        colour,
+        points: trace.way(0..trace.len()),
+        marks: Vec::new(),
+    };
+    Section { title: "Trajectories".into(), bands, vessel, ways: ways.map(way).collect() }.svg()
+}
+
+fn over_time(trace: &Trace, title: &str) -> String {
+    Chart {
+        title: title.into(),
+        x_label: "time, s".into(),
+        y_label: "force, N".into(),
+        curves: vec![Curve { points: trace.force_over_time(0..trace.len()), ..Curve::default() }],
+        ..Chart::default()
+    }
+    .svg()
+}
+
+fn over_depth(traces: &[Trace]) -> String {
+    let curve = |(trace, ((_, name), colour)): (&Trace, ((&str, &str), u8))| Curve {
+        name: name.into(),
+        colour,
+        dashed: false,
+        points: trace.force_over_depth(0..trace.len()),
+    };
+    Chart {
+        title: "Force over depth".into(),
+        x_label: "depth along the needle, mm".into(),
+        y_label: "force, N".into(),
+        curves: traces.iter().zip(INJECTIONS.into_iter().zip(0..)).map(curve).collect(),
+        ..Chart::default()
+    }
+    .svg()
+}

@@ -1,0 +1,223 @@
+//! The anatomy in section, true to scale, with the ways that a needle's tip took through it, as SVG.
+
+use super::{decimal, safe};
+use std::fmt::Write as _;
+
+const WIDE: f64 = 520.0;
+/// Air over the skin, as a share of what is drawn below it.
+const AIR: f64 = 0.22;
+const LINE: f64 = 20.0;
+/// Room for names at the right, as a share of how deep the drawing reaches.
+const NAMES_MM: f64 = 0.45;
+/// Tallest drawing.
+const HIGHEST: f64 = 460.0;
+
+/// A layer: it reaches down to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    /// What it is called; its colour goes by it.
+    pub name: String,
+    /// Depth of its upper face, perpendicular to the skin, mm.
+    pub top_mm: f64,
+}
+
+/// A vessel that runs along the section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tube {
+    /// Depth of its near wall, perpendicular to the skin, mm.
+    pub near_mm: f64,
+    /// From near to far wall, mm.
+    pub high_mm: f64,
+}
+
+/// A way of the tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    /// What the legend calls it.
+    pub name: String,
+    /// Which colour: 0 to 5.
+    pub colour: u8,
+    /// Along the skin and below it, mm.
+    pub points: Vec<(f64, f64)>,
+    /// Places on it that have a name.
+    pub marks: Vec<((f64, f64), String)>,
+}
+
+/// What is drawn.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Section {
+    /// Over it.
+    pub title: String,
+    /// Outermost first.
+    pub bands: Vec<Band>,
+    /// Where there is one.
+    pub vessel: Option<Tube>,
+    /// The last on top.
+    pub ways: Vec<Way>,
+}
+
+/// What is in view, mm.
+struct View {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    scale: f64,
+    head: f64,
+}
+
+impl View {
+    fn x(&self, mm: f64) -> f64 {
+        (mm - self.left) * self.scale
+    }
+
+    fn y(&self, mm: f64) -> f64 {
+        self.head + (mm - self.top) * self.scale
+    }
+}
+
+impl Section {
+    /// The drawing.
+    pub fn svg(&self) -> String {
+        let view = self.view();
+        let total = view.y(view.bottom);
+        let mut out =
+            format!("<svg viewBox=\"0 0 {WIDE} {total:.1}\" role=img><title>{}</title>", safe(&self.title));
+        let _ = write!(out, "<text class=title x=0 y=16>{}</text>", safe(&self.title));
+        for (index, way) in self.ways.iter().enumerate() {
+            let y = 36.0 + LINE * index as f64;
+            let _ = write!(
+                out,
+                "<path class=\"s s{}\" d=\"M0 {:.1}h24\"/><text x=30 y={y:.1}>{}</text>",
+                way.colour,
+                y - 5.0,
+                safe(&way.name)
+            );
+        }
+        self.draw_tissue(&mut out, &view);
+        for way in &self.ways {
+            draw_way(&mut out, way, &view);
+        }
+        let (x, y) = (8.0, total - 12.0);
+        let _ = write!(
+            out,
+            "<path d=\"M{x} {:.1}v5h{:.1}v-5\" fill=none stroke=\"var(--on-tissue)\" stroke-width=2 /><text x={:.1} y={:.1} style=\"fill:var(--on-tissue)\">5 mm</text></svg>",
+            y - 5.0,
+            5.0 * view.scale,
+            x + 6.0,
+            y - 7.0
+        );
+        out
+    }
+
+    fn view(&self) -> View {
+        let points = || self.ways.iter().flat_map(|w| w.points.iter());
+        let deepest = points().map(|p| p.1).fold(0.0, f64::max);
+        let lowest_top = self.bands.iter().map(|b| b.top_mm).fold(0.0, f64::max);
+        let vessel = self.vessel.map_or(0.0, |v| v.near_mm + v.high_mm);
+        let bottom = 1.15 * deepest.max(lowest_top + 1.0).max(vessel + 1.0);
+        let top = -AIR * bottom;
+        let (low, high) = points().fold((0.0_f64, 1.0_f64), |(a, b), p| (a.min(p.0), b.max(p.0)));
+        let head = 30.0 + LINE * self.ways.len() as f64;
+        let scale = (HIGHEST / (bottom - top)).min(WIDE / (1.2 * (high - low) + NAMES_MM * bottom));
+        // Names stand on the right: the ways keep to the left of them.
+        let middle = f64::midpoint(low, high);
+        let half = WIDE / scale / 2.0;
+        let shift = 0.5 * NAMES_MM * bottom;
+        View { left: middle - half + shift, right: middle + half + shift, top, bottom, scale, head }
+    }
+
+    fn draw_tissue(&self, out: &mut String, view: &View) {
+        let rect = |out: &mut String, from: f64, to: f64, fill: &str| {
+            let _ = write!(
+                out,
+                "<rect x=0 y={:.1} width={WIDE} height={:.1} style=\"fill:var(--{fill},var(--other))\"/>",
+                view.y(from),
+                ((to - from) * view.scale).max(0.0)
+            );
+        };
+        rect(out, view.top, 0.0, "sky");
+        for (index, band) in self.bands.iter().enumerate() {
+            let end = self.bands.get(index + 1).map_or(view.bottom, |next| next.top_mm);
+            let plain: String = band.name.chars().filter(char::is_ascii_lowercase).collect();
+            rect(out, band.top_mm, end, &plain);
+        }
+        if let Some(vessel) = self.vessel {
+            rect(out, vessel.near_mm, vessel.near_mm + vessel.high_mm, "lumen");
+            for wall in [vessel.near_mm, vessel.near_mm + vessel.high_mm] {
+                let y = view.y(wall);
+                let _ = write!(
+                    out,
+                    "<line x1=0 x2={WIDE} y1={y:.1} y2={y:.1} stroke=\"var(--wall)\" stroke-width=3 />"
+                );
+            }
+        }
+        let mut free = f64::NEG_INFINITY;
+        let vessel = self.vessel.map(|v| ("vessel".to_owned(), v.near_mm));
+        let mut names: Vec<(String, f64)> =
+            self.bands.iter().map(|b| (b.name.clone(), b.top_mm)).chain(vessel).collect();
+        names.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (name, top_mm) in names {
+            let y = (view.y(top_mm) + 16.0).max(free + 16.0);
+            free = y;
+            let _ = write!(
+                out,
+                "<text x={:.1} y={y:.1} text-anchor=end style=\"fill:var(--on-tissue)\">{}, {} mm</text>",
+                WIDE - 6.0,
+                safe(&name),
+                decimal(top_mm, 1)
+            );
+        }
+        debug_assert!(view.right > view.left);
+    }
+}
+
+fn draw_way(out: &mut String, way: &Way, view: &View) {
+    let _ = write!(out, "<path class=\"s s{}\" d=\"", way.colour);
+    let mut pen = 'M';
+    for (x, y) in way.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite()) {
+        let _ = write!(out, "{pen}{:.1} {:.1}", view.x(*x), view.y(*y));
+        pen = 'L';
+    }
+    out.push_str("\"/>");
+    for ((x, y), name) in &way.marks {
+        let (x, y) = (view.x(*x), view.y(*y));
+        let _ = write!(
+            out,
+            "<circle cx={x:.1} cy={y:.1} r=4 class=\"s s{}\" style=\"fill:var(--page)\"/><text x={:.1} y={:.1} text-anchor=end style=\"fill:var(--on-tissue)\">{}</text>",
+            way.colour,
+            x - 9.0,
+            y + 11.0,
+            safe(name)
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_drawn_to_scale_both_ways_and_holds_all_ways() {
+        let way = Way {
+            name: "a".into(),
+            colour: 0,
+            points: vec![(0.0, 0.0), (8.0, 6.0)],
+            marks: vec![((8.0, 6.0), "end".into())],
+        };
+        let band = |name: &str, top_mm| Band { name: name.into(), top_mm };
+        let section = Section {
+            title: "t".into(),
+            bands: vec![band("skin", 0.0), band("fat", 2.0)],
+            vessel: Some(Tube { near_mm: 4.8, high_mm: 3.0 }),
+            ways: vec![way],
+        };
+        let view = section.view();
+        // 8 mm along and 6 mm down are as long as each other's scale says.
+        assert!(((view.x(8.0) - view.x(0.0)) / 8.0 - (view.y(6.0) - view.y(0.0)) / 6.0).abs() < 1e-9);
+        assert!(view.x(0.0) >= 0.0 && view.x(8.0) <= WIDE && view.bottom > 7.8);
+        let svg = section.svg();
+        assert!(svg.contains("4.8 mm") && svg.contains("var(--lumen") && !svg.contains("NaN"));
+        assert!(Section::default().svg().ends_with("</svg>"), "nothing at all is a drawing too");
+    }
+}

@@ -1,0 +1,130 @@
+//! What a teacher asks for, from the command line: scores, a debrief, patients, the papers.
+
+mod common;
+
+use common::{figure, folder, refused, run, run_well, text};
+use serde_json::Value;
+
+/// Insertions of a minute of a procedure, as `score --json` gives them.
+fn scored(name: &str, arguments: &[&str]) -> (std::path::PathBuf, Vec<Value>) {
+    let file = folder(name).join("a.mcap");
+    let head = ["run", "--headless", "--fast", "--record", text(&file)];
+    run_well(&[&head[..], arguments].concat());
+    let json: Value = serde_json::from_str(&run_well(&["score", text(&file), "--json"])).expect("JSON");
+    let insertions = json["insertions"].as_array().expect("insertions").clone();
+    (file, insertions)
+}
+
+#[test]
+fn a_venepuncture_is_scored_and_debriefed() {
+    let (file, insertions) = scored("scored", &["--seconds", "12", "--angle", "45"]);
+    assert_eq!(insertions.len(), 2);
+    for one in &insertions {
+        let number = |key: &str| one[key].as_f64().unwrap_or_else(|| panic!("{key} in {one}"));
+        assert!((number("angle_deg") - 45.0).abs() < 0.1 && number("angle_rms_error_deg") < 15.1, "{one}");
+        // 4.8 mm at 45°; the skin that was pushed in has sprung back to a part.
+        assert!((6.7..7.6).contains(&number("vessel_contact_path_mm")), "{one}");
+        // The procedure holds it there for 1 s, and comes and goes gently.
+        assert!((1.5..2.5).contains(&number("in_lumen_s")), "{one}");
+        assert_eq!((&one["through_far_wall"], &one["vessel"]), (&Value::Bool(false), &Value::Bool(true)));
+        assert_eq!(
+            (number("passes"), number("redirections"), number("flashbacks")),
+            (1.0, 0.0, 1.0),
+            "{one}"
+        );
+        // One minimum-jerk movement that two punctures disturb.
+        assert!((-5.0..-1.4).contains(&number("smoothness")), "{one}");
+        assert!(number("path_mm") > 2.0 * number("depth_mm") - 1.0, "{one}");
+    }
+    let out = folder("debriefed");
+    let said = run_well(&["debrief", text(&file), text(&file), "--out", text(&out)]);
+    assert!((figure(&said, "insertions") - 4.0).abs() < 1e-9, "{said}");
+    let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
+    for words in ["held for", "through the far wall", "4.8 mm", "<svg", "change"] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(!page.contains("http") && !page.contains("NaN"));
+    refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
+}
+
+#[test]
+fn a_needle_that_goes_through_and_one_that_is_turned_are_told() {
+    // 10 mm under the skin: beyond the far wall at 7.8 mm.
+    let (_, through) = scored("through", &["--seconds", "6", "--procedure", "insertion-5mms-60deg"]);
+    assert_eq!(through[0]["through_far_wall"], Value::Bool(true), "{through:?}");
+    assert_eq!(through[0]["punctures"], 3);
+    let dir = folder("turned");
+    let turned = dir.join("turned.toml");
+    let text_of = "format = 1\nname = \"turned\"\nstart_mm = -2.0\n[hand]\nstiffness_n_per_mm = 3.0\ndamping_n_s_per_mm = 0.02\n\
+         tremor_mm = 0.0\nseed = 1\n[[step]]\nname = \"wait\"\nseconds = 0.5\n[[step]]\nname = \"in\"\nto_mm = 9.0\nseconds = 1.5\n\
+         [[step]]\nname = \"back and turn\"\nto_mm = 4.0\nseconds = 1.0\nturned_deg = 12.0\n\
+         [[step]]\nname = \"in again\"\npast = \"vessel\"\nby_mm = 1.0\nseconds = 1.5\n\
+         [[step]]\nname = \"out\"\nto_mm = -2.0\nseconds = 1.5\nturned_deg = 0.0\n";
+    std::fs::write(&turned, text_of).expect("written");
+    let (_, redirected) = scored("redirected", &["--seconds", "6", "--procedure", text(&turned)]);
+    assert_eq!(
+        (&redirected[0]["passes"], &redirected[0]["redirections"]),
+        (&Value::from(2), &Value::from(1))
+    );
+    assert!(redirected[0]["angle_largest_error_deg"].as_f64().expect("a number") > 11.0, "{redirected:?}");
+    assert_eq!(redirected[0]["vessel"], Value::Bool(true));
+}
+
+#[test]
+fn patients_are_listed_with_their_layers() {
+    let all = run_well(&["profiles"]);
+    for words in [
+        "adult",
+        "thin-elderly",
+        "high-body-mass",
+        "firm-skin",
+        "vessel, 3.0 × 4.5 mm",
+        "gives way at 1.00 N",
+    ] {
+        assert!(all.contains(words), "{words} is not in: {all}");
+    }
+    let one = run_well(&["profiles", "firm-skin"]);
+    assert!(one.contains("1.50 N") && !one.contains("thin-elderly"));
+    refused(&run(&["profiles", "giant"]), 2, &["giant", "adult"]);
+}
+
+#[test]
+fn insertions_on_the_virtual_device_become_a_table_that_tells_others() {
+    let dir = folder("fit-device");
+    let record = |speed: &str, angle: &str| {
+        let file = dir.join(format!("{speed}-{angle}.mcap"));
+        let procedure = format!("insertion-{speed}mms-{angle}deg");
+        // Long enough for one way in at each speed.
+        let seconds = if speed == "3" { "9" } else { "6" };
+        let head = ["run", "--headless", "--fast", "--seconds", seconds, "--record", text(&file)];
+        run_well(&[&head[..], &["--procedure", &procedure]].concat());
+        file
+    };
+    let cells = [("3", "60"), ("5", "60"), ("5", "30"), ("5", "45")].map(|(v, a)| record(v, a));
+    let unseen = record("5", "60.5");
+    let out = dir.join("table.toml");
+    let files: Vec<&str> = cells.iter().map(|c| text(c)).collect();
+    let arguments = [&["fit-force"], &files[..], &["--holdout", text(&unseen), "--out", text(&out)]].concat();
+    let said = run_well(&arguments);
+    assert_eq!(
+        (figure(&said, "cells"), figure(&said, "measured"), figure(&said, "judged")),
+        (6.0, 4.0, 1.0),
+        "{said}"
+    );
+    assert!(said.contains("no data at 3.0 mm/s and 30°") && said.contains("separable"), "{said}");
+    let (size, unseen_n) = (figure(&said, "force_rms_n"), figure(&said, "unseen_rms_n"));
+    assert!(size > 0.2 && unseen_n < 0.2 * size, "{said}");
+    let written = std::fs::read_to_string(&out).expect("written");
+    let table: toml::Table = written.parse().expect("TOML");
+    let rows = table["force_table"]["force_n"].as_array().expect("rows");
+    assert_eq!(rows.len(), 6);
+    let page = std::fs::read_to_string(out.with_extension("html")).expect("written beside it");
+    assert!(page.contains("<svg") && !page.contains("http") && page.contains("no data: separable"));
+
+    refused(
+        &run(&["fit-force", text(&unseen), "--holdout", text(&unseen), "--out", text(&out)]),
+        2,
+        &["5-60.5.mcap"],
+    );
+    refused(&run(&["fit-force", "/no/such.csv", "--out", text(&out)]), 2, &["/no/such.csv"]);
+}
