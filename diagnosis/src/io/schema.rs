@@ -161,8 +161,8 @@ pub struct FitTable {
 pub struct Hypothesis {
     /// The effect.
     pub name: EffectName,
-    /// Log-likelihood per held-out second that it brings over the refit.
-    pub holdout_gain: f64,
+    /// Log-likelihood of the held-out recordings that it brings over the model without it; none where it was not judged there.
+    pub holdout_gain: Option<f64>,
     /// What speaks for and against it, as its confidence weighs it; only where it came through the search.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub evidence: Option<BTreeMap<String, f64>>,

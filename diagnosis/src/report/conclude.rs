@@ -153,7 +153,7 @@ fn named_effects(
 fn hypotheses(assessment: &Assessment, s: &Search) -> Vec<Hypothesis> {
     let weighed = |assessed: &Assessed| Hypothesis {
         name: assessed.found.effect.name,
-        holdout_gain: assessed.found.holdout.sum,
+        holdout_gain: Some(assessed.found.holdout.sum),
         evidence: assessment.rests_on_evidence(assessed).then(|| assessed.evidence.clone()),
         class: assessed.class.clone(),
         rejected_because: assessment.doubt(assessed),
@@ -170,7 +170,7 @@ fn hypotheses(assessment: &Assessment, s: &Search) -> Vec<Hypothesis> {
         for rival in &one.rivals {
             let behind = || format!("{} explains more by {:.1} standard errors", one.effect.name, rival.z);
             let reason = rival.absence.clone().unwrap_or_else(behind);
-            lost(rival.name, one.holdout.sum - rival.lead, reason);
+            lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), reason);
         }
     }
     for (name, gain, reason) in &s.rejected {

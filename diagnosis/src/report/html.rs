@@ -2,7 +2,7 @@
 //! would be one too many.
 
 use crate::io::rig::Kind;
-use crate::io::schema::{Named, Verdict};
+use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
 use crate::report::axes::{HIGH, frame, safe};
 use crate::report::motion_picture;
@@ -337,8 +337,9 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
     out.push_str(
         "<section><h2>What was considered</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
     );
+    let gain = |h: &Hypothesis| h.holdout_gain.unwrap_or(f64::NEG_INFINITY);
     let mut sorted: Vec<_> = r.hypotheses.iter().collect();
-    sorted.sort_by(|a, b| b.holdout_gain.total_cmp(&a.holdout_gain));
+    sorted.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
     for h in sorted {
         let outcome = h.rejected_because.as_deref().unwrap_or("named");
         let _ = write!(
@@ -346,7 +347,7 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
             "<tr><td>{} <small>{}</small></td><td class=n>{}</td><td>{}</td></tr>",
             safe(h.name.in_words()),
             h.name,
-            short(h.holdout_gain),
+            h.holdout_gain.map_or_else(String::new, short),
             safe(outcome)
         );
     }

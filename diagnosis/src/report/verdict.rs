@@ -54,6 +54,7 @@ pub(crate) fn verdict(
     let helps = !assessment.effects.is_empty()
         && table.patched.holdout.powi(2) < REPEATS * table.refit.holdout.powi(2);
     let repeats = maps.iter().any(|map| map.significant && map.carries > 0.1);
+    let again = assessment.repeats.filter(|_| disturbed);
     let swings = assessment.swing.and_then(|swing| swing.in_words()).filter(|_| disturbed);
     if !assessment.named().is_empty() {
         (Verdict::MissingPhysics, None)
@@ -63,8 +64,12 @@ pub(crate) fn verdict(
         || (disturbed && repeats)
         || swings.is_some()
         || foreign.is_some()
+        || again.is_some()
     {
-        (Verdict::Unexplained, swings.or_else(|| assessment.foreign()).or(foreign))
+        (
+            Verdict::Unexplained,
+            swings.or_else(|| assessment.foreign()).or(foreign).or_else(|| again.map(in_words)),
+        )
     } else if disturbed {
         (Verdict::RandomDisturbance, None)
     } else if refit_matters(&assessment.estimator, holdout, on_holdout, table.force_rms.holdout) {
@@ -72,4 +77,8 @@ pub(crate) fn verdict(
     } else {
         (Verdict::NoMismatch, None)
     }
+}
+
+fn in_words(correlation: f64) -> String {
+    format!("what is left repeats where the motion does, with a correlation of {correlation:.2}")
 }

@@ -78,22 +78,24 @@ pub(crate) fn fit_rivals(
                 let own = costs(&best, context.nominal, &holdout);
                 let lead = |rival: &FittedModel| {
                     let theirs = costs(rival, context.nominal, &holdout);
-                    bootstrap(&theirs.iter().zip(&own).map(|(a, b)| a - b).collect::<Vec<f64>>())
+                    let leads: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
+                    let fitted = rival.fit.prepared.iter().map(|one| one.segments.len()).sum::<usize>();
+                    (bootstrap(&leads), leads[fitted..].iter().sum::<f64>())
                 };
-                let mut gain = lead(&rival);
+                let (mut gain, mut held_out) = lead(&rival);
                 let mut rival = rival;
                 if gain.z < WITHIN_REACH {
                     // A rival that may be near is fitted as well as the winner was.
                     let polished = FittedModel { noise: best.noise, ..context.polish_one(&rival) };
                     let again = lead(&polished);
-                    if again.sum < gain.sum {
-                        (gain, rival) = (again, polished);
+                    if again.0.sum < gain.sum {
+                        ((gain, held_out), rival) = (again, polished);
                     }
                 }
                 let last = rival.model.effects.len() - 1;
                 let absence =
                     (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
-                Rival { name: effect.name, z: gain.z, lead: gain.sum, absence }
+                Rival { name: effect.name, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
             })
             .collect();
         // Needed only where a rival comes near, and the same for all of them.

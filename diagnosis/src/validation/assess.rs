@@ -17,6 +17,7 @@ use crate::validation::evidence::EffectEvidence;
 use crate::validation::known_travel::known;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
+use crate::validation::repeats::correlation_of_repeats;
 use crate::validation::residuals::{Residuals, above};
 use crate::validation::stepwise::{Search, eliminate};
 use crate::validation::tonal::{self, TonalDisturbance};
@@ -73,6 +74,8 @@ pub(crate) struct Assessment {
     /// Frequency at which a force may swing whatever the axis does, and that force if it does.
     hertz: Option<f64>,
     pub(crate) swing: Option<TonalDisturbance>,
+    /// Correlation of what is left between repeats of a motion, where there are any and it is surely more than chance.
+    pub(crate) repeats: Option<f64>,
 }
 
 impl Assessment {
@@ -295,6 +298,10 @@ impl Scales<'_> {
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
         let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
         let swing = hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(holdout, on_holdout)));
+        let all: Vec<BlockedRecording> = context.tracks.iter().chain(holdout).cloned().collect();
+        let left: Vec<Vec<f64>> = on_fit.patched.iter().chain(&on_holdout.patched).cloned().collect();
+        let moving: Vec<Vec<bool>> = all.iter().map(|track| estimator.moving(track)).collect();
+        let repeats = correlation_of_repeats(&all, &left, &moving, estimator.bandwidth_hz);
         let effects = found
             .into_iter()
             .enumerate()
@@ -324,7 +331,17 @@ impl Scales<'_> {
                 }
             })
             .collect();
-        Assessment { effects, dropped: Vec::new(), shown, estimator, floor, understood, hertz, swing }
+        Assessment {
+            effects,
+            dropped: Vec::new(),
+            shown,
+            estimator,
+            floor,
+            understood,
+            hertz,
+            swing,
+            repeats,
+        }
     }
 }
 

@@ -147,10 +147,24 @@ impl EffectEvidence {
         self.fit.z >= PROMISING && self.holdout.z > -1.0 && self.share >= SHARE
     }
 
+    /// Why it does not generalise, with the figures that say so.
+    fn unsure(&self) -> String {
+        if self.holdout.sum <= 0.0 {
+            return format!("held-out recordings are less likely with it, by {:.0} nats", -self.holdout.sum);
+        }
+        format!(
+            "its gain of {:.0} nats on held-out recordings is unsure ({:.1} standard errors there, {:.1} on the fitted ones) and it takes {:.0} % of what the noise leaves",
+            self.holdout.sum,
+            self.holdout.z,
+            self.fit.z,
+            100.0 * self.share.max(0.0)
+        )
+    }
+
     /// Why an effect may not be named, if it may not.
     pub(crate) fn rejection_reason(&self) -> Option<String> {
         if !self.generalises() {
-            return Some("its gain does not carry to the held-out recordings".into());
+            return Some(self.unsure());
         }
         let rare = self.fit.z.max(self.fit.clipped_z) < 2.0 && self.holdout.z < 3.0;
         if rare && !self.recurs() && !self.agrees_everywhere() {
@@ -175,7 +189,7 @@ impl EffectEvidence {
                     .into(),
             );
         }
-        self.at_bound.then(|| "its values stand at the end of what is possible".into())
+        self.at_bound.then(|| "a fitted parameter reached its limit".into())
     }
 }
 
@@ -185,8 +199,9 @@ pub(crate) struct Rival {
     pub(crate) name: EffectName,
     /// Mean lead of the winner over its standard error, over all segments.
     pub(crate) z: f64,
-    /// Lead of the winner in log-likelihood.
+    /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
     pub(crate) lead: f64,
+    pub(crate) held_out_lead: f64,
     /// Why it is none although it explains as much.
     pub(crate) absence: Option<String>,
 }

@@ -42,7 +42,7 @@ pub(crate) struct Search {
     pub(crate) last: FittedModel,
     pub(crate) found: Vec<EffectEvidence>,
     /// Hypotheses that were fitted in full and lost: name, gain, reason.
-    pub(crate) rejected: Vec<(EffectName, f64, String)>,
+    pub(crate) rejected: Vec<(EffectName, Option<f64>, String)>,
 }
 
 /// Smooths holdout-out recordings with a fitted model; `scale` is the acceleration that the command makes.
@@ -143,7 +143,7 @@ struct SearchState {
 /// What was looked at and not taken.
 #[derive(Default)]
 struct Rejected {
-    names: Vec<(EffectName, f64, String)>,
+    names: Vec<(EffectName, Option<f64>, String)>,
     tried: usize,
     /// Whether plain forces were looked for together.
     plain_tried: bool,
@@ -260,7 +260,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         if gain < MIN_LOG_LIKELIHOOD_GAIN {
             rejected.names.push((
                 name,
-                gain,
+                None,
                 "what it explains is no more than a slow disturbance would".into(),
             ));
             continue;
@@ -283,7 +283,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
             promising = Some(next);
         }
         if let Some(reason) = rejection_reason {
-            rejected.names.push((name, judged.holdout.sum, reason));
+            rejected.names.push((name, Some(judged.holdout.sum), reason));
         }
     }
     promising
@@ -424,7 +424,7 @@ pub(crate) fn eliminate(s: &mut Search, context: &FitContext, holdout: &[Blocked
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, _, reason)) = weakest else { return };
-        s.rejected.push((s.found[i].effect.name, s.found[i].holdout.sum, reason));
+        s.rejected.push((s.found[i].effect.name, Some(s.found[i].holdout.sum), reason));
         let mut model = s.last.model.clone();
         model.effects.remove(i);
         s.last = context.fit_slow(model, &[&s.null.noise, noise]);
