@@ -55,7 +55,7 @@ export class BodyView {
   }
 
   build() {
-    const angle = this.scene.tilt_rad - (this.scene.skin_tilt_rad ?? 0);
+    const angle = this.scene.tilt_rad - this.scene.skin_tilt_rad;
     if (!this.picture.build(this.scene, angle)) {
       byId("body-note").textContent = "This anatomy cannot be drawn";
       return;
@@ -71,7 +71,7 @@ export class BodyView {
   /** One picture; `view` as main.js keeps it. */
   draw(view) {
     if (!this.open || !this.picture?.built) return;
-    const angle = view.angle ?? view.tilt - (this.scene.skin_tilt_rad ?? 0);
+    const angle = view.angle ?? view.tilt - this.scene.skin_tilt_rad;
     this.depth.disabled = !view.canDrag;
     // While a person holds the slider it says where the hand wants to be, else where the needle is.
     if (!view.person || document.activeElement !== this.depth) this.depth.value = view.depth.toFixed(1);

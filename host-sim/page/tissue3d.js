@@ -130,7 +130,7 @@ export class Tissue3d {
       return { ...surface, array, index, count: surface.triangles.length, name: scene.layers[surface.layer]?.name };
     });
     const bands = scene.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
-    this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm ?? layer.top_mm, bottom: bands[i + 1]?.depth_mm ?? bands[i + 1]?.top_mm ?? DEEP_MM }));
+    this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm, bottom: bands[i + 1]?.depth_mm ?? DEEP_MM }));
     // In the needle's plane; beside it the limb curves down.
     const points = picture.points;
     this.blockBottom = 0;

@@ -136,7 +136,7 @@ fn insertion(name: &str) -> Option<Text> {
     let (speed, angle) = name.strip_prefix("insertion-")?.strip_suffix("deg")?.split_once("mms-")?;
     let number = |text: &str| text.parse::<f64>().ok().filter(|v| v.is_finite());
     let (speed, angle) = (number(speed)?, number(angle)?);
-    let reach_mm = INSERTION_DEPTH_MM / angle.to_radians().sin();
+    let reach_mm = INSERTION_DEPTH_MM / libm::sin(angle.to_radians());
     let text = INSERTION
         .replace("insertion-3mms-45deg\"", &format!("{name}\""))
         .replace("speed_mm_s = 3.0", &format!("speed_mm_s = {speed:?}"))
@@ -226,7 +226,7 @@ impl Step {
                     )
                 })?;
                 // One without a wall that gives way is passed where it begins.
-                let begins_mm = layer.depth.0.to_num::<f64>() / angle_rad.sin();
+                let begins_mm = layer.depth.0.to_num::<f64>() / libm::sin(angle_rad);
                 Ok(puncture_path_mm(layer, angle_rad).unwrap_or(begins_mm) + self.by_mm)
             }
         }
