@@ -14,7 +14,7 @@ use control_core::config::Tissue;
 use std::path::Path;
 
 /// Eq. 2 as printed, in the place of the cone.
-const AS_PRINTED: &str = "[friction]\nlaw = \"paper\"\nlevel_length_mm = 23.0\nlevel_cap = 4.0\nanchor_ms = 50\nstiffness_n_per_mm = 0.5\nlimit_n = 0.3\n\n[[layer]]";
+const AS_PRINTED: &str = "[friction]\nlaw = \"paper\"\nlevel_length_mm = 23.0\nlevel_cap = 3.5\nanchor_ms = 50\nstiffness_n_per_mm = 0.25\nlimit_n = 0.3\n\n[[layer]]";
 /// How long the needle is held still, s: as the procedure says.
 const HELD_S: f64 = 2.0;
 
@@ -48,7 +48,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     for words in [
         "P_curr_f is called the current position. Taken so, eq. 2 has no state; we read it as an anchor that follows the needle, and P_pre as the \
          anchor of the tick before, as the equation's last line sets it.",
-        "S_f1 and S_f2 have no values, and from position to torque a factor is missing. Ours: S_f1 23 mm, S_f2 from a time constant of 50 ms, 0.5 N/mm.",
+        "S_f1 and S_f2 have no values, and from position to torque a factor is missing. Ours: S_f1 23 mm, S_f2 from a time constant of 50 ms, 0.25 N/mm.",
         "The effect of the penetration is called the difference between two effects. Ours: a wall rises along one parabola until it gives way, and falls \
          along another; that it has given way lasts until the tip has left the layer.",
     ] {
