@@ -3,6 +3,9 @@
 mod common;
 
 use common::{Setup, record, rig};
+use diagnosis::effects::{EffectName, Variable};
+use diagnosis::rig::Rig;
+use diagnosis::simulation::{Plant, Surroundings};
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 
 fn diagnosed(effect: &'static str, closed: bool) -> Outcome {
@@ -35,4 +38,34 @@ fn a_bump_of_travel_times_speed_is_no_damping_along_the_travel() {
 fn under_feedback_no_form_takes_what_a_null_leaves() {
     let report = diagnosed("none", true).report;
     assert_eq!(report.verdict, Verdict::NoMismatch, "{}", report.sentence);
+}
+
+#[test]
+fn the_force_without_a_name_runs_in_the_simulator_as_it_was_fitted() {
+    let outcome = diagnosed("sine_of_speed", true);
+    let told = outcome.report.free_form.expect("the form is told");
+    assert!(told.holdout_gain.is_some_and(|gain| gain > 0.0), "{told:?}");
+    assert!(told.in_words.is_some_and(|words| words.contains("speed")));
+    let fit = &outcome.report.fit;
+    assert!(fit.patched.holdout < fit.refit.holdout, "{} of {}", fit.patched.holdout, fit.refit.holdout);
+    // Written and read back, as host-sim does.
+    let rig = Rig::parse(&outcome.patched_rig.to_toml(), "patched").expect("the patched rig is right");
+    let [effect] = rig.effects.as_slice() else { panic!("the table alone") };
+    assert_eq!(effect.name, EffectName::Table);
+    let table = effect.table.as_ref().expect("it holds its table");
+    assert_eq!(table.over, [Variable::Speed]);
+    let bare = Rig { effects: Vec::new(), ..rig.clone() };
+    let dt = 1e-6;
+    let acceleration = |rig: &Rig, v: f64| {
+        let mut plant = Plant::new(rig);
+        plant.place(1.0, v);
+        plant.step(0.0, Surroundings::default(), dt);
+        (plant.velocity() - v) / dt
+    };
+    let largest = table.force.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    for (v, force) in table.grid[0].iter().zip(&table.force).filter(|(v, _)| v.abs() > 0.5) {
+        let run = (acceleration(&rig, *v) - acceleration(&bare, *v)) * rig.model.inertia;
+        let fitted = force * effect.coefficient("force");
+        assert!((run - fitted).abs() < 1e-3 * largest, "{run:e} instead of {fitted:e} at {v} rad/s");
+    }
 }

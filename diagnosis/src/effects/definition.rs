@@ -11,6 +11,10 @@ pub(crate) trait ForceLaw: std::fmt::Debug + Send + Sync {
     fn names(&self) -> Vec<String>;
     /// The terms for one step; `out` has one place per name. `velocity` is nought where its sign is unknown.
     fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]);
+    /// The part of the force that holds an axis at rest, per unit of the first coefficient, where only a part does.
+    fn dry_part(&self, _state: &State) -> f64 {
+        0.0
+    }
     /// The same law with the same state.
     fn copy(&self) -> Box<dyn ForceLaw>;
 }

@@ -77,6 +77,11 @@ impl Law {
         self.name.definition().is_dry()
     }
 
+    /// The part of a force without a name that holds an axis at rest, per unit of its coefficient, N·m or N.
+    pub fn dry_part(&self, state: &State) -> f64 {
+        self.law.dry_part(state)
+    }
+
     /// The terms for this step; `out` has one place per name.
     pub fn terms(&mut self, state: &State, out: &mut [f64]) {
         let velocity = if state.rest { 0.0 } else { state.velocity };

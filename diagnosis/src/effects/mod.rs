@@ -10,14 +10,13 @@ pub(crate) mod definition;
 pub(crate) mod experiments;
 mod law;
 mod load;
-mod table;
 mod travel_profile;
 mod waves;
 
 pub use command::CommandLaw;
 pub(crate) use law::wave_mean;
 pub use law::{Law, State};
-pub use table::Variable;
+pub use table::{Table, Variable};
 
 use definition::Definition;
 use serde::{Deserialize, Serialize};
@@ -87,6 +86,7 @@ registry! {
     PositionDependentDamping position_dependent_damping;
     EncoderEccentricity encoder_eccentricity;
     MissedCounts missed_counts;
+    Table table;
 }
 
 impl EffectName {
@@ -118,13 +118,24 @@ pub struct Effect {
     /// What enters linearly, by the name of its term; force units or relative.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub coefficients: BTreeMap<String, f64>,
+    /// The force itself, where it has no name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<Table>,
 }
 
 impl Effect {
     /// An effect with its shape and without coefficients.
     pub fn shaped(name: EffectName, shape: &[(&str, f64)]) -> Self {
         let shape = shape.iter().map(|(key, value)| ((*key).to_owned(), *value)).collect();
-        Self { name, shape, coefficients: BTreeMap::new() }
+        Self { name, shape, coefficients: BTreeMap::new(), table: None }
+    }
+
+    /// A force without a name; `turn` is the travel of one turn where it is over the angle.
+    pub fn tabled(table: Table, turn: Option<f64>) -> Self {
+        let mut effect = Self::shaped(EffectName::Table, &[]);
+        effect.shape.extend(turn.map(|turn| ("turn".to_owned(), turn)));
+        effect.table = Some(table);
+        effect
     }
 
     /// One value of the shape, or what stands for it where it is missing.
@@ -137,9 +148,10 @@ impl Effect {
         self.shape_or(key, 0.0) > 0.5
     }
 
-    /// One coefficient; zero where it is missing.
+    /// One coefficient; where it is missing, zero, and one of a table, which is a force as it stands.
     pub fn coefficient(&self, key: &str) -> f64 {
-        self.coefficients.get(key).copied().unwrap_or(0.0)
+        let missing = if self.name == EffectName::Table { 1.0 } else { 0.0 };
+        self.coefficients.get(key).copied().unwrap_or(missing)
     }
 
     /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of their coefficients.
@@ -159,6 +171,12 @@ impl Effect {
 
     /// Whether the numbers can be run; the reason where not.
     pub(crate) fn check(&self) -> Result<(), String> {
+        match (&self.table, self.name) {
+            (Some(table), EffectName::Table) => table.check()?,
+            (None, EffectName::Table) => return Err("it needs a table with over, grid and force".into()),
+            (Some(_), _) => return Err("only an effect of the name table may have a table".into()),
+            (None, _) => {}
+        }
         for (key, value) in self.shape.iter().chain(&self.coefficients) {
             if !value.is_finite() || value.abs() > 1e30 {
                 return Err(format!("{key} must be a finite number"));

@@ -1,6 +1,6 @@
 //! What one effect puts into a recording: the inputs of its terms. Nothing here is fitted.
 
-use crate::effects::{Effect, EffectName, Law, State};
+use crate::effects::{Effect, EffectName, Law, State, Variable};
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
@@ -21,7 +21,8 @@ pub(crate) fn effect_inputs(
     }
     let count = law.names().len();
     let n = track.blocks();
-    let carried = effect.shape.contains_key("of_drive").then(|| track.block_mean(command));
+    let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command));
+    let carried = (over_command || effect.shape.contains_key("of_drive")).then(|| track.block_mean(command));
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
@@ -31,7 +32,7 @@ pub(crate) fn effect_inputs(
             acceleration: track.acceleration(j),
             rest: track.rest[j],
             drive: carried.as_ref().map_or(1.0, |carried| carried[j]),
-            command: 1.0,
+            command: carried.as_ref().map_or(1.0, |carried| carried[j]),
             tilt: track.tilt_at(j),
             external: track.force_at(j),
             time: track.start[j] + 0.5 * track.span[j],

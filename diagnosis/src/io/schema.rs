@@ -1,6 +1,6 @@
 //! `diagnosis.json`: the words and the shape of the report, as the contract fixes them.
 
-use crate::effects::{EffectName, Subsystem};
+use crate::effects::{EffectName, Subsystem, Variable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -174,6 +174,24 @@ pub struct Hypothesis {
     pub rejected_because: Option<String>,
 }
 
+/// A force of any form: what is there and has no name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FreeForm {
+    /// What it depends on.
+    pub inputs: Vec<Variable>,
+    /// Its form in words.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub in_words: Option<String>,
+    /// Gain of log-likelihood on the held-out recordings over the model without it; none where it was not fitted for them.
+    pub holdout_gain: Option<f64>,
+    /// The same on blocks of the fitted recordings that were left out, and its standard error.
+    pub left_out_gain: f64,
+    /// Its standard error.
+    pub left_out_error: f64,
+    /// Part of what the named effects and this force together take of left-out blocks that the named effects take, 0 to 1.
+    pub share_of_ceiling: f64,
+}
+
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -197,6 +215,9 @@ pub struct Report {
     pub unexplained_fraction: f64,
     /// Every hypothesis that was looked at closely.
     pub hypotheses: Vec<Hypothesis>,
+    /// What a force of any form takes beside the named effects.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub free_form: Option<FreeForm>,
     /// Where the mismatch is, when nothing was named.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none", default)]
     pub place: Option<Place>,

@@ -7,6 +7,7 @@ use crate::estimation::refit::{acceleration_scale, is_driven};
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Hypothesis, Named, Place, Region, Report, Stretch, Verdict};
+use crate::report::free_form;
 use crate::report::next_experiment;
 use crate::report::outcome::{self, Evidence, Outcome, Series};
 use crate::report::patched_rig::{patch, place};
@@ -41,25 +42,39 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     if let Some(reason) = misfit(&assessment, &nominal).filter(|_| driven) {
         return Outcome::cannot_tell(&nominal.rig, reason);
     }
-    opponent::oppose(&mut assessment, &context, &s);
+    let beside = opponent::oppose(&mut assessment, &context, &s);
     let maps_of = |shown: &Shown| {
         let (on_fit, on_holdout) = (&shown.on_fit.patched, &shown.on_holdout.patched);
         residual_maps::maps((&fit_tracks, on_fit), (&holdout_tracks, on_holdout), nominal.rig.turn())
     };
     let maps_with_all = maps_of(&assessment.shown);
-    let foreign = if assessment.named().is_empty() {
-        out_of_library::alone(&context, &refit, &holdout_tracks).or_else(|| {
-            let taken = opponent::alone(&context, &s)?;
-            Some(format!("a force over {} would explain it", taken.inputs.in_words()))
-        })
-    } else {
-        None
-    };
+    let nothing_named = assessment.named().is_empty();
+    let unnamed = nothing_named.then(|| opponent::alone(&context, &refit, &holdout_tracks, &s)).flatten();
+    let length = nominal.rig.kind.length();
+    let form = unnamed.as_ref().map(|unnamed| free_form::sentence(&unnamed.shape, length));
+    let foreign = nothing_named
+        .then(|| out_of_library::alone(&context, &refit, &holdout_tracks))
+        .flatten()
+        .or_else(|| form.as_ref().map(|form| format!("{form} would explain it")));
     let (verdict, reason) = verdict(&assessment, &maps_with_all, &holdout_tracks, &excitation, foreign);
+    let unnamed = unnamed.filter(|_| verdict == Verdict::Unexplained);
+    let reason = match (reason, form.as_ref().filter(|_| unnamed.is_some())) {
+        (Some(reason), Some(form)) if !reason.contains(form.as_str()) => {
+            Some(format!("{reason}; what is there is {form}"))
+        }
+        (reason, _) => reason,
+    };
     // The verdict rests on all that was weighed, what people see on what is named.
     let with_named = only_named(&assessment, &context, &refit, &holdout_tracks, &s);
+    let named_alone = with_named.as_ref().unwrap_or(&assessment.shown);
+    let where_left = &named_alone.on_holdout.patched;
+    let free_form = free_form::told(unnamed.as_ref(), form.filter(|_| unnamed.is_some()), beside);
+    let drawn = unnamed.as_ref().map(|unnamed| unnamed.shape.clone());
+    let with_force = unnamed.and_then(|unnamed| {
+        Some(Shown::new(&context, &holdout_tracks, &assessment.estimator, &refit, unnamed.fitted?))
+    });
     let Shown { patched, on_fit, on_holdout, table, keeps_nominal } =
-        with_named.as_ref().unwrap_or(&assessment.shown);
+        with_force.as_ref().unwrap_or(named_alone);
     let maps = with_named.as_ref().map_or(maps_with_all, maps_of);
     let effects = named_effects(&assessment, with_named.as_ref(), &context, &s);
     let rig_of = |model: &FittedModel| {
@@ -81,10 +96,11 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
         unexplained_fraction: if before > 0.0 { (left / before).min(1.0) } else { 0.0 },
         hypotheses: hypotheses(&assessment, &s),
         place: matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance)
-            .then(|| top_place(&holdout_tracks, &on_holdout.patched, &maps)),
+            .then(|| top_place(&holdout_tracks, where_left, &maps)),
+        free_form,
         separating_experiment: match verdict {
             Verdict::InsufficientExcitation => Some(next_experiment::SPEEDS.to_owned()),
-            _ => known_travel::beyond(&holdout_tracks, &patched.model, &span, nominal.rig.kind.length()),
+            _ => known_travel::beyond(&holdout_tracks, &patched.model, &span, length),
         },
         simulation: pooled(&simulated),
         verdict,
@@ -93,8 +109,14 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     report.sentence = outcome::sentence(&report, nominal.rig.kind);
     let mut series = all_series(&assessment, &fit_tracks, on_fit, false);
     series.extend(all_series(&assessment, &holdout_tracks, on_holdout, true));
-    let evidence =
-        Evidence { series, maps, simulated, kind: nominal.rig.kind, rig: nominal.rig.name.clone() };
+    let evidence = Evidence {
+        series,
+        maps,
+        form: drawn,
+        simulated,
+        kind: nominal.rig.kind,
+        rig: nominal.rig.name.clone(),
+    };
     Outcome { report, evidence, nominal_rig: given.clone(), refit_rig, patched_rig }
 }
 

@@ -5,6 +5,7 @@ use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
 use crate::report::axes::{HIGH, frame, safe};
+use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, Series, unit};
 use crate::validation::residual_maps::Map;
@@ -28,6 +29,9 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     if r.verdict != Verdict::InsufficientExcitation {
         numbers(&mut out, outcome);
         what(&mut out, outcome);
+        if let (Some(form), Some(told)) = (&outcome.evidence.form, &r.free_form) {
+            free_form::draw(&mut out, form, told, &r.fit.unit, outcome.evidence.kind);
+        }
         over_time(&mut out, outcome);
         over_states(&mut out, outcome);
         hypotheses(&mut out, outcome);
@@ -115,7 +119,7 @@ fn numbers(out: &mut String, outcome: &Outcome) {
         ("with its values refitted", "b", f.refit),
         ("with what was found", "c", f.patched),
     ];
-    let found = !outcome.report.effects.is_empty();
+    let found = !outcome.report.effects.is_empty() || outcome.evidence.form.is_some();
     for (label, class, both) in &models[..if found { 3 } else { 2 }] {
         let _ = write!(
             out,
@@ -216,7 +220,7 @@ fn over_time(out: &mut String, outcome: &Outcome) {
     let unit = &outcome.report.fit.unit;
     let marked = "<span><i class=\"key m\"></i> where</span>";
     let (after, marks_say) = match &outcome.report {
-        report if !report.effects.is_empty() => {
+        report if !report.effects.is_empty() || outcome.evidence.form.is_some() => {
             ("with what was found", format!(" {marked} what was found acts most"))
         }
         report if report.place.is_some() => {

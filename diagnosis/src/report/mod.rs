@@ -3,6 +3,8 @@
 pub(crate) mod axes;
 pub(crate) mod conclude;
 pub mod exports;
+mod form_in_words;
+pub(crate) mod free_form;
 mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
@@ -12,6 +14,6 @@ pub(crate) mod run_forward;
 pub(crate) mod verdict;
 
 pub use crate::io::schema::{
-    Both, ByModel, FitTable, Hypothesis, Named, Parameter, Place, Region, Report, Simulation, Stretch,
-    Verdict, WindowsOff,
+    Both, ByModel, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report, Simulation,
+    Stretch, Verdict, WindowsOff,
 };

@@ -6,6 +6,7 @@ use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
 use crate::numerics::digits::short;
 use crate::report::html;
+use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
@@ -68,6 +69,8 @@ pub struct Evidence {
     pub maps: Vec<Map>,
     /// The models run forward beside the held-out recordings.
     pub simulated: Vec<Comparison>,
+    /// The force of any form, where nothing is named.
+    pub(crate) form: Option<Shape>,
     /// Rotary or linear.
     pub kind: Kind,
     /// The rig's label.
@@ -131,7 +134,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
         ),
         Verdict::Unexplained => format!(
             "Simulation and recordings differ repeatably by {:.1} % of the force, and no known effect explains it{}",
-            percent(fit.patched.holdout),
+            percent(fit.refit.holdout),
             report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),
         Verdict::RandomDisturbance => format!(
@@ -178,6 +181,7 @@ impl Outcome {
             noise_floor: 0.0,
             unexplained_fraction: 0.0,
             hypotheses: Vec::new(),
+            free_form: None,
             place: None,
             simulation: None,
             separating_experiment: Some(crate::report::next_experiment::GENERAL.to_owned()),
@@ -187,6 +191,7 @@ impl Outcome {
         let evidence = Evidence {
             series: Vec::new(),
             maps: Vec::new(),
+            form: None,
             simulated: Vec::new(),
             kind: rig.kind,
             rig: rig.name.clone(),

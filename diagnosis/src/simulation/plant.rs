@@ -93,7 +93,10 @@ impl Plant {
                 // A force against the motion that can hold the axis at rest.
                 dry -= sum * velocity.signum();
             } else {
-                free += sum;
+                // A jump of a table at rest is dry friction.
+                let holds = law.dry_part(&state) * coefficients[0];
+                dry += holds;
+                free += sum + holds * velocity.signum();
             }
         }
         let dry = dry.max(0.0);

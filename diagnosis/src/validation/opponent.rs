@@ -1,16 +1,34 @@
 //! Something that is not in the library, as the opponent of every name: a force of any form. Nothing here changes a model.
 
+use crate::effects::{Effect, Variable};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
-use crate::selection::free_form::{Evaluator, Taken, is_told};
-use crate::selection::search::FitContext;
+use crate::estimation::noise::Colour;
+use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
+use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::assess::Assessment;
+use crate::validation::evidence::judge_all;
+use crate::validation::parameters;
 use crate::validation::stepwise::Search;
 
-/// Puts every name that would stand against forces of any form; a name that one of them makes needless is none.
-pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Search) {
+/// What a force of any form would take beside a model.
+pub(crate) struct Beside {
+    pub(crate) taken: Taken,
+    /// Part of what model and form take of left-out blocks that the model takes, 0 to 1.
+    pub(crate) share: f64,
+}
+
+fn share(of_model: f64, taken: &Taken) -> f64 {
+    let beyond = taken.gain.sum.max(0.0);
+    if of_model <= 0.0 { 0.0 } else { of_model / (of_model + beyond) }
+}
+
+/// Puts every name that would stand against forces of any form; a name that one of them makes needless is none. Says what
+/// a form takes beside all names, if they stand.
+pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Search) -> Option<Beside> {
     let named = assessment.named();
     if named.is_empty() {
-        return;
+        return None;
     }
     let evaluator = Evaluator::new(context.nominal, context.tracks, &s.last.noise, context.scale);
     let model = assessment.shown.patched.model.clone();
@@ -31,11 +49,38 @@ pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Sear
             ));
         }
     }
+    let taken = whole.taken().into_iter().next()?;
+    let of_model = whole.alone.over(&evaluator.alone(&Model::default())).sum;
+    (!assessment.named().is_empty()).then(|| Beside { share: share(of_model, &taken), taken })
+}
+
+/// A force without a name where nothing is named.
+pub(crate) struct Unnamed {
+    pub(crate) taken: Taken,
+    pub(crate) shape: Shape,
+    /// The refit with the force beside it; none where each recording has its own place of it.
+    pub(crate) fitted: Option<FittedModel>,
+    /// Held-out gain of log-likelihood over the refit.
+    pub(crate) holdout_gain: Option<f64>,
 }
 
 /// The force of any form that explains most of what a refit leaves, where that is sure and enough to be told.
-pub(crate) fn alone(context: &FitContext, s: &Search) -> Option<Taken> {
+pub(crate) fn alone(
+    context: &FitContext,
+    refit: &FittedModel,
+    holdout: &[BlockedRecording],
+    s: &Search,
+) -> Option<Unnamed> {
     let evaluator = Evaluator::new(context.nominal, context.tracks, &s.null.noise, context.scale);
-    let taken = evaluator.densities(&Model::default()).taken();
-    taken.into_iter().find(|taken| is_told(taken, context.tracks))
+    let all = evaluator.densities(&Model::default()).taken();
+    let taken = all.into_iter().find(|taken| is_told(taken, context.tracks))?;
+    let (inertia, _, _) = parameters::scale(context.nominal, refit);
+    let shape = evaluator.shape(&Model::default(), taken.inputs, inertia)?;
+    let over_angle = shape.table.over.contains(&Variable::Angle);
+    let fitted = (!over_angle).then(|| {
+        let effects = vec![Effect::tabled(shape.table.clone(), context.nominal.rig.turn())];
+        context.fit(Model { effects, ..Model::default() }, &refit.noise, Colour::White)
+    });
+    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, holdout).pop());
+    Some(Unnamed { taken, shape, fitted, holdout_gain: judged.map(|found| found.holdout.sum) })
 }

@@ -142,6 +142,20 @@ impl Warp {
         let rank = ((above - 1) as f64 + part) / QUANTILES as f64;
         0.5 * (rank + (x - low) / (high - low))
     }
+
+    /// The variable where it is this far along, 0 to 1.
+    pub(crate) fn inverse(&self, part: f64) -> f64 {
+        let (mut low, mut high) = self.range();
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if self.at(middle) < part {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
 }
 
 /// The warps of all variables over the fitted recordings.
@@ -263,6 +277,11 @@ impl<'a> Basis<'a> {
             let (sin, cos) = (k * p.travel).sin_cos();
             out.extend([cos * mean, sin * mean]);
         }
+    }
+
+    /// Over the command, what a column is per unit of it; 1 elsewhere.
+    pub(crate) fn factor(&self, p: &Point, gain: f64) -> f64 {
+        if self.inputs.scales_command() { gain * p.command } else { 1.0 }
     }
 
     /// The columns over a recording; `gain` is the acceleration per unit of the command.

@@ -2,6 +2,7 @@
 
 use super::basis::{self, Basis, Inputs, Point, Warps};
 use super::compare::{Densities, Density};
+use super::shape::{Coefficients, Shape};
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 use crate::estimation::filter::{Gains, Noise};
 use crate::estimation::fit::{Prepared, layout};
@@ -108,6 +109,8 @@ pub(crate) struct Evaluator<'a> {
     /// Acceleration that the command makes.
     scale: f64,
     units: Vec<Units>,
+    points: Vec<Vec<Point>>,
+    warps: Warps,
     forms: Vec<Form>,
 }
 
@@ -150,7 +153,7 @@ impl<'a> Evaluator<'a> {
                 Form { inputs: *inputs, frequency: basis.frequency, responses, own }
             })
             .collect();
-        Self { nominal, tracks, noise: *noise, scale, units, forms }
+        Self { nominal, tracks, noise: *noise, scale, units, points, warps, forms }
     }
 
     fn base(&self, model: &Model) -> Base {
@@ -289,6 +292,36 @@ impl Evaluator<'_> {
         };
         let with = self.forms.par_iter().filter(|form| !form.frequency.is_empty()).map(of).collect();
         Densities { alone, with }
+    }
+
+    /// Density of a model alone.
+    pub(crate) fn alone(&self, model: &Model) -> Density {
+        let base = self.base(model);
+        Normal::new(self, &base, None).density(&base.precision)
+    }
+
+    /// The force of a form beside a model, fitted to all blocks; of an angle, as in the first recording. `inertia` makes
+    /// force of acceleration.
+    pub(crate) fn shape(&self, model: &Model, inputs: Inputs, inertia: f64) -> Option<Shape> {
+        let form = self.forms.iter().find(|form| form.inputs == inputs && !form.frequency.is_empty())?;
+        let base = self.base(model);
+        let normal = Normal::new(self, &base, Some(form));
+        let (mut whole, b) = normal.sum(None);
+        for (i, p) in self.most_likely(form, &base, &normal).iter().enumerate() {
+            whole.add(i, i, *p);
+        }
+        let factor = Factor::new(&whole);
+        let (x, inverse) = (factor.solve(&b), factor.inverse());
+        let (first, count) = (normal.base, form.frequency.len());
+        let mut covariance = Square::zero(count);
+        for i in 0..count {
+            for j in 0..count {
+                covariance.add(i, j, inverse.at(first + i, first + j));
+            }
+        }
+        let of = Coefficients { mean: x[first..first + count].to_vec(), covariance };
+        let basis = Basis::new(inputs, &self.warps);
+        Some(Shape::new(&basis, &of, &self.points, self.nominal.known_gain(), inertia))
     }
 
     /// Precisions of the priors of all columns, of the size and length of a form with the largest marginal likelihood.

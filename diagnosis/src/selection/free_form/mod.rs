@@ -4,6 +4,8 @@
 mod basis;
 mod compare;
 mod evaluate;
+mod shape;
 
 pub(crate) use compare::{Taken, is_told};
 pub(crate) use evaluate::Evaluator;
+pub(crate) use shape::Shape;

@@ -1,0 +1,142 @@
+//! What people are told of a force without a name: its entry in the report and its picture.
+
+use crate::effects::Variable;
+use crate::io::rig::Kind;
+use crate::io::schema::FreeForm;
+use crate::numerics::digits::short;
+use crate::report::axes::{frame, safe};
+use crate::report::form_in_words;
+use crate::selection::free_form::Shape;
+use crate::validation::opponent::{Beside, Unnamed};
+use std::fmt::Write as _;
+
+/// The form in a sentence without a stop.
+pub(crate) fn sentence(shape: &Shape, length: &str) -> String {
+    form_in_words::sentence(&shape.table, &shape.visits, length)
+}
+
+/// The entry of the report: of the force where nothing is named, or of what a form takes beside the names.
+pub(crate) fn told(
+    unnamed: Option<&Unnamed>,
+    in_words: Option<String>,
+    beside: Option<Beside>,
+) -> Option<FreeForm> {
+    let (taken, share_of_ceiling) = match (unnamed, &beside) {
+        (Some(unnamed), _) => (&unnamed.taken, 0.0),
+        (None, Some(beside)) => (&beside.taken, beside.share),
+        (None, None) => return None,
+    };
+    Some(FreeForm {
+        inputs: taken.inputs.variables().to_vec(),
+        in_words,
+        holdout_gain: unnamed.and_then(|unnamed| unnamed.holdout_gain),
+        left_out_gain: taken.gain.sum,
+        left_out_error: taken.gain.error,
+        share_of_ceiling,
+    })
+}
+
+/// Lines of a picture over two variables.
+const LINES: usize = 5;
+/// Standard deviations of the band.
+const BAND: f64 = 1.96;
+
+fn unit(variable: Variable, kind: Kind) -> String {
+    match variable {
+        Variable::Speed => format!("{}/s", kind.length()),
+        Variable::Travel | Variable::Angle => kind.length().into(),
+        Variable::Command => "command units".into(),
+        Variable::SinceReversal | Variable::Time => "s".into(),
+    }
+}
+
+/// One line of a picture: places, forces, bands, and at what value of the other variable.
+struct Line {
+    places: Vec<(f64, f64, f64)>,
+    at: Option<f64>,
+}
+
+/// The lines over one variable, and that variable with the other one.
+fn lines(shape: &Shape) -> (Vec<Line>, Variable, Option<Variable>) {
+    let table = &shape.table;
+    let point = |x: f64, i: usize| (x, table.force[i], BAND * shape.deviation[i]);
+    let [first, second] = match table.grid.as_slice() {
+        [one] => {
+            let places = one.iter().enumerate().map(|(i, x)| point(*x, i)).collect();
+            return (vec![Line { places, at: None }], table.over[0], None);
+        }
+        [first, second] => [first, second],
+        _ => return (Vec::new(), Variable::Time, None),
+    };
+    let n = second.len();
+    if table.over[1] == Variable::Command {
+        // In proportion to the command: the largest shows all.
+        let places = first.iter().enumerate().map(|(i, x)| point(*x, i * n + n - 1)).collect();
+        return (vec![Line { places, at: Some(second[n - 1]) }], table.over[0], Some(table.over[1]));
+    }
+    let row = |k: usize| {
+        let i = (2 * k + 1) * (first.len() - 1) / (2 * LINES);
+        let places = second.iter().enumerate().map(|(j, x)| point(*x, i * n + j)).collect();
+        Line { places, at: Some(first[i]) }
+    };
+    ((0..LINES).map(row).collect(), table.over[1], Some(table.over[0]))
+}
+
+/// The picture with its band, and the sentence.
+pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str, kind: Kind) {
+    let (lines, variable, other) = lines(shape);
+    let words = told.in_words.as_deref().unwrap_or("a force without a name");
+    let _ = write!(out, "<section><h2>A force without a name</h2><p>It is {}.", safe(words));
+    if let Some(gain) = told.holdout_gain {
+        let _ = write!(
+            out,
+            " On the held-out recordings it gains {} in log-likelihood over the refitted values; on left-out blocks of the fitted ones {} ± {}.",
+            short(gain),
+            short(told.left_out_gain),
+            short(told.left_out_error)
+        );
+    }
+    out.push_str("</p><figure>");
+    let all = || lines.iter().flat_map(|line| line.places.iter().copied());
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
+    let top = all().map(|p| p.1.abs() + p.2).fold(1e-300, f64::max);
+    let at = frame(out, (low, high), (-top, top), variable.in_words(), force);
+    for (k, line) in lines.iter().enumerate() {
+        let turn = 200 + 130 * k / lines.len();
+        let _ = write!(out, "<path style=\"fill:hsl({turn} 60% 50%/.18)\" d=\"");
+        let edge = |out: &mut String, p: &(f64, f64, f64), sign: f64, pen: char| {
+            let (x, y) = at(p.0, p.1 + sign * p.2);
+            let _ = write!(out, "{pen}{x:.1} {y:.1}");
+        };
+        for (i, p) in line.places.iter().enumerate() {
+            edge(out, p, 1.0, if i == 0 { 'M' } else { 'L' });
+        }
+        line.places.iter().rev().for_each(|p| edge(out, p, -1.0, 'L'));
+        let _ = write!(out, "Z\"/><path class=line style=\"stroke:hsl({turn} 60% 50%)\" d=\"");
+        for (i, p) in line.places.iter().enumerate() {
+            edge(out, p, 0.0, if i == 0 { 'M' } else { 'L' });
+        }
+        out.push_str("\"/>");
+    }
+    let _ = write!(
+        out,
+        "</svg><figcaption>force, {}, over {}, {}, with its 95 % band",
+        safe(force),
+        variable.in_words(),
+        safe(&unit(variable, kind))
+    );
+    if let Some(other) = other {
+        out.push_str("; ");
+        for (k, line) in lines.iter().enumerate() {
+            let turn = 200 + 130 * k / lines.len();
+            let _ = write!(
+                out,
+                "<span><i class=key style=\"background:hsl({turn} 60% 50%)\"></i> at a {} of {} {}</span> ",
+                other.in_words(),
+                short(line.at.unwrap_or(0.0)),
+                safe(&unit(other, kind))
+            );
+        }
+    }
+    out.push_str("</figcaption></figure></section>");
+}
