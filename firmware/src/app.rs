@@ -1,8 +1,8 @@
 //! The tasks of the firmware and nothing else: which interrupt starts them and at which priority. What they do is in
-//! [`crate::tasks`], what they do it with in [`crate::board`].
+//! [`firmware::tasks`], what they do it with in [`crate::board`].
 //!
 //! No task shares anything by lock. Orders go to the tick and samples come from it through queues with one writer and one
-//! reader; single words go through atomics ([`crate::tasks::shared`]).
+//! reader; single words go through atomics ([`firmware::tasks::shared`]).
 
 // RTIC takes priorities as literals only: these hold them to the ones that `timing` explains.
 const _: () = {
@@ -12,26 +12,26 @@ const _: () = {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use crate::board::{self, Statics};
-    use crate::tasks::queues::Queues;
-    use crate::tasks::supervisor::Watch;
-    use crate::tasks::supply::Supply;
-    use crate::tasks::telemetry::Telemetry;
-    use crate::tasks::tick::Tick;
-    use crate::tasks::tilt::Tilt;
-    use crate::tasks::usb::Port;
+    use crate::SHARED;
+    use crate::board::{self, Discovery, Statics};
+    use firmware::tasks::queues::Queues;
+    use firmware::tasks::supervisor::Watch;
+    use firmware::tasks::telemetry::Telemetry;
+    use firmware::tasks::tick::Tick;
+    use firmware::tasks::tilt::Tilt;
+    use firmware::tasks::usb::Port;
 
     #[shared]
     struct Shared {}
 
     #[local]
     struct Local {
-        tick: Tick,
-        supply: Supply,
-        supervisor: Watch,
-        usb: Port,
-        telemetry: Telemetry,
-        tilt: Tilt,
+        tick: Tick<Discovery>,
+        supply: board::Supply,
+        supervisor: Watch<Discovery>,
+        usb: Port<Discovery>,
+        telemetry: Telemetry<Discovery>,
+        tilt: Tilt<Discovery>,
     }
 
     #[init(local = [queues: Queues = Queues::new(), statics: Statics = Statics::new()])]
@@ -39,24 +39,29 @@ mod app {
         let ends = context.local.queues.split();
         let parts = board::init(context.core, context.device, context.local.statics);
         let local = Local {
-            tick: Tick::new(parts.tick_timer, parts.encoder, parts.drive, &parts.plan, parts.heat, ends.tick),
+            tick: Tick::new(
+                &SHARED,
+                (parts.tick_timer, parts.encoder, parts.drive),
+                &parts.plan,
+                parts.heat,
+                ends.tick,
+            ),
             supply: parts.supply,
             supervisor: Watch::new(
+                &SHARED,
                 parts.watchdog,
-                parts.debug,
                 parts.supply_level,
                 parts.encoder_lines,
                 parts.drive_lines,
             ),
-            usb: Port::new(parts.usb_device, parts.usb_class, ends.usb),
+            usb: Port::new(&SHARED, parts.serial, ends.usb),
             telemetry: Telemetry::new(
-                parts.identity,
-                &parts.plan,
-                parts.reset_cause,
+                &SHARED,
+                (parts.identity, &parts.plan, parts.reset_cause),
                 parts.store,
                 ends.telemetry,
             ),
-            tilt: Tilt::new(parts.tilt),
+            tilt: Tilt::new(&SHARED, parts.tilt),
         };
         (Shared {}, local)
     }
@@ -80,7 +85,8 @@ mod app {
     /// The supply falls: torque goes before the brown-out reset comes.
     #[task(binds = PVD, priority = 15, local = [supply])]
     fn supply(context: supply::Context) {
-        context.local.supply.run();
+        context.local.supply.clear();
+        firmware::tasks::supply::fell(&SHARED);
     }
 
     /// Every millisecond: sets the others off, hears who is alive, feeds the watchdog. Deadline: its period.

@@ -16,40 +16,74 @@
 //! | PA11, PA12 | USB | the micro-USB connector CN5 |
 //! | PD12 | green LED: running | on the board |
 
-mod crash;
+pub(crate) mod crash;
 mod encoder;
 mod flash;
 mod monitors;
 mod outputs;
 pub(crate) mod usb;
 
-use crate::tasks::supply::{PVD_LINE, Supply, SupplyLevel};
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};
-pub(crate) use encoder::{Encoder, EncoderLines};
+use cortex_m::peripheral::DWT;
+use crash::LAST_WORDS;
+use encoder::{Encoder, EncoderLines};
 use firmware::drive::{Drive, ParallelDac};
+use firmware::port;
 use firmware::reset::{ResetFlags, Said, cause};
 use firmware::store::{Store, Stored};
+use firmware::tasks::tick::BoardDrive;
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
 use link::device::Identity;
-pub(crate) use monitors::DriveLines;
+use monitors::DriveLines;
 use outputs::{InclinometerPin, Lines, OnChipDac};
 use stm32f4xx_hal::gpio::{Output, PD7, PE3};
 use stm32f4xx_hal::otg_fs::USB;
-use stm32f4xx_hal::pac;
+use stm32f4xx_hal::pac::{self, Interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{self, Enable, Rcc, Reset};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
-use usb_device::device::UsbDevice;
-use usbd_serial::CdcAcmClass;
 
-/// Converters and amplifier enable of this board.
-pub(crate) type BoardDrive = Drive<OnChipDac, ParallelDac<Lines>, PD7<Output>>;
-/// The configuration's store of this board.
-pub(crate) type BoardStore = Store<flash::Sectors>;
+/// This board.
+pub(crate) struct Discovery;
+
+impl port::Board for Discovery {
+    type Timer = TickTimer;
+    type Encoder = Encoder;
+    type Dac12 = OnChipDac;
+    type Dac8 = ParallelDac<Lines>;
+    type Enable = PD7<Output>;
+    type EncoderLines = EncoderLines;
+    type DriveLines = DriveLines;
+    type Supply = SupplyLevel;
+    type Watchdog = Watchdog;
+    type Tilt = BoardTilt;
+    type Serial = usb::Port;
+    type Flash = flash::Sectors;
+
+    fn cycles() -> u32 {
+        DWT::cycle_count()
+    }
+
+    fn wake_usb() {
+        rtic::pend(Interrupt::OTG_FS);
+    }
+
+    fn wake_telemetry() {
+        rtic::pend(Interrupt::USART2);
+    }
+
+    fn wake_tilt() {
+        rtic::pend(Interrupt::USART3);
+    }
+
+    fn allow_usb(allowed: bool) {
+        usb::allow_interrupt(allowed);
+    }
+}
 
 /// Memory that must outlive start-up.
 pub(crate) struct Statics {
@@ -69,15 +103,13 @@ pub(crate) struct Parts {
     pub(crate) encoder: Encoder,
     pub(crate) encoder_lines: EncoderLines,
     pub(crate) drive_lines: DriveLines,
-    pub(crate) drive: BoardDrive,
+    pub(crate) drive: BoardDrive<Discovery>,
     pub(crate) tilt: BoardTilt,
-    pub(crate) usb_device: UsbDevice<'static, usb::Bus>,
-    pub(crate) usb_class: CdcAcmClass<'static, usb::Bus>,
-    pub(crate) watchdog: IndependentWatchdog,
-    pub(crate) debug: pac::DBGMCU,
+    pub(crate) serial: usb::Port,
+    pub(crate) watchdog: Watchdog,
     pub(crate) supply: Supply,
     pub(crate) supply_level: SupplyLevel,
-    pub(crate) store: BoardStore,
+    pub(crate) store: Store<flash::Sectors>,
     pub(crate) plan: Plan,
     pub(crate) heat: u32,
     pub(crate) identity: Identity,
@@ -144,7 +176,7 @@ pub(crate) fn init(
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     gpiod.pd12.into_push_pull_output().set_high();
 
-    let Said { crash, torque, heat } = crate::tasks::shared::LAST_WORDS.take();
+    let Said { crash, torque, heat } = LAST_WORDS.take();
     let (store, device_part, patient_part) = Store::open(flash::Sectors::new(device.FLASH));
     let (plan, damage) = plan(device_part, patient_part);
     let reset_cause = cause(flags, crash, torque).or(damage);
@@ -155,7 +187,7 @@ pub(crate) fn init(
         None => defmt::info!("started; torque is off"),
     }
 
-    let (usb_device, usb_class) = usb::init(
+    let serial = usb::init(
         USB::new(
             (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK),
             (gpioa.pa11, gpioa.pa12),
@@ -184,10 +216,8 @@ pub(crate) fn init(
         drive_lines,
         drive,
         tilt,
-        usb_device,
-        usb_class,
-        watchdog,
-        debug: device.DBGMCU,
+        serial,
+        watchdog: Watchdog { watchdog, debug: device.DBGMCU },
         supply,
         supply_level,
         store,
@@ -263,6 +293,45 @@ fn serial_number() -> [u8; 12] {
     serial
 }
 
+/// Line of the voltage detector in the interrupt controller.
+const PVD_LINE: u32 = 16;
+
+/// The voltage detector's interrupt.
+pub(crate) struct Supply(pac::EXTI);
+
+impl Supply {
+    /// Has been served.
+    pub(crate) fn clear(&mut self) {
+        // Cleared by writing ones; the other lines are not used.
+        self.0.pr().write(|w| w.pr16().clear_bit_by_one());
+    }
+}
+
+/// The voltage detector's level.
+pub(crate) struct SupplyLevel(pac::PWR);
+
+impl port::SupplyLevel for SupplyLevel {
+    fn is_low(&self) -> bool {
+        self.0.csr().read().pvdo().bit()
+    }
+}
+
+/// The independent watchdog, and what a debugger may stop.
+pub(crate) struct Watchdog {
+    watchdog: IndependentWatchdog,
+    debug: pac::DBGMCU,
+}
+
+impl port::Watchdog for Watchdog {
+    fn feed(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn stop_on_debug(&mut self, stop: bool) {
+        self.watchdog.stop_on_debug(&self.debug, stop);
+    }
+}
+
 /// Core cycles of a count of the tick's timer.
 const TIMER_CYCLES: u32 = timing::CORE_HZ / timing::TICK_TIMER_HZ;
 
@@ -286,19 +355,18 @@ impl TickTimer {
         timer.cr1().write(|w| w.cen().set_bit());
         Self(timer)
     }
+}
 
-    /// Clears the edge that brought us here.
-    pub(crate) fn acknowledge(&self) {
+impl port::TickTimer for TickTimer {
+    fn acknowledge(&self) {
         self.0.sr().write(|w| w.uif().clear_bit());
     }
 
-    /// Whether the next edge has come already.
-    pub(crate) fn edge_waits(&self) -> bool {
+    fn edge_waits(&self) -> bool {
         self.0.sr().read().uif().bit()
     }
 
-    /// Core cycles since the edge.
-    pub(crate) fn cycles_since_edge(&self) -> u32 {
+    fn cycles_since_edge(&self) -> u32 {
         u32::from(self.0.cnt().read().cnt().bits()) * TIMER_CYCLES
     }
 }

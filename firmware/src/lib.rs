@@ -12,10 +12,13 @@ extern crate std;
 
 pub mod drive;
 pub mod lines;
+mod log;
 pub mod monitor;
+pub mod port;
 pub mod reset;
 pub mod stages;
 pub mod store;
 pub mod supervision;
+pub mod tasks;
 pub mod tilt;
 pub mod timing;

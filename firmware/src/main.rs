@@ -12,8 +12,11 @@ use defmt_rtt as _;
 mod app;
 #[cfg(target_os = "none")]
 mod board;
+
+/// The words that the tasks share.
 #[cfg(target_os = "none")]
-mod tasks;
+static SHARED: firmware::tasks::shared::Shared =
+    firmware::tasks::shared::Shared::new(&board::crash::LAST_WORDS);
 
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {

@@ -3,13 +3,17 @@
 //! resets itself, so that a PC finds a device that answers and says what happened.
 #![allow(unsafe_code, reason = "after a fault nothing that owns a register can be trusted")]
 
-use crate::tasks::shared::LAST_WORDS;
 use control_core::config::DacWidth;
 use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use firmware::reset::{Crash, CrashKind};
+use firmware::reset::{Crash, CrashKind, LastWords};
 use stm32f4xx_hal::pac::{DAC, GPIOD, GPIOE, RCC};
+
+/// What survives a reset: start-up code leaves this section alone, any bits are valid in it, and it says itself which mean
+/// something.
+#[unsafe(link_section = ".uninit.last_words")]
+pub(crate) static LAST_WORDS: LastWords = LastWords::new();
 
 /// PD7, the amplifier's enable, off.
 const ENABLE_OFF: u32 = 1 << (7 + 16);

@@ -32,9 +32,8 @@ pub(crate) fn init(timer: TIM2, a: PA15<Alternate<0>>, b: PA1, rcc: &mut Rcc) ->
     (Encoder(encoder), lines)
 }
 
-impl Encoder {
-    /// The count, which wraps with 32 bits.
-    pub(crate) fn count(&self) -> Counts {
+impl firmware::port::Encoder for Encoder {
+    fn count(&self) -> Counts {
         Counts(self.0.count().cast_signed())
     }
 }

@@ -1,7 +1,7 @@
 //! The two sectors at the end of flash that hold the configuration.
 #![allow(unsafe_code, reason = "flash is programmed by writes to its address")]
 
-use crate::tasks::shared::REPORTS;
+use crate::SHARED;
 use firmware::store::{CELL_WORDS, ConfigFlash, Slot, StoreError};
 use firmware::supervision::Task;
 use firmware::timing;
@@ -109,7 +109,7 @@ impl ConfigFlash for Sectors {
             cortex_m::asm::dsb();
         });
         // Telemetry is at work, not hung: a configuration has a hundred words and more.
-        REPORTS.alive(Task::Telemetry);
+        SHARED.reports.alive(Task::Telemetry);
         done
     }
 
@@ -127,7 +127,7 @@ impl ConfigFlash for Sectors {
         });
         watchdog(ALERT);
         for task in Task::ALL {
-            REPORTS.alive(task);
+            SHARED.reports.alive(task);
         }
         done
     }

@@ -3,6 +3,7 @@
 
 use control_core::units::DacCode;
 use firmware::monitor::Readings;
+use firmware::port::ReadDrive;
 use stm32f4xx_hal::gpio::{Analog, Input, PC2, PE4, PE5, PE6};
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC2, GPIOD};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
@@ -30,9 +31,10 @@ impl DriveLines {
         let current = fitted.is_low().then(|| convert_for_ever(converter, rcc));
         Self { stop, ready, current }
     }
+}
 
-    /// What they say now.
-    pub(crate) fn read(&self) -> Readings {
+impl ReadDrive for DriveLines {
+    fn read(&self) -> Readings {
         Readings {
             stop_open: self.stop.is_high(),
             ready: self.ready.is_low(),

@@ -2,25 +2,32 @@
 #![allow(unsafe_code, reason = "an interrupt is unmasked")]
 
 use core::fmt::Write;
+use firmware::port::{SerialPort, WouldBlock};
 use heapless::String;
 use stm32f4xx_hal::otg_fs::{USB, UsbBus};
 use stm32f4xx_hal::pac::{Interrupt, NVIC};
 use usb_device::bus::UsbBusAllocator;
-use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid};
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 /// The bus of this board.
-pub(crate) type Bus = UsbBus<USB>;
+type Bus = UsbBus<USB>;
 
 /// Identifiers shared by serial ports that are told apart by their names (V-USB's free list).
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x16C0, 0x27DD);
 const MANUFACTURER: &str = "Needle insertion simulator";
 const PRODUCT: &str = "Needle device";
 /// Largest packet of a bulk endpoint at full speed.
-const PACKET_BYTES: u16 = crate::tasks::queues::PACKET_BYTES as u16;
+const PACKET_BYTES: u16 = firmware::tasks::queues::PACKET_BYTES as u16;
 /// Words for the packets that wait to be read: the control endpoint's and the port's, with room to spare.
 const RECEIVE_WORDS: usize = 64;
 const SERIAL_CHARACTERS: usize = 24;
+
+/// The port.
+pub(crate) struct Port {
+    device: UsbDevice<'static, Bus>,
+    class: CdcAcmClass<'static, Bus>,
+}
 
 /// Memory of the driver.
 pub(crate) struct Statics {
@@ -37,11 +44,7 @@ impl Statics {
 }
 
 /// Connects to the bus as a serial port whose name ends in `serial`.
-pub(crate) fn init(
-    core: USB,
-    serial: [u8; 12],
-    statics: &'static mut Statics,
-) -> (UsbDevice<'static, Bus>, CdcAcmClass<'static, Bus>) {
+pub(crate) fn init(core: USB, serial: [u8; 12], statics: &'static mut Statics) -> Port {
     for byte in serial {
         // Two characters a byte: as many as there is room for.
         let _ = write!(statics.serial, "{byte:02X}");
@@ -55,16 +58,37 @@ pub(crate) fn init(
     let Ok(builder) = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).strings(&[strings]) else {
         panic!("one set of strings is allowed")
     };
-    (builder.device_class(USB_CLASS_CDC).build(), class)
+    Port { device: builder.device_class(USB_CLASS_CDC).build(), class }
 }
 
-/// Keeps the core's interrupt away until [`resume_interrupt`]: there is no room for what it brings.
-pub(crate) fn stop_interrupt() {
-    NVIC::mask(Interrupt::OTG_FS);
+/// Whether the core's interrupt may come: not while there is no room for what it brings.
+pub(crate) fn allow_interrupt(allowed: bool) {
+    if allowed {
+        // SAFETY: no critical section is built on masking this interrupt.
+        unsafe { NVIC::unmask(Interrupt::OTG_FS) };
+    } else {
+        NVIC::mask(Interrupt::OTG_FS);
+    }
 }
 
-/// There is room again.
-pub(crate) fn resume_interrupt() {
-    // SAFETY: no critical section is built on masking this interrupt.
-    unsafe { NVIC::unmask(Interrupt::OTG_FS) };
+impl SerialPort for Port {
+    fn poll(&mut self) {
+        self.device.poll(&mut [&mut self.class]);
+    }
+
+    fn is_configured(&self) -> bool {
+        self.device.state() == UsbDeviceState::Configured
+    }
+
+    fn is_open(&self) -> bool {
+        self.class.dtr()
+    }
+
+    fn read(&mut self, packet: &mut [u8]) -> Result<usize, WouldBlock> {
+        self.class.read_packet(packet).map_err(|_| WouldBlock)
+    }
+
+    fn write(&mut self, packet: &[u8]) -> Result<(), WouldBlock> {
+        self.class.write_packet(packet).map(drop).map_err(|_| WouldBlock)
+    }
 }

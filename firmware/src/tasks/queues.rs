@@ -5,18 +5,21 @@ use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
 
 /// A bulk packet of USB at full speed.
-pub(crate) const PACKET_BYTES: usize = 64;
+pub const PACKET_BYTES: usize = 64;
 
 /// Bytes on their way to or from the PC.
-pub(crate) type Packet = Vec<u8, PACKET_BYTES>;
+pub type Packet = Vec<u8, PACKET_BYTES>;
 
 /// An order in a byte: what a tick moves without noticing.
 #[derive(Clone, Copy)]
-pub(crate) enum SmallOrder {
+pub enum SmallOrder {
     /// In the session of this number.
     Start(u8),
+    /// Torque off.
     Stop,
+    /// Depth 0 is here.
     Zero,
+    /// The PC is alive.
     Heartbeat,
     /// Take the large one that waits: a plan or an excitation, which are rare and only for a device whose torque is off;
     /// in the session of this number.
@@ -24,14 +27,15 @@ pub(crate) enum SmallOrder {
 }
 
 /// What a tick gave, with its number.
-pub(crate) struct Ticked {
+pub struct Ticked {
     /// Counts from power-on, the lower half of the number; a gap is what the queue had no room for.
-    pub(crate) tick: u32,
-    pub(crate) output: TickOutput,
+    pub tick: u32,
+    /// What it gave.
+    pub output: TickOutput,
 }
 
 /// Memory of all queues.
-pub(crate) struct Queues {
+pub struct Queues {
     orders: Queue<SmallOrder, 16>,
     large_orders: Queue<Order, 2>,
     // 25 ms of samples: as long as telemetry may hang before it is found out.
@@ -43,37 +47,50 @@ pub(crate) struct Queues {
 }
 
 /// The tick's ends.
-pub(crate) struct TickEnds {
-    pub(crate) orders: Consumer<'static, SmallOrder>,
-    pub(crate) large_orders: Consumer<'static, Order>,
-    pub(crate) outputs: Producer<'static, Ticked>,
+pub struct TickEnds {
+    /// From telemetry.
+    pub orders: Consumer<'static, SmallOrder>,
+    /// What [`SmallOrder::Large`] stands for.
+    pub large_orders: Consumer<'static, Order>,
+    /// To telemetry.
+    pub outputs: Producer<'static, Ticked>,
 }
 
 /// The USB task's ends.
-pub(crate) struct UsbEnds {
-    pub(crate) from_pc: Producer<'static, Packet>,
-    pub(crate) to_pc: Consumer<'static, Packet>,
+pub struct UsbEnds {
+    /// To telemetry.
+    pub from_pc: Producer<'static, Packet>,
+    /// From telemetry.
+    pub to_pc: Consumer<'static, Packet>,
 }
 
 /// Telemetry's ends.
-pub(crate) struct TelemetryEnds {
-    pub(crate) orders: Producer<'static, SmallOrder>,
-    pub(crate) large_orders: Producer<'static, Order>,
-    pub(crate) outputs: Consumer<'static, Ticked>,
-    pub(crate) from_pc: Consumer<'static, Packet>,
-    pub(crate) to_pc: Producer<'static, Packet>,
+pub struct TelemetryEnds {
+    /// To the tick.
+    pub orders: Producer<'static, SmallOrder>,
+    /// What [`SmallOrder::Large`] stands for.
+    pub large_orders: Producer<'static, Order>,
+    /// From the tick.
+    pub outputs: Consumer<'static, Ticked>,
+    /// From the USB task.
+    pub from_pc: Consumer<'static, Packet>,
+    /// To the USB task.
+    pub to_pc: Producer<'static, Packet>,
 }
 
 /// All ends.
-pub(crate) struct Ends {
-    pub(crate) tick: TickEnds,
-    pub(crate) usb: UsbEnds,
-    pub(crate) telemetry: TelemetryEnds,
+pub struct Ends {
+    /// The tick's.
+    pub tick: TickEnds,
+    /// The USB task's.
+    pub usb: UsbEnds,
+    /// Telemetry's.
+    pub telemetry: TelemetryEnds,
 }
 
 impl Queues {
     /// All empty.
-    pub(crate) const fn new() -> Self {
+    pub const fn new() -> Self {
         Self {
             orders: Queue::new(),
             large_orders: Queue::new(),
@@ -84,7 +101,7 @@ impl Queues {
     }
 
     /// The ends, for the tasks.
-    pub(crate) fn split(&'static mut self) -> Ends {
+    pub fn split(&'static mut self) -> Ends {
         let (orders_in, orders) = self.orders.split();
         let (large_in, large_orders) = self.large_orders.split();
         let (outputs, outputs_out) = self.outputs.split();

@@ -2,21 +2,19 @@
 //! flash. It decides nothing about torque; it only passes orders on.
 
 use super::queues::{Packet, SmallOrder, TelemetryEnds};
-use super::shared::{self, LINK_CONFIGURED, LINK_READY};
-use crate::board::BoardStore;
-use crate::board::usb::resume_interrupt;
+use super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
+use crate::log;
+use crate::port::Board;
+use crate::store::{Store, StoreError};
+use crate::supervision::Task;
+use crate::timing;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use control_core::{Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
-use cortex_m::peripheral::DWT;
-use firmware::store::StoreError;
-use firmware::supervision::Task;
-use firmware::timing;
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use link::frames::{SaveFailure, Stage, Timing};
-use stm32f4xx_hal::pac::Interrupt;
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
 const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
@@ -28,9 +26,10 @@ const FRAME_END: u8 = 0;
 struct TorqueIsOn;
 
 /// Telemetry's own state.
-pub(crate) struct Telemetry {
+pub struct Telemetry<B: Board> {
+    shared: &'static Shared,
     endpoint: Endpoint,
-    store: BoardStore,
+    store: Store<B::Flash>,
     /// CRC-32 of the device's and of the patient's part that a reset would bring back.
     saved: (u32, u32),
     ends: TelemetryEnds,
@@ -43,16 +42,16 @@ pub(crate) struct Telemetry {
     in_session: bool,
 }
 
-impl Telemetry {
+impl<B: Board> Telemetry<B> {
     /// `plan` is the one that the tick starts with, `reset_cause` what ended the last run.
-    pub(crate) fn new(
-        identity: Identity,
-        plan: &Plan,
-        reset_cause: Option<Fault>,
-        store: BoardStore,
+    pub fn new(
+        shared: &'static Shared,
+        (identity, plan, reset_cause): (Identity, &Plan, Option<Fault>),
+        store: Store<B::Flash>,
         ends: TelemetryEnds,
     ) -> Self {
         Self {
+            shared,
             endpoint: Endpoint::new(identity, plan, reset_cause),
             store,
             saved: (link::codec::hash(plan.device()), link::codec::hash(plan.patient())),
@@ -67,36 +66,36 @@ impl Telemetry {
     }
 
     /// One turn: link state, commands, samples, frames.
-    pub(crate) fn run(&mut self) {
-        let entered = DWT::cycle_count();
+    pub fn run(&mut self) {
+        let entered = B::cycles();
         self.watch_link();
         // Samples first: whether torque is on decides what a command may do.
         self.take_samples();
         self.take_commands();
         self.send_frames();
-        shared::REPORTS.alive(Task::Telemetry);
-        shared::STAGES.note(Stage::Telemetry, DWT::cycle_count().wrapping_sub(entered));
+        self.shared.reports.alive(Task::Telemetry);
+        self.shared.stages.note(Stage::Telemetry, B::cycles().wrapping_sub(entered));
     }
 
     /// The cable pulled, the bus suspended, or the port closed by the program that had it open.
     fn watch_link(&mut self) {
-        let link = shared::LINK.load(Relaxed);
+        let link = self.shared.link.load(Relaxed);
         let is_ready = link & LINK_READY != 0;
         let was_closed = self.was_ready && !is_ready;
         let is_open = link & LINK_CONFIGURED != 0;
         if (self.was_open && !is_open) || was_closed {
-            defmt::info!("the PC is gone");
+            log::info!("the PC is gone");
             // Nothing that it asked for outlives it: neither what has not been read yet, nor a start that the tick has not
             // seen yet.
             while self.ends.from_pc.dequeue().is_some() {}
             self.endpoint.disconnect();
             self.filling.clear();
-            shared::DISCARD.store(true, Relaxed);
-            shared::SESSION.store(self.session().wrapping_add(1), Relaxed);
+            self.shared.discard.store(true, Relaxed);
+            self.shared.session.store(self.session().wrapping_add(1), Relaxed);
             self.held = Some(Order::Stop);
             self.forward_orders();
-            if shared::POWERED.load(Relaxed) {
-                shared::TRIPS.raise(Fault::LinkLost);
+            if self.shared.is_powered() {
+                self.shared.trips.raise(Fault::LinkLost);
             }
         }
         self.was_open = is_open;
@@ -105,20 +104,20 @@ impl Telemetry {
 
     /// The number of the session.
     fn session(&self) -> u8 {
-        shared::SESSION.load(Relaxed)
+        self.shared.session.load(Relaxed)
     }
 
     fn take_commands(&mut self) {
-        self.endpoint.set_interlocks(shared::CONDITIONS.get());
+        self.endpoint.set_interlocks(self.shared.conditions.get());
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             self.forward_orders();
         }
-        resume_interrupt();
+        B::allow_usb(true);
         self.forward_orders();
         let in_session = self.endpoint.in_session();
         if in_session && !self.in_session {
-            shared::STAGES.forget_longest();
+            self.shared.stages.forget_longest();
             // Ends whatever half frame the USB core still held from before; nothing else is in hand yet.
             let _ = self.filling.push(FRAME_END);
         }
@@ -134,7 +133,7 @@ impl Telemetry {
                 Order::Zero => SmallOrder::Zero,
                 Order::Heartbeat => SmallOrder::Heartbeat,
                 Order::Trip(fault) => {
-                    shared::TRIPS.raise(fault);
+                    self.shared.trips.raise(fault);
                     continue;
                 }
                 large @ (Order::Configure(_) | Order::Excite(_)) => {
@@ -171,17 +170,17 @@ impl Telemetry {
     /// and a stop may still be on their way to the tick, though, and an erasure would stop the processor with the amplifier
     /// on: not before it is off.
     fn save(&mut self, plan: &Plan) -> Result<(), TorqueIsOn> {
-        shared::CONDITIONS.set(Interlock::Saving, true);
-        let is_off = !shared::POWERED.load(Relaxed);
+        self.shared.conditions.set(Interlock::Saving, true);
+        let is_off = !self.shared.is_powered();
         let saved = if is_off { self.save_parts(plan) } else { Ok(()) };
-        shared::CONDITIONS.set(Interlock::Saving, false);
+        self.shared.conditions.set(Interlock::Saving, false);
         let failure = match saved {
             Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
             Err(StoreError::Full) => SaveFailure::Full,
             Err(StoreError::Flash) => SaveFailure::Flash,
             Err(StoreError::TooLong) => SaveFailure::TooLong,
         };
-        defmt::warn!("the configuration was not saved: {}", failure as u8);
+        log::warn!("the configuration was not saved: {}", failure as u8);
         self.endpoint.not_saved(self.next_tick, failure);
         Ok(())
     }
@@ -211,8 +210,8 @@ impl Telemetry {
         }
         self.endpoint.set_timing(Timing {
             clock_hz: timing::CORE_HZ,
-            stages: shared::STAGES.read(),
-            missed_ticks: shared::MISSED_TICKS.load(Relaxed),
+            stages: self.shared.stages.read(),
+            missed_ticks: self.shared.missed_ticks.load(Relaxed),
             ..Timing::default()
         });
     }
@@ -237,7 +236,7 @@ impl Telemetry {
             self.flush();
         }
         if has_sent {
-            rtic::pend(Interrupt::OTG_FS);
+            B::wake_usb();
         }
     }
 

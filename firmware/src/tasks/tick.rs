@@ -1,27 +1,28 @@
 //! The control tick: count in, code out, then everything that can wait for the code to be out.
 
 use super::queues::{SmallOrder, TickEnds, Ticked};
-use super::shared;
-use crate::board::{BoardDrive, Encoder, TickTimer};
+use super::shared::Shared;
+use crate::drive::Drive;
+use crate::port::{Board, Encoder, TickTimer};
+use crate::supervision::Task;
+use crate::timing;
 use control_core::config::DacWidth;
 use control_core::controller::TickInput;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use control_core::{Controller, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
-use cortex_m::peripheral::DWT;
-use firmware::supervision::Task;
-use firmware::timing;
 use link::frames::Stage;
 
 /// Ticks from one note of the motor's heat to the next.
 const HEAT_TICKS: u32 = 8;
 
 /// The tick's own state.
-pub(crate) struct Tick {
-    timer: TickTimer,
-    encoder: Encoder,
-    drive: BoardDrive,
+pub struct Tick<B: Board> {
+    shared: &'static Shared,
+    timer: B::Timer,
+    encoder: B::Encoder,
+    drive: BoardDrive<B>,
     controller: Controller,
     width: DacWidth,
     ends: TickEnds,
@@ -32,17 +33,20 @@ pub(crate) struct Tick {
     unsupervised_ticks: u32,
 }
 
-impl Tick {
+/// Converters and amplifier enable of a board.
+pub type BoardDrive<B> = Drive<<B as Board>::Dac12, <B as Board>::Dac8, <B as Board>::Enable>;
+
+impl<B: Board> Tick<B> {
     /// Torque off, under `plan`, with a motor as warm as `heat`.
-    pub(crate) fn new(
-        timer: TickTimer,
-        encoder: Encoder,
-        drive: BoardDrive,
+    pub fn new(
+        shared: &'static Shared,
+        (timer, encoder, drive): (B::Timer, B::Encoder, BoardDrive<B>),
         plan: &Plan,
         heat: u32,
         ends: TickEnds,
     ) -> Self {
         Self {
+            shared,
             timer,
             encoder,
             drive,
@@ -57,13 +61,25 @@ impl Tick {
         }
     }
 
+    /// The converter of the plan in force.
+    #[cfg(test)]
+    pub(super) fn width(&self) -> DacWidth {
+        self.width
+    }
+
+    /// As after so many ticks.
+    #[cfg(test)]
+    pub(super) fn set_number(&mut self, tick: u32) {
+        self.tick = tick;
+    }
+
     /// One tick.
-    pub(crate) fn run(&mut self) {
-        let entered = DWT::cycle_count();
+    pub fn run(&mut self) {
+        let entered = B::cycles();
         self.timer.acknowledge();
-        let input = TickInput { count: self.encoder.count(), tilt: shared::tilt() };
-        if !shared::TRIPS.is_empty()
-            && let Some(fault) = shared::TRIPS.take()
+        let input = TickInput { count: self.encoder.count(), tilt: self.shared.tilt() };
+        if !self.shared.trips.is_empty()
+            && let Some(fault) = self.shared.trips.take()
         {
             self.controller.order(Order::Trip(fault));
         }
@@ -72,23 +88,23 @@ impl Tick {
         let to_dac = self.timer.cycles_since_edge();
 
         // The code is out; what follows may take its time, up to the deadline.
-        shared::set_given(self.width, output.dac);
+        self.shared.set_given(self.width, output.dac);
         let powered = output.enable;
         if self.ends.outputs.enqueue(Ticked { tick: self.tick, output }).is_err() {
             // Telemetry sees the gap in the numbers and counts it.
         }
         self.tick = self.tick.wrapping_add(1);
-        if shared::POWERED.load(Relaxed) != powered {
-            shared::POWERED.store(powered, Relaxed);
-            shared::LAST_WORDS.torque(powered);
+        if self.shared.is_powered() != powered {
+            self.shared.powered.store(powered, Relaxed);
+            self.shared.last_words.torque(powered);
         }
         if self.tick.is_multiple_of(HEAT_TICKS) {
-            shared::LAST_WORDS.heat(self.controller.heat());
+            self.shared.last_words.heat(self.controller.heat());
         }
         self.watch_supervisor();
         self.take_order();
-        shared::STAGES.note(Stage::TickToDac, to_dac);
-        shared::REPORTS.alive(Task::Tick);
+        self.shared.stages.note(Stage::TickToDac, to_dac);
+        self.shared.reports.alive(Task::Tick);
         self.watch_time(entered);
     }
 
@@ -114,10 +130,10 @@ impl Tick {
 
     /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before where it could know.
     fn power_up(&mut self, session: u8, order: Order) {
-        if session != shared::SESSION.load(Relaxed) {
+        if session != self.shared.session.load(Relaxed) {
             return;
         }
-        match shared::CONDITIONS.get().first() {
+        match self.shared.conditions.get().first() {
             None => self.controller.order(order),
             Some(interlock) => self.controller.order(Order::Trip(interlock.fault())),
         }
@@ -125,7 +141,7 @@ impl Tick {
 
     /// The supervisor watches everybody; somebody has to watch the supervisor.
     fn watch_supervisor(&mut self) {
-        let supervised_ms = shared::SUPERVISED_MS.load(Relaxed);
+        let supervised_ms = self.shared.supervised_ms.load(Relaxed);
         if supervised_ms != self.supervised_ms {
             self.supervised_ms = supervised_ms;
             self.unsupervised_ticks = 0;
@@ -133,7 +149,7 @@ impl Tick {
         }
         self.unsupervised_ticks = self.unsupervised_ticks.saturating_add(1);
         if self.unsupervised_ticks >= timing::SUPERVISOR_SILENCE_TICKS {
-            shared::TRIPS.raise(Fault::Watchdog);
+            self.shared.trips.raise(Fault::Watchdog);
         }
     }
 
@@ -148,18 +164,18 @@ impl Tick {
         if self.timer.edge_waits() {
             self.missed(1);
         }
-        shared::STAGES.note(Stage::Tick, DWT::cycle_count().wrapping_sub(entered));
+        self.shared.stages.note(Stage::Tick, B::cycles().wrapping_sub(entered));
     }
 
     #[cold]
     fn missed(&self, ticks: u32) {
-        if shared::CONDITIONS.get().contains(Interlock::Saving) {
+        if self.shared.conditions.get().contains(Interlock::Saving) {
             // An erasure stops the processor, and torque is off.
             return;
         }
-        shared::MISSED_TICKS.store(shared::MISSED_TICKS.load(Relaxed).saturating_add(ticks), Relaxed);
-        if shared::POWERED.load(Relaxed) {
-            shared::TRIPS.raise(Fault::Overrun);
+        self.shared.missed_ticks.store(self.shared.missed_ticks.load(Relaxed).saturating_add(ticks), Relaxed);
+        if self.shared.is_powered() {
+            self.shared.trips.raise(Fault::Overrun);
         }
     }
 }

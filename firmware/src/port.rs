@@ -1,0 +1,103 @@
+//! What a board has to offer: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
+//! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
+
+use crate::drive::MotorDac;
+use crate::lines::PulledLines;
+use crate::monitor::Readings;
+use crate::store::ConfigFlash;
+use crate::tilt::TiltSource;
+use control_core::units::Counts;
+use embedded_hal::digital::OutputPin;
+
+/// A board: its parts, and what reaches its processor as a whole.
+pub trait Board: 'static {
+    /// The tick's timer.
+    type Timer: TickTimer;
+    /// The encoder.
+    type Encoder: Encoder;
+    /// The converter of 12 bits.
+    type Dac12: MotorDac;
+    /// The converter of 8 bits.
+    type Dac8: MotorDac;
+    /// The amplifier's enable line.
+    type Enable: OutputPin;
+    /// The encoder's lines.
+    type EncoderLines: PulledLines;
+    /// What amplifier and emergency stop say back.
+    type DriveLines: ReadDrive;
+    /// The supply.
+    type Supply: SupplyLevel;
+    /// The watchdog.
+    type Watchdog: Watchdog;
+    /// The tilt sensor.
+    type Tilt: TiltSource;
+    /// The port to the PC.
+    type Serial: SerialPort;
+    /// The configuration's flash.
+    type Flash: ConfigFlash;
+
+    /// The core's cycles, which wrap.
+    fn cycles() -> u32;
+    /// Sets the USB task off.
+    fn wake_usb();
+    /// Sets the telemetry task off.
+    fn wake_telemetry();
+    /// Sets the tilt task off.
+    fn wake_tilt();
+    /// Whether the port's own interrupt may set the USB task off.
+    fn allow_usb(allowed: bool);
+}
+
+/// The timer whose edges are the ticks.
+pub trait TickTimer {
+    /// Clears the edge that brought us here.
+    fn acknowledge(&self);
+    /// Whether the next edge has come already.
+    fn edge_waits(&self) -> bool;
+    /// Core cycles since the edge.
+    fn cycles_since_edge(&self) -> u32;
+}
+
+/// The encoder's counter.
+pub trait Encoder {
+    /// The count, which wraps.
+    fn count(&self) -> Counts;
+}
+
+/// The lines on which the drive speaks back.
+pub trait ReadDrive {
+    /// What they say now.
+    fn read(&self) -> Readings;
+}
+
+/// The supply's detector.
+pub trait SupplyLevel {
+    /// Whether the supply is below the level at which the core surely runs.
+    fn is_low(&self) -> bool;
+}
+
+/// The watchdog, which runs.
+pub trait Watchdog {
+    /// Puts the end off.
+    fn feed(&mut self);
+    /// Whether it stands still while a debugger halts the core.
+    fn stop_on_debug(&mut self, stop: bool);
+}
+
+/// What a serial port does not do now: there is nothing to read, or no room to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WouldBlock;
+
+/// A serial port on USB.
+pub trait SerialPort {
+    /// Looks at the core, once.
+    fn poll(&mut self);
+    /// Enumerated, configured and not suspended.
+    fn is_configured(&self) -> bool;
+    /// A program has it open.
+    fn is_open(&self) -> bool;
+    /// Takes a packet, with its length.
+    fn read(&mut self, packet: &mut [u8]) -> Result<usize, WouldBlock>;
+    /// Gives a packet; an empty one ends a transfer.
+    fn write(&mut self, packet: &[u8]) -> Result<(), WouldBlock>;
+}
