@@ -14,5 +14,7 @@ fn main() {
     println!("cargo::rustc-link-search={}", out.display());
     for argument in ["-Tlink.x", "-Tdefmt.x", "--nmagic"] {
         println!("cargo::rustc-link-arg-bins={argument}");
+        println!("cargo::rustc-link-arg-tests={argument}");
     }
+    println!("cargo::rustc-link-arg-tests=-Tembedded-test.x");
 }

@@ -4,6 +4,7 @@
 //! Built before everything else, hence no dependencies; it may not know how a crate works inside, only what to run.
 
 mod bench;
+mod board_test;
 mod elf;
 mod firmware;
 mod flash;
@@ -28,6 +29,7 @@ The project's chores.
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
+  cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench             measures, prints the table and writes target/bench.json
   cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
         "flash" => flash::run(rest),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
+        "board-test" => no_more(rest).and_then(|()| board_test::run()),
         "mutants" => mutants::run(rest),
         "bench" => no_more(rest).and_then(|()| bench::run()),
         other => Err(Failure::usage(format!(

@@ -9,10 +9,7 @@ use std::path::Path;
 const CRATES: [(&str, &[&str]); 3] = [
     ("control-core", &[]),
     ("link", &[]),
-    (
-        "firmware",
-        &["firmware/src/main.rs", "firmware/src/app.rs", "firmware/src/board.rs", "firmware/src/board/**"],
-    ),
+    ("firmware", &["firmware/src/main.rs", "firmware/src/app.rs", "firmware/src/board/**"]),
 ];
 /// A mutant that runs longer hangs.
 const LIMIT_S: &str = "30";

@@ -2,7 +2,7 @@
 
 use crate::setup::{self, TARGET};
 use crate::shell::{self, Failure, cargo};
-use crate::{firmware, setup::Toolchain, site, wasm};
+use crate::{board_test, firmware, setup::Toolchain, site, wasm};
 use std::fs;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -159,6 +159,7 @@ fn unit(clock: &Clock) -> Result<Ended, Failure> {
 /// The image, and the same warnings for it as for everything else.
 fn image(clock: &Clock) -> Result<Ended, Failure> {
     firmware::report(&firmware::build()?)?;
+    board_test::build()?;
     let toolchain = setup::toolchain()?;
     if toolchain == Toolchain::Debian {
         // Debian's compiler comes without clippy; the host's clippy has seen all but the tasks.

@@ -1,0 +1,143 @@
+//! The board itself: `cargo xtask board-test`, with a debug probe and a board beside it. Wire PA4 to PC2 and PE6, PE4 and PE5 to
+//! ground, plug CN5 into a PC, and leave the amplifier off.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+#![allow(unexpected_cfgs, reason = "the macro of embedded-test asks for one of its own")]
+
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+use defmt_rtt as _;
+
+#[cfg(target_os = "none")]
+#[allow(
+    unsafe_code,
+    dead_code,
+    unreachable_pub,
+    reason = "the image's own board, of which a test uses a part"
+)]
+#[path = "../src/board/mod.rs"]
+mod board;
+
+/// The words that the tasks would share.
+#[cfg(target_os = "none")]
+static SHARED: firmware::tasks::shared::Shared =
+    firmware::tasks::shared::Shared::new(&board::crash::LAST_WORDS);
+
+#[cfg(target_os = "none")]
+#[embedded_test::tests]
+mod tests {
+    use super::board::{self, Parts, Statics};
+    use control_core::config::DacWidth;
+    use control_core::controller::TickInput;
+    use control_core::event::State;
+    use control_core::units::{Counts, DacCode};
+    use control_core::{Config, Controller, Order, Plan};
+    use cortex_m::peripheral::DWT;
+    use firmware::port::{ReadDrive, SerialPort, SupplyLevel, TickTimer};
+    use firmware::timing;
+
+    /// Room for what the image keeps in its start-up task.
+    static mut STATICS: Statics = Statics::new();
+
+    #[init]
+    fn init() -> Parts {
+        let (Some(core), Some(device)) =
+            (cortex_m::Peripherals::take(), stm32f4xx_hal::pac::Peripherals::take())
+        else {
+            panic!("the peripherals are taken once")
+        };
+        // SAFETY: a test begins with a reset and calls this once.
+        #[allow(unsafe_code, static_mut_refs)]
+        board::init(core, device, unsafe { &mut STATICS })
+    }
+
+    /// Waits for the next latch of the converter, and for what it puts out to settle.
+    fn a_tick(parts: &Parts) {
+        while !parts.tick_timer.edge_waits() {}
+        parts.tick_timer.acknowledge();
+        cortex_m::asm::delay(timing::TICK_CYCLES / 2);
+    }
+
+    /// PA4 on PC2: each code comes back as itself, to both ends.
+    #[test]
+    fn the_converter_gives_code_for_code(mut parts: Parts) {
+        let plan = Plan::new(&Config::default());
+        let Ok(plan) = plan else { panic!("the default is sound") };
+        let mut output = Controller::new(plan).tick(TickInput::default());
+        output.enable = true;
+        for code in (1..=4095).step_by(23) {
+            output.dac = DacCode(code);
+            parts.drive.apply(DacWidth::Bits12, &output);
+            (0..3).for_each(|_| a_tick(&parts));
+            let Some(DacCode(back)) = parts.drive_lines.read().current else {
+                panic!("PE6 is not wired to ground")
+            };
+            parts.watchdog.feed_for_test();
+            assert!(back.abs_diff(code) < 25, "code {code} came back as {back}");
+        }
+        parts.drive.off();
+    }
+
+    #[test]
+    fn the_supply_is_high_enough_and_the_lines_are_closed(parts: Parts) {
+        assert!(
+            !parts.supply_level.is_low(),
+            "the supply is below 2.66 V: is the board powered by CN5 alone?"
+        );
+        let readings = parts.drive_lines.read();
+        assert!(!readings.stop_open && readings.ready && !readings.enable_line, "PE4, PE5 or PD7");
+    }
+
+    /// Cycles of the control law by state, over an insertion and a withdrawal.
+    #[test]
+    fn the_law_takes_its_cycles(mut parts: Parts) {
+        let Ok(plan) = Plan::new(&Config::default()) else { panic!("the default is sound") };
+        let mut controller = Controller::new(plan);
+        controller.order(Order::Start);
+        let mut longest = [0_u32; 8];
+        for tick in 0..20_000_i32 {
+            controller.order(Order::Heartbeat);
+            let count = if tick < 10_000 { tick / 16 - 60 } else { (20_000 - tick) / 16 - 60 };
+            let entered = DWT::cycle_count();
+            let output = controller.tick(TickInput { count: Counts(count), ..TickInput::default() });
+            let cycles = DWT::cycle_count().wrapping_sub(entered);
+            if let Some(place) = longest.get_mut(usize::from(output.sample.state)) {
+                *place = cycles.max(*place);
+            }
+            parts.watchdog.feed_for_test();
+        }
+        for (state, cycles) in longest.iter().enumerate() {
+            defmt::println!("state {}: {} cycles at the most", state, cycles);
+        }
+        assert!(longest[State::Elastic as usize] > 100, "it was pressed");
+        assert!(longest.iter().all(|&cycles| cycles < timing::OUTPUT_CYCLES), "later than the latch");
+    }
+
+    #[test]
+    fn a_configuration_is_saved_and_found_again(mut parts: Parts) {
+        let mut config = Config::default();
+        config.limits.fade_in_ms = 301;
+        assert!(parts.store.save(&config).is_ok(), "saved");
+        config.limits.fade_in_ms = 302;
+        assert!(parts.store.save(&config).is_ok(), "saved again");
+    }
+
+    /// CN5 in a PC: configured within five seconds. Prints the longest look at the core, which masks the tick at worst.
+    #[test]
+    #[timeout(10)]
+    fn usb_enumerates(mut parts: Parts) {
+        let (mut longest, mut is_configured) = (0, false);
+        for _ in 0..5_000 {
+            let entered = DWT::cycle_count();
+            parts.serial.poll();
+            longest = DWT::cycle_count().wrapping_sub(entered).max(longest);
+            is_configured |= parts.serial.is_configured();
+            parts.watchdog.feed_for_test();
+            cortex_m::asm::delay(timing::CORE_HZ / 1_000);
+        }
+        defmt::println!("longest look at the USB core: {} cycles", longest);
+        assert!(is_configured, "no PC has configured the device: is CN5 plugged in?");
+        assert!(longest < timing::OUTPUT_CYCLES, "it masks the tick beyond its latch");
+    }
+}
