@@ -143,8 +143,14 @@ impl SpeedEstimator {
         if silent > REST_TICKS {
             return MillimetresPerSecond::default();
         }
-        // Waiting for the next edge bounds the speed from above: it cannot have been less than `silent` away.
-        scale.speed(self.span.count, self.span.tick.max(silent))
+        // Waiting for the next edge bounds the speed from above: it is less than a count in `silent`, however many counts
+        // came before.
+        let Edge { tick, count } = self.span;
+        if silent.wrapping_mul(count.unsigned_abs()) > tick {
+            scale.speed(count.signum(), silent)
+        } else {
+            scale.speed(count, tick)
+        }
     }
 
     fn edge(&self, number: usize) -> Edge {
@@ -237,6 +243,21 @@ mod tests {
         near(399, 156.25 / 4.0);
         near(1_399, 156.25 / 100.0);
         near(899, 156.25 / 100.0);
+    }
+
+    /// A needle that stops at once: what has not moved by a count in a time is slower than a count in that time.
+    #[test]
+    fn after_an_abrupt_stop_speed_is_less_than_a_count_in_the_time_since() {
+        // Three counts in four ticks are 117 mm/s; a count a tick is 156.25.
+        let speeds: Vec<f64, 1_400> =
+            speeds((1..=400).map(|tick| 3 * tick / 4).chain(core::iter::repeat_n(300, 900))).collect();
+        let before = speeds.get(399).copied().unwrap_or_default();
+        assert!((before - 117.2).abs() < 2.0, "{before} mm/s");
+        for silent in 3..900_u32 {
+            let speed = speeds.get(399 + silent as usize).copied().unwrap_or(f64::MAX);
+            let bound = 156.25 / f64::from(silent);
+            assert!(speed <= bound * 1.001, "{speed} mm/s, {silent} ticks after the last count");
+        }
     }
 
     #[test]

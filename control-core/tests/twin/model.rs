@@ -291,7 +291,10 @@ impl Twin {
         let inside = remembered.iter().filter(|e| (1..=128).contains(&age(e))).max_by_key(age);
         let before = remembered.iter().filter(|e| age(e) > 128 && age(e) <= 1000).min_by_key(age);
         let first = *inside.or(before).unwrap_or(&self.last_edge);
-        let span = (self.last_edge.0 - first.0).max(silent).max(1);
-        f64::from(self.last_edge.1 - first.1) * self.mm_per_count * 10_000.0 / span as f64
+        let (counts, ticks) =
+            (f64::from(self.last_edge.1 - first.1), (self.last_edge.0 - first.0).max(1) as f64);
+        let since = silent as f64;
+        let per_tick = if since * counts.abs() > ticks { counts.signum() / since } else { counts / ticks };
+        per_tick * self.mm_per_count * 10_000.0
     }
 }
