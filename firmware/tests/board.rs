@@ -32,7 +32,7 @@ mod tests {
     use control_core::controller::TickInput;
     use control_core::event::State;
     use control_core::units::{Counts, DacCode};
-    use control_core::{Config, Controller, Order, Plan};
+    use control_core::{Controller, Device, Order, Patient, Plan};
     use cortex_m::peripheral::DWT;
     use firmware::port::{ReadDrive, SerialPort, SupplyLevel, TickTimer};
     use firmware::timing;
@@ -62,7 +62,7 @@ mod tests {
     /// PA4 on PC2: each code comes back as itself, to both ends.
     #[test]
     fn the_converter_gives_code_for_code(mut parts: Parts) {
-        let plan = Plan::new(&Config::default());
+        let plan = Plan::new(&Device::default(), &Patient::default());
         let Ok(plan) = plan else { panic!("the default is sound") };
         let mut output = Controller::new(plan).tick(TickInput::default());
         output.enable = true;
@@ -92,7 +92,9 @@ mod tests {
     /// Cycles of the control law by state, over an insertion and a withdrawal.
     #[test]
     fn the_law_takes_its_cycles(mut parts: Parts) {
-        let Ok(plan) = Plan::new(&Config::default()) else { panic!("the default is sound") };
+        let Ok(plan) = Plan::new(&Device::default(), &Patient::default()) else {
+            panic!("the default is sound")
+        };
         let mut controller = Controller::new(plan);
         controller.order(Order::Start);
         let mut longest = [0_u32; 8];
@@ -116,11 +118,11 @@ mod tests {
 
     #[test]
     fn a_configuration_is_saved_and_found_again(mut parts: Parts) {
-        let mut config = Config::default();
-        config.limits.fade_in_ms = 301;
-        assert!(parts.store.save(&config).is_ok(), "saved");
-        config.limits.fade_in_ms = 302;
-        assert!(parts.store.save(&config).is_ok(), "saved again");
+        let mut device = Device::default();
+        device.limits.fade_in_ms = 301;
+        assert!(parts.store.save_device(&device).is_ok(), "saved");
+        device.limits.fade_in_ms = 302;
+        assert!(parts.store.save_device(&device).is_ok(), "saved again");
     }
 
     /// CN5 in a PC: configured within five seconds. Prints the longest look at the core, which masks the tick at worst.
