@@ -16,6 +16,9 @@ fn mrad(degrees: f64) -> Milliradians {
     Milliradians((degrees.to_radians() * 1e3).round() as i16)
 }
 
+/// A layer, and the path in mm at which it was met.
+type Met = (u8, f64);
+
 /// A needle at an angle, which goes where it is told at 10 mm/s.
 struct Needle {
     core: Controller,
@@ -48,7 +51,7 @@ impl Needle {
     }
 
     /// Where each layer is touched and where it gives way on the way to `mm`.
-    fn met(&mut self, mm: f64) -> (Vec<(u8, f64)>, Vec<(u8, f64)>) {
+    fn met(&mut self, mm: f64) -> (Vec<Met>, Vec<Met>) {
         let (mut contacts, mut punctures) = (Vec::new(), Vec::new());
         self.go(mm, |out| {
             let at = out.depth.0.to_num::<f64>();
