@@ -88,6 +88,12 @@ pub struct Ends {
     pub telemetry: TelemetryEnds,
 }
 
+impl Default for Queues {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Queues {
     /// All empty.
     pub const fn new() -> Self {

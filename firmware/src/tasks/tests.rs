@@ -322,8 +322,7 @@ fn the_tick_does_not_start_under_an_interlock_and_says_why() {
 #[test]
 fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let (mut tick, shared, mut telemetry) = tick();
-    let mut eight = Device::default();
-    eight.dac = DacWidth::Bits8;
+    let eight = Device { dac: DacWidth::Bits8, ..Device::default() };
     let eight = Plan::new(&eight, &Patient::default()).unwrap();
     let configure = |telemetry: &mut TelemetryEnds| {
         assert!(telemetry.large_orders.enqueue(control_core::Order::Configure(eight.clone())).is_ok());
@@ -593,11 +592,11 @@ impl Desk {
 
     fn answer(&mut self, command: Command) -> Result<(), Rejection> {
         let id = self.say(command);
-        let acks = self.turn().into_iter().filter_map(|frame| match frame {
+        let mut acks = self.turn().into_iter().filter_map(|frame| match frame {
             DeviceFrame::Ack(ack) if ack.id == id => Some(ack.result),
             _ => None,
         });
-        acks.last().unwrap()
+        acks.next_back().unwrap()
     }
 }
 
