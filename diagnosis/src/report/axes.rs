@@ -55,7 +55,7 @@ pub(crate) fn frame(
         (px, py.clamp(0.0, HIGH))
     };
     let step = |ticks: &[f64]| if let [a, b, ..] = ticks { b - a } else { 1.0 };
-    let up = ticks(y.0, y.1, 4.0);
+    let up = ticks(y.0, y.1, 6.0);
     for value in &up {
         let (_, py) = at(x.0, *value);
         let _ = write!(

@@ -5,6 +5,8 @@ pub(crate) mod conclude;
 pub mod exports;
 mod form_in_words;
 pub(crate) mod free_form;
+#[cfg(test)]
+mod golden;
 mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;

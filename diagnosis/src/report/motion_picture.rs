@@ -1,7 +1,7 @@
 //! What a person means by "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
 
 use crate::numerics::digits::short;
-use crate::report::axes::{frame, safe};
+use crate::report::axes::{HIGH, frame, safe};
 use crate::simulation::comparison::{Comparison, Figures, Off};
 use std::fmt::Write as _;
 
@@ -37,6 +37,11 @@ fn line(out: &mut String, class: &str, time: &[f64], values: &[f64], at: &impl F
     let mut pen = 'M';
     for (t, x) in time.iter().zip(values).step_by(every) {
         let (px, py) = at(*t, *x);
+        // It has left the picture.
+        if py <= 0.0 || py >= HIGH {
+            pen = 'M';
+            continue;
+        }
         let _ = write!(out, "{pen}{px:.1} {py:.1}");
         pen = 'L';
     }

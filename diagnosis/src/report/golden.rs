@@ -1,0 +1,57 @@
+//! The sentence of every verdict, word for word: people read them, and whoever changes one sees it here.
+
+use crate::effects::EffectName as N;
+use crate::io::rig::{Kind, Rig};
+use crate::io::schema::{Both, Named, Place, Region, Report, Verdict};
+use crate::report::outcome::{Outcome, sentence};
+use std::collections::BTreeMap;
+
+fn named(name: N, confidence: f64, class: &[N], states: Vec<Region>) -> Named {
+    Named {
+        name,
+        class: class.to_vec(),
+        subsystem: name.subsystem(),
+        confidence,
+        parameters: BTreeMap::new(),
+        place: Place { recordings: Vec::new(), states },
+        separating_experiment: None,
+    }
+}
+
+/// A report of a verdict over a force of 1 N·m: 0.4 stands, 0.2 refitted, 0.05 patched.
+fn report(verdict: Verdict, reason: Option<&str>, effects: Vec<Named>) -> Report {
+    let mut report = Outcome::cannot_tell(&Rig::of_values(1e-3, 1e-3, 1e-2), "nothing yet".into()).report;
+    (report.verdict, report.effects) = (verdict, effects);
+    report.reason = reason.map(str::to_owned);
+    let both = |x: f64| Both { fit: x, holdout: x };
+    let fit = &mut report.fit;
+    (fit.nominal, fit.refit, fit.patched, fit.force_rms) = (both(0.4), both(0.2), both(0.05), both(1.0));
+    report
+}
+
+#[test]
+fn every_verdict_says_its_sentence() {
+    let region = Region { variable: "speed".into(), low: 0.02, high: 1.5 };
+    let found = vec![
+        named(N::CoulombFriction, 0.97, &[N::CoulombFriction, N::AsymmetricFriction], vec![region]),
+        named(N::ElectricalLag, 0.91, &[N::ElectricalLag], Vec::new()),
+    ];
+    let rest = "a.csv is at rest: it moves by 0 counts in all; record a motion of some turns";
+    let cases = [
+        (report(Verdict::MissingPhysics, None, found), include_str!("golden/missing_physics.txt")),
+        (report(Verdict::NoMismatch, None, Vec::new()), include_str!("golden/no_mismatch.txt")),
+        (report(Verdict::ParametersOnly, None, Vec::new()), include_str!("golden/parameters_only.txt")),
+        (
+            report(Verdict::Unexplained, Some("a force that swings by itself at 50 Hz is left"), Vec::new()),
+            include_str!("golden/unexplained.txt"),
+        ),
+        (report(Verdict::RandomDisturbance, None, Vec::new()), include_str!("golden/random_disturbance.txt")),
+        (
+            report(Verdict::InsufficientExcitation, Some(rest), Vec::new()),
+            include_str!("golden/insufficient_excitation.txt"),
+        ),
+    ];
+    for (report, golden) in cases {
+        assert_eq!(sentence(&report, Kind::Rotary), golden.trim_end(), "{:?}", report.verdict);
+    }
+}
