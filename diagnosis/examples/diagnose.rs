@@ -10,8 +10,12 @@ fn main() {
         std::process::exit(2);
     }
     let list = |text: &str| text.split(',').map(PathBuf::from).collect();
-    let request =
-        Request { rig: PathBuf::from(&arguments[0]), fit: list(&arguments[1]), holdout: list(&arguments[2]) };
+    let request = Request {
+        rig: PathBuf::from(&arguments[0]),
+        fit: list(&arguments[1]),
+        holdout: list(&arguments[2]),
+        ..Request::default()
+    };
     let start = std::time::Instant::now();
     match diagnose(&request, &|_, _| ()) {
         Ok(outcome) => {

@@ -32,7 +32,7 @@ use rig::Rig;
 use std::path::PathBuf;
 
 /// What to diagnose.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Request {
     /// `rig.toml`.
     pub rig: PathBuf,
@@ -40,6 +40,8 @@ pub struct Request {
     pub fit: Vec<PathBuf>,
     /// Recordings that only judge.
     pub holdout: Vec<PathBuf>,
+    /// A file of formulas that are searched too.
+    pub effects: Option<PathBuf>,
 }
 
 /// Reads, diagnoses and concludes. `progress` hears the stage and the fraction done.
@@ -48,7 +50,14 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     if request.fit.is_empty() || request.holdout.is_empty() {
         return Err(InputError::new("at least one recording to fit and one to hold out are needed"));
     }
-    let rig = Rig::read(&request.rig)?;
+    let mut rig = Rig::read(&request.rig)?;
+    if let Some(path) = &request.effects {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|cause| {
+            InputError::new(format!("{file}: the effects cannot be read ({cause}); check its path"))
+        })?;
+        rig.searched = effects::read_effects(&text, &file).map_err(InputError::new)?;
+    }
     let read =
         |paths: &[PathBuf]| paths.iter().map(|path| Recording::read(path)).collect::<Result<Vec<_>, _>>();
     let (fit, holdout) = (read(&request.fit)?, read(&request.holdout)?);

@@ -205,7 +205,8 @@ fn files_and_keys_that_are_mistaken_are_refused_with_their_place() {
         ("unfilled.toml", "fit.csv", "holdout.csv", "model.inertia is still to be filled in"),
     ];
     for (rig, fit, holdout, sentence) in cases {
-        let request = Request { rig: path(rig), fit: vec![path(fit)], holdout: vec![path(holdout)] };
+        let request =
+            Request { rig: path(rig), fit: vec![path(fit)], holdout: vec![path(holdout)], effects: None };
         let error = diagnose(&request, &|_, _| ()).expect_err(sentence).to_string();
         assert!(error.contains(sentence), "should say \"{sentence}\": {error}");
         assert!(!error.contains('\n'), "{error}");

@@ -18,7 +18,7 @@ fn shared(name: &str) -> Option<PathBuf> {
 
 fn run(dir: &std::path::Path, fit: &[&str], held: &[&str]) -> Outcome {
     let list = |names: &[&str]| names.iter().map(|name| dir.join(name)).collect();
-    let request = Request { rig: dir.join("rig.toml"), fit: list(fit), holdout: list(held) };
+    let request = Request { rig: dir.join("rig.toml"), fit: list(fit), holdout: list(held), effects: None };
     diagnose(&request, &|_, _| ()).expect("the recordings are usable")
 }
 

@@ -24,6 +24,7 @@ fn find(hidden: Option<Effect>, folder: &str) -> diagnosis::Outcome {
     let request = diagnosis::Request {
         rig: rig.clone(),
         fit: vec![fit.clone(), fit2.clone()],
+        effects: None,
         holdout: vec![holdout.clone()],
     };
     let outcome = diagnosis::diagnose(&request, &|_, _| {}).expect("the recordings are sound");

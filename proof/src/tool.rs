@@ -43,6 +43,7 @@ impl Tool for Diagnosis {
         let request = diagnosis::Request {
             rig: paths.rig.clone(),
             fit: paths.fit.clone(),
+            effects: None,
             holdout: paths.holdout.clone(),
         };
         let outcome = diagnosis::diagnose(&request, &|_, _| {}).map_err(|e| e.to_string())?;

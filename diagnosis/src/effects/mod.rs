@@ -8,18 +8,20 @@ mod bristles;
 mod command;
 pub(crate) mod definition;
 pub(crate) mod experiments;
+mod formula;
 mod law;
 mod load;
 mod travel_profile;
 mod waves;
 
 pub use command::CommandLaw;
+pub use formula::{Formula, FormulaId, FormulaText, read_effects};
 pub(crate) use law::wave_mean;
 pub use law::{Law, State};
 pub use table::{Table, Variable};
 
 use definition::Definition;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -39,21 +41,24 @@ macro_rules! registry {
         $(mod $module;)*
 
         /// The effects, by the name that the report uses: that of the file which defines it.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-        #[serde(rename_all = "snake_case")]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[allow(missing_docs)]
-        pub enum EffectName { $($variant,)* }
+        pub enum EffectName {
+            $($variant,)*
+            /// A formula of a user's own, under a name of its own.
+            Formula(FormulaId),
+        }
 
         impl EffectName {
-            /// All of them.
+            /// All that are built in.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
             /// The name in reports.
-            pub fn as_str(self) -> &'static str { match self { $(Self::$variant => stringify!($module),)* } }
+            pub fn as_str(self) -> &'static str { match self { $(Self::$variant => stringify!($module),)* Self::Formula(id) => id.get().name() } }
 
             /// What it is.
             pub(crate) fn definition(self) -> &'static dyn Definition {
-                match self { $(Self::$variant => &$module::Defined,)* }
+                match self { $(Self::$variant => &$module::Defined,)* Self::Formula(id) => id.get() }
             }
         }
     };
@@ -90,6 +95,19 @@ registry! {
 }
 
 impl EffectName {
+    /// The effect of a name in a report: built in, or a formula that has been read.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|known| known.as_str() == name).or_else(|| formula::find(name))
+    }
+
+    /// The formula behind a name of a user's own.
+    pub fn formula(self) -> Option<&'static Formula> {
+        match self {
+            Self::Formula(id) => Some(id.get()),
+            _ => None,
+        }
+    }
+
     /// Where it sits.
     pub fn subsystem(self) -> Subsystem {
         self.definition().subsystem()
@@ -101,6 +119,20 @@ impl EffectName {
     }
 }
 
+impl Serialize for EffectName {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.as_str())
+    }
+}
+
+impl<'de> Deserialize<'de> for EffectName {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(from)?;
+        Self::find(&name)
+            .ok_or_else(|| serde::de::Error::custom(format!("{name} is no effect that is known")))
+    }
+}
+
 impl fmt::Display for EffectName {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(self.as_str())
@@ -109,18 +141,87 @@ impl fmt::Display for EffectName {
 
 /// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients` linearly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "InFile", into = "InFile")]
 pub struct Effect {
     /// Which effect.
     pub name: EffectName,
     /// What enters non-linearly, by name; SI units, command units or cycles per turn.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shape: BTreeMap<String, f64>,
     /// What enters linearly, by the name of its term; force units or relative.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub coefficients: BTreeMap<String, f64>,
     /// The force itself, where it has no name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub table: Option<Table>,
+}
+
+/// An effect as a rig file has it: a formula brings its text.
+#[derive(Serialize, Deserialize)]
+struct InFile {
+    name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    title: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    formula: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    words: Option<String>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    parameters: BTreeMap<String, [f64; 2]>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    shape: BTreeMap<String, f64>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    coefficients: BTreeMap<String, f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    table: Option<Table>,
+}
+
+/// The name that a rig file gives to every formula.
+const FORMULA: &str = "formula";
+
+impl From<Effect> for InFile {
+    fn from(effect: Effect) -> Self {
+        let Effect { name, shape, coefficients, table } = effect;
+        let text = name.formula().map(|formula| formula.text.clone());
+        let plain = if text.is_some() { FORMULA } else { name.as_str() };
+        let (title, formula) =
+            (text.as_ref().map(|t| t.title.clone()), text.as_ref().map(|t| t.formula.clone()));
+        let words = text.as_ref().map(|t| t.words.clone()).filter(|words| !words.is_empty());
+        let parameters = text.map(|t| t.parameters).unwrap_or_default();
+        Self { name: plain.to_owned(), title, formula, words, parameters, shape, coefficients, table }
+    }
+}
+
+impl TryFrom<InFile> for Effect {
+    type Error = String;
+
+    fn try_from(file: InFile) -> Result<Self, String> {
+        let InFile { name, title, formula, words, mut parameters, shape, coefficients, table } = file;
+        if name != FORMULA {
+            let known =
+                EffectName::find(&name).ok_or_else(|| format!("{name} is no effect that is known"))?;
+            return Ok(Self { name: known, shape, coefficients, table });
+        }
+        let formula =
+            formula.ok_or("an effect of name formula needs the formula itself, as formula = \"-a*v\"")?;
+        let mut values = shape;
+        values.extend(coefficients);
+        for (key, value) in values.iter().filter(|(key, _)| *key != "scale") {
+            // Values without bounds may be anything of their size.
+            parameters.entry(key.clone()).or_insert([value - value.abs() - 1.0, value + value.abs() + 1.0]);
+        }
+        let title = title.unwrap_or_else(|| FORMULA.to_owned());
+        let text = FormulaText { title, formula, parameters, words: words.unwrap_or_default() };
+        let name = Formula::register(text)?;
+        let mut effect = Self::shaped(name, &[]);
+        let terms = name.formula().map(|f| f.terms()).unwrap_or_default();
+        for (key, value) in values {
+            let place = if terms.contains(&key) { &mut effect.coefficients } else { &mut effect.shape };
+            place.insert(key, value);
+        }
+        if terms == ["scale"] {
+            effect.coefficients.entry("scale".into()).or_insert(1.0);
+        }
+        Ok(effect)
+    }
 }
 
 impl Effect {
@@ -180,6 +281,12 @@ impl Effect {
         for (key, value) in self.shape.iter().chain(&self.coefficients) {
             if !value.is_finite() || value.abs() > 1e30 {
                 return Err(format!("{key} must be a finite number"));
+            }
+        }
+        if let Some(formula) = self.name.formula() {
+            let missing = formula.shape().iter().find(|(key, _, _)| !self.shape.contains_key(*key));
+            if let Some((key, _, _)) = missing {
+                return Err(format!("its parameter {key} has no value; give it as shape.{key}"));
             }
         }
         for key in self.name.definition().needed() {

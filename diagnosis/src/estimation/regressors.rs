@@ -21,7 +21,8 @@ pub(crate) fn effect_inputs(
     }
     let count = law.names().len();
     let n = track.blocks();
-    let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command));
+    let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
+        || effect.name.formula().is_some_and(|formula| formula.uses("u"));
     let carried = (over_command || effect.shape.contains_key("of_drive")).then(|| track.block_mean(command));
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];

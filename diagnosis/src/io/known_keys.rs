@@ -1,13 +1,12 @@
 //! The keys of a rig file: one that is misspelt is named with the nearest that is known.
 
 /// Tables and their keys, as the contract has them.
-const KEYS: [(&str, &[&str]); 6] = [
+const KEYS: [(&str, &[&str]); 5] = [
     ("", &["format", "name", "kind", "model", "uncertainty", "actuator", "encoder", "effect"]),
     ("model", &["inertia", "viscous", "coulomb", "offset", "weight", "gravity", "gravity_zero"]),
     ("uncertainty", &["inertia", "viscous", "coulomb", "offset", "weight", "gravity", "gain"]),
     ("actuator", &["gain", "command_unit", "limit", "delay_s", "lag_s"]),
     ("encoder", &["counts_per_unit", "absolute", "noise_counts", "filter_s", "turn", "start_spread"]),
-    ("effect", &["name", "shape", "coefficients", "formula", "table"]),
 ];
 
 /// Changes of a letter that lead from one word to another (Levenshtein).
@@ -31,7 +30,6 @@ pub(crate) fn unknown(rig: &toml::Table) -> Option<String> {
         let inside: Vec<&toml::Table> = match (table, rig.get(table)) {
             ("", _) => vec![rig],
             (_, Some(toml::Value::Table(inside))) => vec![inside],
-            (_, Some(toml::Value::Array(all))) => all.iter().filter_map(toml::Value::as_table).collect(),
             _ => continue,
         };
         let found = inside.iter().flat_map(|t| t.keys()).find(|key| !keys.contains(&key.as_str()));

@@ -153,6 +153,9 @@ pub struct Rig {
     /// Effects beside the nominal model; in a patched rig only.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<Effect>,
+    /// Formulas that are searched too.
+    #[serde(skip)]
+    pub searched: Vec<EffectName>,
 }
 
 /// Uncertainty assumed where the rig declares none: a data-sheet value for what is easily measured, a guess for friction.

@@ -22,6 +22,20 @@ pub(crate) fn check(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Resu
             without.file
         )));
     }
+    for formula in
+        rig.searched.iter().chain(rig.effects.iter().map(|e| &e.name)).filter_map(|name| name.formula())
+    {
+        if formula.uses("tilt")
+            && let Some(without) = fit.iter().chain(holdout).find(|r| r.tilt_rad.is_none())
+        {
+            return Err(InputError::new(format!(
+                "effect {}: formula \"{}\" needs the tilt and {} has no column tilt_rad; record the tilt, or leave the effect out",
+                formula.name(),
+                formula.text.formula,
+                without.file
+            )));
+        }
+    }
     Ok(())
 }
 

@@ -65,6 +65,11 @@ struct Joint {
 
 /// Numbers of an effect, for a note.
 fn numbers(effect: &Effect) -> String {
+    if let Some(formula) = effect.name.formula() {
+        let values = effect.shape.iter().chain(&effect.coefficients);
+        let values: Vec<String> = values.map(|(key, value)| format!("{key} {value:.6e}")).collect();
+        return format!("{}, {}", formula.text.formula, values.join(", "));
+    }
     let all = effect.shape.iter().chain(&effect.coefficients);
     all.map(|(key, value)| format!("{key} {value:.6e}")).collect::<Vec<_>>().join(", ")
 }

@@ -154,7 +154,8 @@ impl FitContext<'_> {
             let worth = gain - cost(&effect, self.tracks.len(), self.span);
             (worth > 0.0).then_some((effect, worth))
         };
-        let mut found: Vec<(Effect, f64)> = N::ALL.par_iter().filter_map(best_of).collect();
+        let all: Vec<N> = N::ALL.iter().chain(&self.nominal.rig.searched).copied().collect();
+        let mut found: Vec<(Effect, f64)> = all.par_iter().filter_map(best_of).collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
     }

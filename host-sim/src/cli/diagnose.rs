@@ -23,6 +23,9 @@ pub(crate) struct Diagnose {
     /// A recording that only judges; again for more
     #[arg(long, required = true, value_name = "FILE.csv")]
     holdout: Vec<PathBuf>,
+    /// Formulas of your own that are searched too
+    #[arg(long, value_name = "F.toml")]
+    effects: Option<PathBuf>,
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -34,7 +37,7 @@ pub(crate) struct Diagnose {
 impl Diagnose {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let formats = super::export::formats(&self.export)?;
-        let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout };
+        let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout, effects: self.effects };
         let bar = Mutex::new(Progress::new("diagnosing"));
         let show = |stage: &str, done: f64| {
             if let Ok(mut bar) = bar.lock() {

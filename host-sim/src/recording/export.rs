@@ -152,6 +152,7 @@ pub fn rig(name: &str, hello: &Hello) -> Rig {
             ..Encoder::default()
         },
         effects: Vec::new(),
+        searched: Vec::new(),
     }
 }
 
