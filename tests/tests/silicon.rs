@@ -86,6 +86,8 @@ fn a_sector_is_erased_with_the_amplifier_off_only() {
         rig.pc.send(&mut rig.board, Command::Start);
         rig.pc.run_ms(&mut rig.board, 3);
         rig.pc.send(&mut rig.board, Command::Stop);
+        // By then the link knows that torque is off, and only just.
+        rig.pc.run_ms(&mut rig.board, 2);
         config.device.limits.fade_in_ms = 300 + number;
         rig.pc.send(&mut rig.board, Command::ConfigureDevice(config.device));
         rig.pc.run_ms(&mut rig.board, 12);
