@@ -1,5 +1,6 @@
 //! A score test for every candidate in turn, and nothing that speaks against it: no rival in its place, no free form, no
-//! held-out recording. The variance of a score is the scatter of its blocks, so that autocorrelated noise counts once.
+//! held-out recording. The variance of a score is the scatter of its blocks with the candidate in the model, so that
+//! autocorrelated noise counts once.
 
 use super::estimate::Table;
 use super::features::Feature;
@@ -54,25 +55,27 @@ fn score(
     members: &[usize],
 ) -> f64 {
     let k = members.len();
+    let with = normal.solve(&[active, members].concat(), &[]);
     let shadows: Vec<Vec<f64>> = members.iter().map(|m| normal.regress(active, *m)).collect();
     let (mut sum, mut scatter) = (vec![0.0; k], Normal::new(k));
     for (table, columns) in tables.iter().zip(columns).take(2) {
         let block = (BLOCK / table.band * table.rate) as usize;
         let mut own = vec![0.0; k];
         let mut until = block;
-        for (j, (i, left)) in left_over(columns, table, fitted).enumerate() {
+        let rows = left_over(columns, table, fitted).zip(left_over(columns, table, &with));
+        for (j, ((i, before), (_, after))) in rows.enumerate() {
             if i >= until {
-                sum.iter_mut().zip(&own).for_each(|(s, o)| *s += o);
                 scatter.add(&own, 0.0);
                 own.fill(0.0);
                 until = i + block;
             }
-            for ((own, member), shadow) in own.iter_mut().zip(members).zip(&shadows) {
+            for (m, (member, shadow)) in members.iter().zip(&shadows).enumerate() {
                 let known: f64 = active.iter().map(|a| columns[*a][j] * shadow[*a]).sum();
-                *own += left * (columns[*member][j] - known);
+                let alone = columns[*member][j] - known;
+                sum[m] += before * alone;
+                own[m] += after * alone;
             }
         }
-        sum.iter_mut().zip(&own).for_each(|(s, o)| *s += o);
         scatter.add(&own, 0.0);
     }
     let all: Vec<usize> = (0..k).collect();
