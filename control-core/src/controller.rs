@@ -18,6 +18,9 @@ use crate::units::{
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
+/// Of eight ticks, the one in which the watch takes the count.
+const LOOK_TURN: u32 = 4;
+
 /// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
 const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
 
@@ -232,9 +235,13 @@ impl Controller {
             None => (MillinewtonMetres::default(), Limits::default()),
         };
         self.winding.tick(torque);
-        // A tick in which a wall gives way is long enough.
-        if transitions.puncture == 0 {
-            self.take_turn(count, torque);
+        self.turn = (self.turn + 1) % 8;
+        if self.turn == LOOK_TURN {
+            // Always at its time, for speeds are taken from it.
+            self.runaway.take(count.0, torque.0);
+        } else if transitions.puncture == 0 {
+            // A tick in which a wall gives way is long enough.
+            self.take_turn();
         }
         let codes = self.plan.dac.codes(torque);
         let state = match self.mode {
@@ -264,15 +271,14 @@ impl Controller {
     }
 
     /// What is slow enough to be done in one tick of eight, each in another one.
-    fn take_turn(&mut self, count: Counts, torque: MillinewtonMetres) {
-        const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8, "the turns below") };
-        self.turn = (self.turn + 1) % 8;
+    fn take_turn(&mut self) {
+        const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
         let fault = match self.turn {
             0 => return self.winding.warm(&self.plan.thermal),
             2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
-            4 => self.runaway.look(&self.plan.runaway, count.0),
-            5 => self.runaway.judge(&self.plan.runaway, torque.0),
-            6 => self.runaway.count_turns(),
+            5 => self.runaway.look(&self.plan.runaway),
+            6 => self.runaway.judge(&self.plan.runaway),
+            7 => self.runaway.count_turns(),
             _ => return,
         };
         if let Some(fault) = fault

@@ -80,8 +80,9 @@ impl Bounds {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Watch {
     counts: [i32; LOOKS],
-    /// Torque at each look, without its sign.
+    /// Torque at each look.
     torques: [I16F16; LOOKS],
+    /// The place of the latest look, from 0 on without end.
     next: usize,
     /// Counts that the last span has more than the one before it.
     gained: i32,
@@ -105,29 +106,38 @@ impl Watch {
         is_back
     }
 
-    /// A look at `count`: too fast. What the needle has gained is kept for [`Self::judge`].
-    pub(crate) fn look(&mut self, bounds: &Bounds, count: i32) -> Option<Fault> {
-        let at =
-            |looks: usize| self.counts.get(self.next.wrapping_sub(looks) % LOOKS).copied().unwrap_or(count);
-        let (middle, first) = (at(SPAN_LOOKS), at(2 * SPAN_LOOKS));
-        let speed = count.wrapping_sub(middle);
-        self.gained = speed.wrapping_sub(middle.wrapping_sub(first));
-        if let Some(place) = self.counts.get_mut(self.next % LOOKS) {
-            *place = count;
+    /// Takes the count and the torque in mN·m of a look, which the next three ticks judge.
+    pub(crate) fn take(&mut self, count: i32, torque: I16F16) {
+        self.next = self.next.wrapping_add(1);
+        let place = self.next % LOOKS;
+        if let (Some(last), Some(given)) = (self.counts.get_mut(place), self.torques.get_mut(place)) {
+            (*last, *given) = (count, torque);
         }
+    }
+
+    fn count(&self, looks_ago: usize) -> i32 {
+        self.counts.get(self.next.wrapping_sub(looks_ago) % LOOKS).copied().unwrap_or_default()
+    }
+
+    fn torque(&self, looks_ago: usize) -> I16F16 {
+        self.torques.get(self.next.wrapping_sub(looks_ago) % LOOKS).copied().unwrap_or_default()
+    }
+
+    /// Too fast. What the needle has gained is kept for [`Self::judge`].
+    pub(crate) fn look(&mut self, bounds: &Bounds) -> Option<Fault> {
+        let middle = self.count(SPAN_LOOKS);
+        let speed = self.count(0).wrapping_sub(middle);
+        self.gained = speed.wrapping_sub(middle.wrapping_sub(self.count(2 * SPAN_LOOKS)));
         (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)
     }
 
-    /// The same look's other half, a tick later, under `torque` in mN·m: against the motor.
-    pub(crate) fn judge(&mut self, bounds: &Bounds, torque: I16F16) -> Option<Fault> {
-        let strength = torque.saturating_abs();
-        let first = self.next.wrapping_sub(2 * SPAN_LOOKS) % LOOKS;
-        let before = self.torques.get(first).copied().unwrap_or(strength);
-        if let Some(place) = self.torques.get_mut(self.next % LOOKS) {
-            *place = strength;
-        }
-        self.next = self.next.wrapping_add(1);
-        let against = if torque.is_negative() { self.gained } else { self.gained.wrapping_neg() };
+    /// Against the motor.
+    pub(crate) fn judge(&mut self, bounds: &Bounds) -> Option<Fault> {
+        // Taken, so that a look which a puncture kept from being looked at is not judged by the one before it.
+        let gained = core::mem::take(&mut self.gained);
+        let torque = self.torque(0);
+        let (strength, before) = (torque.saturating_abs(), self.torque(2 * SPAN_LOOKS).saturating_abs());
+        let against = if torque.is_negative() { gained } else { gained.wrapping_neg() };
         // A wall that has just given way: three quarters.
         let has_fallen = strength < before - (before >> 2);
         (!has_fallen && bounds.is_driven(against, strength)).then_some(Fault::WrongWay)
@@ -171,8 +181,9 @@ mod tests {
             }
             let is_look = tick % LOOK_TICKS == 0;
             let fault = is_look.then(|| {
-                let fast = watch.look(&bounds, count);
-                let driven = watch.judge(&bounds, I16F16::from_num(torque));
+                watch.take(count, I16F16::from_num(torque));
+                let fast = watch.look(&bounds);
+                let driven = watch.judge(&bounds);
                 fast.or(driven).or(watch.count_turns())
             });
             fault.flatten().map(|fault| (time, fault))
