@@ -283,6 +283,8 @@ impl Controller {
         };
         if let Some(fault) = fault
             && self.mode.is_powered()
+            // An excitation is faster than a hand on purpose, and its own travel bounds it.
+            && (self.mode, fault) != (Mode::Exciting, Fault::Overspeed)
         {
             self.trip(fault);
         }

@@ -74,7 +74,7 @@ struct Given {
 }
 
 impl Picture {
-    /// From numbers: how many layers there are; for each its tissue ([`TISSUES`], 7 the vessel, 8 its far wall), its depth
+    /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
     /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
     /// the skin in rad.

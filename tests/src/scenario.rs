@@ -21,8 +21,8 @@ pub fn venepuncture(start: Nanos) -> impl PlantSide {
         (at(10), mm(-5)),
         (at(25), mm(4)),
         (at(40), mm(4)),
-        (at(50), mm(8)),
-        (at(60), mm(8)),
+        (at(50), mm(12)),
+        (at(60), mm(12)),
         (at(78), mm(-3)),
     ]))
 }

@@ -36,7 +36,8 @@ pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Sear
     for i in named {
         let mut less = model.clone();
         less.effects.remove(i);
-        let standing = whole.standing(&evaluator.densities(&less));
+        let variable = model.effects[i].name.variable();
+        let standing = whole.standing(&evaluator.densities(&less), variable);
         if let Some(against) = standing.against {
             let takes = match standing.own.sum {
                 own if own > 0.0 => format!("{own:.0}"),

@@ -18,7 +18,10 @@ const TICK_S: f64 = 1.0 / TICK_HZ as f64;
 /// Fastest that a dragged hand moves, mm/s: a quick reach, and well within what the encoder check allows.
 const DRAG_MM_PER_S: f64 = 250.0;
 /// A dragged hand closes in on the mouse with this time constant, s.
-const DRAG_LAG_S: f64 = 0.02;
+const DRAG_LAG_S: f64 = 0.04;
+/// Largest change of a dragged hand's speed: 6.25 m/s², a stab. Faster, and the device would take it for a motor that is wired
+/// the wrong way.
+const DRAG_MM_PER_S2: f64 = DRAG_MM_PER_S / DRAG_LAG_S;
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
 
@@ -43,6 +46,7 @@ pub struct VirtualDevice {
     hand: Hand,
     /// Where the hand is, mm past the plant's zero.
     hand_mm: f64,
+    hand_mm_per_s: f64,
     /// Where a person set the zero, mm past the plant's zero.
     zero_mm: f64,
     /// By how much the procedure has turned the needle, rad.
@@ -75,6 +79,7 @@ impl VirtualDevice {
             tick: 0,
             hand: Hand::Script { since: 0 },
             hand_mm: procedure.start_mm,
+            hand_mm_per_s: 0.0,
             zero_mm: 0.0,
             turned_rad: 0.0,
             set_value: 0.0,
@@ -241,13 +246,15 @@ impl VirtualDevice {
         let gap = wanted_mm - self.hand_mm;
         match self.hand {
             Hand::Script { .. } if gap.abs() <= most => {
-                self.hand_mm = wanted_mm;
+                (self.hand_mm, self.hand_mm_per_s) = (wanted_mm, speed);
                 (wanted_mm * 1e-3, speed * 1e-3)
             }
             _ => {
-                let step = (gap * TICK_S / DRAG_LAG_S).clamp(-most, most);
-                self.hand_mm += step;
-                (self.hand_mm * 1e-3, step / TICK_S * 1e-3)
+                let wanted = (gap / DRAG_LAG_S).clamp(-DRAG_MM_PER_S, DRAG_MM_PER_S);
+                let change = DRAG_MM_PER_S2 * TICK_S;
+                self.hand_mm_per_s += (wanted - self.hand_mm_per_s).clamp(-change, change);
+                self.hand_mm += self.hand_mm_per_s * TICK_S;
+                (self.hand_mm * 1e-3, self.hand_mm_per_s * 1e-3)
             }
         }
     }
