@@ -137,15 +137,8 @@ fn the_papers_are_reproduced_as_far_as_their_laws_are_built() {
         std::fs::read_to_string(dir.join(format!("paper-{number}.html"))).expect("written")
     };
     let jog = page("001");
-    for words in [
-        "the paper's number",
-        ">ours<",
-        "the paper gives none",
-        "28.8 mN",
-        "4000",
-        "10 kHz",
-        "<svg",
-    ] {
+    for words in ["the paper's number", ">ours<", "the paper gives none", "28.8 mN", "4000", "10 kHz", "<svg"]
+    {
         assert!(jog.contains(words), "{words} is not on the page of 001");
     }
     assert!(jog.contains("0.99 N") || jog.contains("1.00 N"), "the skin's puncture");

@@ -80,8 +80,9 @@ pub(crate) struct Taken {
     pub(crate) gain: Gain,
 }
 
-/// One less the part of what a free form takes that an effect must take, with the form or without it. A stricter bound denies
-/// what is there: on EMPS friction by direction takes a quarter of what any force over speed takes, as real friction has more to it.
+/// Part of what a free form takes that an effect must take to be named, and must take beyond it where it takes less. Of a force of
+/// one variable alone the rest is enough: on EMPS friction by direction takes a quarter of what any force over speed takes, as
+/// real friction has more to it than one law.
 const NEARLY_ALL: f64 = 0.9;
 /// Part of the innovations' mean square that a form must take to be told.
 const TOLD: f64 = 0.005;
@@ -111,7 +112,8 @@ impl Densities {
             let most = most.max(instead);
             let (beyond, beside) = (better.over(&self.alone), both.over(form).sum);
             let little = (1.0 - NEARLY_ALL) * most;
-            (own.sum < little && beyond.is_sure() && beside < little).then_some(Against {
+            let is_small = variable.is_none() || own.sum < little;
+            (is_small && beyond.is_sure() && beyond.sum > little && beside < little).then_some(Against {
                 inputs: *inputs,
                 most,
                 beyond,
@@ -147,10 +149,9 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_takes_little_of_what_a_form_takes_is_denied() {
+    fn a_name_stands_where_it_takes_nearly_all_that_a_form_of_its_inputs_takes() {
         assert!(stands(20.0, 19.0, 20.5), "its own law");
-        assert!(stands(16.0, 20.0, 20.0), "the form takes a fifth more: real machines do so");
-        assert!(!stands(1.0, 20.0, 20.0), "the form takes twenty times as much and leaves it nothing");
+        assert!(!stands(16.0, 20.0, 20.0), "the form takes a fifth more and leaves it nothing");
         assert!(stands(16.0, 5.0, 21.0), "something else is there beside it, which the form takes");
         assert!(!stands(-300.0, 20.0, -10.0), "it takes nothing");
     }
@@ -166,6 +167,13 @@ mod tests {
         let against = |variable| over(1.0, 20.0).standing(&over(0.0, 20.0), variable).against;
         assert!(against(Some(Variable::Speed)).is_none());
         assert!(against(Some(Variable::Travel)).is_some() && against(None).is_some());
+    }
+
+    #[test]
+    fn a_force_of_one_variable_is_denied_where_it_takes_little() {
+        let against =
+            |own| densities(own, 20.0).standing(&densities(0.0, 20.0), Some(Variable::Speed)).against;
+        assert!(against(5.0).is_none() && against(1.0).is_some());
     }
 
     #[test]
