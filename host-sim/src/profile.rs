@@ -1,5 +1,5 @@
 //! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
-//! ([`Patient`], fixed point). Nothing of the device stands in it: that is [`crate::device::part`]. What the control law
+//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
 //! refuses is refused here too.
 
 use crate::failure::Failure;

@@ -1,7 +1,7 @@
 //! One model per effect, written once: the diagnosis evaluates its terms along a recording, the simulator runs it forward.
 //!
 //! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. What an effect is stands in
-//! a file of its own, as a [`definition::Definition`]; to add one, write its file and a line in the registry below. Nothing here
+//! a file of its own, as a `Definition`; to add one, write its file and a line in the registry below. Nothing here
 //! may know how an effect is found.
 
 mod bristles;
