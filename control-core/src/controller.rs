@@ -311,9 +311,15 @@ impl Controller {
 
     /// Counts past the zero; a jump or a needle beyond its travel trips.
     fn count(&mut self, absolute: Counts) -> Counts {
-        let step = self.previous.map_or(0, |previous| moved(previous, absolute).0);
-        self.previous = Some(absolute);
         let count = moved(self.origin, absolute);
+        let step = if let Some(previous) = self.previous {
+            moved(previous, absolute).0
+        } else {
+            // Started before its first tick: the watch knows now where the needle is.
+            self.runaway = runaway::Watch::new(count.0);
+            0
+        };
+        self.previous = Some(absolute);
         let is_beyond = match self.mode {
             Mode::Running => count.0.unsigned_abs() > self.plan.travel_counts,
             Mode::Exciting => {

@@ -33,6 +33,7 @@ fn a_dragged_needle_meets_the_skins_parabola_and_stays_where_it_is_let_go() {
     let mut device = started();
     device.control(Control::Drag { depth_mm: 2.6 });
     run(&mut device, 1.0);
+    assert_eq!(device.tripped(), None);
     let depth = device.plant().tip() * 1e3;
     // T²/9 against a hand of 1 N/mm that is 2.6 − T ahead, and as much as the needle weighs: T is near 2.13 mm.
     let expected = depth * depth / 9.0;
@@ -50,7 +51,7 @@ fn a_wild_drag_does_not_trip_the_device_and_the_script_takes_over_again() {
     for depth_mm in [1e9, -1e9, f64::NAN, 55.0, -40.0, f64::INFINITY, 0.0] {
         device.control(Control::Drag { depth_mm });
         run(&mut device, 0.5);
-        assert!(device.is_enabled(), "after a drag to {depth_mm} mm");
+        assert_eq!(device.tripped(), None, "after a drag to {depth_mm} mm");
     }
     device.control(Control::Script);
     let largest = run(&mut device, 6.0);

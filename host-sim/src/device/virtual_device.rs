@@ -19,9 +19,9 @@ const TICK_S: f64 = 1.0 / TICK_HZ as f64;
 const DRAG_MM_PER_S: f64 = 250.0;
 /// A dragged hand closes in on the mouse with this time constant, s.
 const DRAG_LAG_S: f64 = 0.04;
-/// Largest change of a dragged hand's speed: 6.25 m/s², a stab. Faster, and the device would take it for a motor that is wired
-/// the wrong way.
-const DRAG_MM_PER_S2: f64 = DRAG_MM_PER_S / DRAG_LAG_S;
+/// Largest change of a dragged hand's speed: a firm stab. A mouse that jumps asks for more than a hand with a needle in tissue
+/// can do, and the device would take it for a motor that is wired the wrong way.
+const DRAG_MM_PER_S2: f64 = 3000.0;
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
 
@@ -53,6 +53,7 @@ pub struct VirtualDevice {
     turned_rad: f64,
     set_value: f64,
     enable: bool,
+    tripped: Option<Fault>,
     powered_before: bool,
     timing: Timing,
     timed: bool,
@@ -84,6 +85,7 @@ impl VirtualDevice {
             turned_rad: 0.0,
             set_value: 0.0,
             enable: false,
+            tripped: None,
             powered_before: false,
             procedure,
             timing: Timing::default(),
@@ -99,6 +101,11 @@ impl VirtualDevice {
     /// Whether the amplifier is on.
     pub fn is_enabled(&self) -> bool {
         self.enable
+    }
+
+    /// The fault that latched last.
+    pub fn tripped(&self) -> Option<Fault> {
+        self.tripped
     }
 
     /// The converter's output as a share of full scale, −1 to 1.
@@ -148,6 +155,7 @@ impl VirtualDevice {
         }
         self.set_value = self.share(output.dac);
         self.enable = output.enable;
+        self.tripped = output.tripped.or(self.tripped);
         self.endpoint.record(self.tick, &output);
         if self.enable && !self.powered_before && !matches!(self.hand, Hand::Drag { .. }) {
             // The scripted hand waits for a person to start the device; a person who holds the needle goes on holding it.
@@ -250,7 +258,9 @@ impl VirtualDevice {
                 (wanted_mm * 1e-3, speed * 1e-3)
             }
             _ => {
-                let wanted = (gap / DRAG_LAG_S).clamp(-DRAG_MM_PER_S, DRAG_MM_PER_S);
+                // No faster than it can still stop in time.
+                let most = (2.0 * DRAG_MM_PER_S2 * gap.abs()).sqrt().min(DRAG_MM_PER_S);
+                let wanted = (gap / DRAG_LAG_S).clamp(-most, most);
                 let change = DRAG_MM_PER_S2 * TICK_S;
                 self.hand_mm_per_s += (wanted - self.hand_mm_per_s).clamp(-change, change);
                 self.hand_mm += self.hand_mm_per_s * TICK_S;
