@@ -87,14 +87,21 @@ impl Joint {
             slack: 0.0,
             gain: rig.actuator.gain,
             limit: rig.actuator.limit,
-            delay: 0.0,
-            lag: 0.0,
+            delay: rig.actuator.delay_s.unwrap_or(0.0),
+            lag: rig.actuator.lag_s.unwrap_or(0.0),
             notes: Vec::new(),
         };
         if let Some(weight) = model.weight.filter(|w| *w != 0.0) {
             joint.notes.push(format!(
                 "weight {weight:.6e} {} times the sine of the tilt: add it as an applied force, or tilt the joint under gravity",
                 rig.kind.force()
+            ));
+        }
+        if let Some(gravity) = model.gravity.filter(|g| *g != 0.0) {
+            joint.notes.push(format!(
+                "gravity {gravity:.6e} {} times the sine of the angle from {:.6e} rad: add it as an applied force, or hang a mass on the joint",
+                rig.kind.force(),
+                model.gravity_zero.unwrap_or(0.0)
             ));
         }
         for effect in &rig.effects {

@@ -68,11 +68,14 @@ pub struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    /// A recording under a rig; the start is where the rig's periodic effects fit the recording best.
+    /// A recording under a rig; the start is where absolute counts say, else where the rig's periodic effects fit the recording best.
     pub fn new(recording: &'a Recording, rig: &Rig) -> Self {
         let motion = Motion::new(recording, rig);
         let mut beside = Self { recording, motion, start: 0.0 };
-        if let Some(turn) = period(rig) {
+        if rig.model.gravity.is_some_and(|gravity| gravity != 0.0) {
+            // Its counts have one zero, from which the gravity's angle counts.
+            beside.start = recording.position_counts[0] / rig.encoder.counts_per_unit;
+        } else if let Some(turn) = period(rig) {
             let off = |start: f64| {
                 let at = Self { recording, motion: beside.motion.clone(), start };
                 at.spread(rig, 0.2, SEARCH_S).position
