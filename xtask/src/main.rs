@@ -24,7 +24,7 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt clippy doc unit firmware wasm site board browser clients fuzz prove
+                                fmt clippy doc unit firmware wasm site board browser clients parquet fuzz prove
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page

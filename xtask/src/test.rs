@@ -28,7 +28,7 @@ enum Ended {
 }
 
 /// In the order that finds the most for the least time.
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     Step { name: "fmt", shows: "the sources are formatted", run: fmt },
     Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
     Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
@@ -43,6 +43,7 @@ const STEPS: [Step; 12] = [
         shows: "streams and exported rigs as other people's programs read them",
         run: clients,
     },
+    Step { name: "parquet", shows: "import reads Parquet, which the default build leaves out", run: parquet },
     Step { name: "fuzz", shows: "the frame parser, a minute of damaged frames", run: fuzz },
     Step { name: "prove", shows: "the small proof of the diagnosis", run: prove },
 ];
@@ -215,6 +216,11 @@ fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let program = shell::target().join("release/host-sim");
     clock.run(Command::new(&python).arg(top.join("tests/clients/streams.py")).arg(&program))?;
     passed(clock.run(Command::new(&python).arg(top.join("tests/clients/mujoco_rig.py")).arg(&program)))
+}
+
+/// Apart from `unit`: forty packages more.
+fn parquet(clock: &Clock) -> Result<Ended, Failure> {
+    passed(clock.run(tests().args(["-p", "host-sim", "--features", "parquet", "--test", "import"])))
 }
 
 fn fuzz(clock: &Clock) -> Result<Ended, Failure> {
