@@ -81,7 +81,8 @@ pub fn diagnose_recordings(
     }
     let search = validation::stepwise::search(rig, fit, holdout, progress)?;
     progress("writing down", 0.95);
-    let outcome = report::conclude::conclude(search, rig, holdout);
+    let mut outcome = report::conclude::conclude(search, rig, holdout);
+    outcome.evidence.rate_hz = all.iter().map(|r| r.rate_hz()).min_by(f64::total_cmp);
     progress("done", 1.0);
     Ok(outcome)
 }

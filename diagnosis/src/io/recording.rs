@@ -224,3 +224,12 @@ impl Recording {
         (self.len() - 1) as f64 / self.duration_s()
     }
 }
+
+/// What rows at a rate, Hz, can show and what not: a swing takes some five rows, and the command is held from row to row.
+pub fn shown_at(rate_hz: f64) -> String {
+    format!(
+        "{rate_hz:.0} rows a second: shows what happens below about {:.0} Hz; delays and lags much shorter than {:.2} ms do not show",
+        rate_hz / 5.0,
+        1e3 / rate_hz
+    )
+}

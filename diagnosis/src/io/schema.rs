@@ -33,6 +33,13 @@ pub struct Parameter {
     pub unit: String,
 }
 
+impl Parameter {
+    /// The unit as people read it: nothing where there is none.
+    pub fn unit_in_words(&self) -> &str {
+        if self.unit == "1" { "" } else { &self.unit }
+    }
+}
+
 /// Where a recording shows something.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {

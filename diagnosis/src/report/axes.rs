@@ -8,9 +8,9 @@ pub(crate) fn safe(text: &str) -> String {
 }
 
 /// Size of a picture and its margins, in its own units.
-pub(crate) const WIDE: f64 = 900.0;
+pub(crate) const WIDE: f64 = 640.0;
 pub(crate) const HIGH: f64 = 190.0;
-const LEFT: f64 = 96.0;
+const LEFT: f64 = 72.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 32.0;
 
@@ -48,7 +48,13 @@ pub(crate) fn frame(
     x_label: &str,
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
-    let _ = write!(out, "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img>", TOP + HIGH + BOTTOM);
+    let _ = write!(
+        out,
+        "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img><title>{} over {}</title>",
+        TOP + HIGH + BOTTOM,
+        safe(y_label),
+        safe(x_label)
+    );
     let at = move |a: f64, b: f64| {
         let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - 6.0);
         let py = 6.0 + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 12.0);
@@ -62,7 +68,7 @@ pub(crate) fn frame(
             out,
             "<line class=grid x1={LEFT} x2={WIDE} y1={py:.1} y2={py:.1} /><text x={} y={:.1} text-anchor=end>{}</text>",
             LEFT - 5.0,
-            py + 4.0,
+            py + 3.0,
             label(*value, step(&up))
         );
     }
@@ -78,7 +84,6 @@ pub(crate) fn frame(
             label(*value, step(&along))
         );
     }
-    let _ = write!(out, "<title>{} over {}</title>", safe(y_label), safe(x_label));
     at
 }
 

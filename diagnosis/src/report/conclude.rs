@@ -116,6 +116,7 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
         simulated,
         kind: nominal.rig.kind,
         rig: nominal.rig.name.clone(),
+        rate_hz: None,
     };
     Outcome { report, evidence, nominal_rig: given.clone(), refit_rig, patched_rig }
 }

@@ -1,6 +1,7 @@
 //! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here, a few lines of script for tabs
 //! would be one too many.
 
+use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
@@ -8,6 +9,7 @@ use crate::report::axes::{HIGH, frame, safe};
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, Series, unit};
+use crate::report::simulation_page;
 use crate::validation::residual_maps::Map;
 use std::fmt::Write as _;
 
@@ -51,10 +53,10 @@ fn motion(out: &mut String, outcome: &Outcome) {
         safe(&first.file)
     );
     let found = first.figures("patched").is_some();
-    motion_picture::free_run(out, first, if found { &["nominal", "patched"] } else { &["nominal", "refit"] });
+    motion_picture::motions(out, first, if found { &["nominal", "patched"] } else { &["nominal", "refit"] });
     out.push_str(
-        "<p class=note>Under the recorded command alone, with nothing that corrects: errors of force add up to errors of place. \
-         A line that leaves the picture has run away.</p>",
+        "<p class=note>In the first picture and in that of the speed the command alone drives the simulation and nothing corrects it: errors of \
+         force add up to errors of place. A line that leaves the picture has run away.</p>",
     );
     motion_picture::table(out, first);
     if let Some(worse) = outcome.report.simulation.as_ref().and_then(|s| s.worse.as_ref()) {
@@ -70,40 +72,45 @@ fn motion(out: &mut String, outcome: &Outcome) {
 /// What to do with all this.
 fn next(out: &mut String, outcome: &Outcome) {
     let r = &outcome.report;
-    let mut items = Vec::new();
-    let wanted =
-        r.effects.iter().filter_map(|e| e.separating_experiment.as_ref()).chain(&r.separating_experiment);
-    for next in wanted {
+    let holdout = outcome.evidence.simulated.first().map_or("FILE.csv", |one| one.file.as_str());
+    let wanted = r.effects.iter().filter_map(|e| e.separating_experiment.as_ref());
+    let mut items: Vec<String> = wanted
+        .chain(&r.separating_experiment)
+        .map(|experiment| {
+            format!(
+                "Record what decides: {experiment}. On a device of this project `host-sim characterise --device /dev/ttyACM0 --out bench` \
+                 plays it; then run `host-sim diagnose` again with the new files."
+            )
+        })
+        .collect();
+    match r.verdict {
+        Verdict::NoMismatch => items.push("Nothing: keep the simulation as it is.".into()),
+        Verdict::ParametersOnly => {
+            items.push("Put the refitted values of `patched-rig.toml` into your simulation.".into());
+        }
+        Verdict::RandomDisturbance => items.push(
+            "Look for what moves the axis and was not recorded (a hand, a load, the inclination, a supply that dips); record it as \
+             `force` or `tilt_rad`, and run `host-sim diagnose` again."
+                .into(),
+        ),
+        Verdict::Unexplained => items.push(
+            "Compare the shape above with what you know of the machine. A formula of your own is searched with \
+             `host-sim diagnose … --effects own.toml`."
+                .into(),
+        ),
+        Verdict::MissingPhysics | Verdict::InsufficientExcitation => {}
+    }
+    if !r.effects.is_empty() || outcome.evidence.form.is_some() {
         items.push(format!(
-            "Record what decides: {}. On a device of this project <code>host-sim characterise --device /dev/ttyACM0 --out bench</code> \
-             plays it; then <code>host-sim diagnose</code> again with the new files.",
-            safe(next)
+            "Simulate with what was found: `patched-rig.toml` beside this page is the rig with it; \
+             `host-sim simulate --rig patched-rig.toml --recording {holdout} --out simulated` runs it."
         ));
-    }
-    if !r.effects.is_empty() {
         items.push(
-            "Simulate with what was found: <code>patched-rig.toml</code> beside this page is the rig with it. \
-             <code>host-sim simulate --rig patched-rig.toml --recording FILE.csv --out DIR</code> runs it."
-                .to_owned(),
-        );
-        items.push(
-            "Take it where you simulate: <code>host-sim diagnose … --export mjcf</code> writes it for MuJoCo, <code>urdf</code> and \
-             <code>json</code> for others."
-                .to_owned(),
-        );
-    } else if r.verdict == Verdict::ParametersOnly {
-        items.push(
-            "Put the refitted values of <code>patched-rig.toml</code> into your simulation.".to_owned(),
+            "Take it where you simulate: add `--export mjcf` for MuJoCo, `--export urdf` or `--export json` for others, to either command."
+                .into(),
         );
     }
-    if items.is_empty() {
-        return;
-    }
-    let _ = write!(
-        out,
-        "<section><h2>What to do next</h2><ul><li>{}</li></ul></section>",
-        items.join("</li><li>")
-    );
+    simulation_page::what_next(out, &items);
 }
 
 fn numbers(out: &mut String, outcome: &Outcome) {
@@ -177,7 +184,7 @@ fn one(out: &mut String, effect: &Named, kind: Kind) {
                 short(p.value),
                 short(p.ci95[0]),
                 short(p.ci95[1]),
-                safe(&p.unit)
+                safe(p.unit_in_words())
             );
         }
         out.push_str("</table></div>");
@@ -374,6 +381,9 @@ fn remains(out: &mut String, outcome: &Outcome) {
             r.refitted.iter().map(|(key, value)| format!("{key} {}", short(*value))).collect();
         out.push_str(&safe(&values.join(", ")));
         out.push_str(".</p>");
+    }
+    if let Some(rate) = outcome.evidence.rate_hz {
+        let _ = write!(out, "<p>{}.</p>", safe(&shown_at(rate)));
     }
     out.push_str("</section>");
 }

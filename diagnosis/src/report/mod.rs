@@ -13,6 +13,7 @@ pub(crate) mod next_experiment;
 pub(crate) mod outcome;
 pub(crate) mod patched_rig;
 pub(crate) mod run_forward;
+pub mod simulation_page;
 pub(crate) mod verdict;
 
 pub use crate::io::schema::{

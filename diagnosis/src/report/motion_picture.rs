@@ -2,10 +2,9 @@
 
 use crate::numerics::digits::short;
 use crate::report::axes::{HIGH, frame, safe};
-use crate::simulation::comparison::{Comparison, Figures, Off};
+use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
 use std::fmt::Write as _;
 
-const STYLE: &str = include_str!("report.css");
 /// Points that a line is drawn with.
 const POINTS: usize = 900;
 /// Rows a second in the CSV, at the most.
@@ -22,55 +21,82 @@ fn class(model: &str) -> &'static str {
 }
 
 /// What a model is, in words.
-fn words(model: &str) -> &str {
+pub(crate) fn words(model: &str) -> &str {
     match model {
         "nominal" => "the simulation as it stands",
         "refit" => "with its values refitted",
         "patched" => "with what was found",
+        "motion-fitted" => "with values fitted by motion",
         other => other,
     }
 }
 
-fn line(out: &mut String, class: &str, time: &[f64], values: &[f64], at: &impl Fn(f64, f64) -> (f64, f64)) {
+/// A line through points; it is interrupted where it leaves the picture and wherever the simulation is started `afresh`, s.
+fn line(
+    out: &mut String,
+    class: &str,
+    time: &[f64],
+    values: &[f64],
+    afresh: Option<f64>,
+    at: &impl Fn(f64, f64) -> (f64, f64),
+) {
     let every = time.len().div_ceil(POINTS).max(1);
+    let part = |t: f64| afresh.map_or(0, |seconds| (t / seconds) as u64);
     let _ = write!(out, "<path class=\"motion {class}\" d=\"");
-    let mut pen = 'M';
+    let mut last = None;
     for (t, x) in time.iter().zip(values).step_by(every) {
         let (px, py) = at(*t, *x);
-        // It has left the picture.
         if py <= 0.0 || py >= HIGH {
-            pen = 'M';
+            last = None;
             continue;
         }
+        let pen = if last == Some(part(*t)) { 'L' } else { 'M' };
         let _ = write!(out, "{pen}{px:.1} {py:.1}");
-        pen = 'L';
+        last = Some(part(*t));
     }
     out.push_str("\"/>");
 }
 
-/// The range of what was recorded with some room: a simulation that runs away leaves the picture.
-fn range(recorded: &[f64]) -> (f64, f64) {
-    let low = recorded.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = recorded.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let room = 0.3 * (high - low).max(1e-12);
-    (low - room, high + room)
+/// Where all but one in a hundred of the values lie.
+fn bulk(values: &[f64]) -> (f64, f64) {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else { return (0.0, 0.0) };
+    let few = sorted.len() / 200;
+    (sorted[few], sorted[last - few])
+}
+
+/// The range of a picture: what was recorded with some room, and up to half as much again for the simulations: one that runs
+/// away leaves the picture.
+fn range(recorded: &[f64], models: &[(&str, &[f64])]) -> (f64, f64) {
+    let (low, high) = bulk(recorded);
+    let span = (high - low).max(1e-12);
+    let (mut least, mut most) = (low, high);
+    for (_, values) in models {
+        let (a, b) = bulk(values);
+        least = least.min(a.max(low - 0.5 * span));
+        most = most.max(b.min(high + 0.5 * span));
+    }
+    (least - 0.15 * span, most + 0.15 * span)
 }
 
 struct Picture<'a> {
-    title: &'a str,
+    title: String,
     label: String,
     recorded: &'a [f64],
     models: Vec<(&'a str, &'a [f64])>,
+    /// Time between two starts from the measured state, s.
+    afresh: Option<f64>,
 }
 
 fn picture(out: &mut String, time: &[f64], picture: &Picture) {
     let last = time.last().copied().unwrap_or(1.0);
     let _ = write!(out, "<h3>{}</h3>", picture.title);
-    let at = frame(out, (0.0, last), range(picture.recorded), "time, s", &picture.label);
+    let at = frame(out, (0.0, last), range(picture.recorded, &picture.models), "time, s", &picture.label);
     for (model, values) in &picture.models {
-        line(out, class(model), time, values, &at);
+        line(out, class(model), time, values, picture.afresh, &at);
     }
-    line(out, "r", time, picture.recorded, &at);
+    line(out, "r", time, picture.recorded, None, &at);
     let _ = write!(out, "</svg><p class=axis>{} · time, s</p>", safe(&picture.label));
 }
 
@@ -82,33 +108,81 @@ fn legend(out: &mut String, models: &[&str]) {
     out.push_str("</p>");
 }
 
-/// Position and speed of some of the models in a free run beside the recording.
-pub(crate) fn free_run(out: &mut String, compared: &Comparison, models: &[&str]) {
+/// A column of each of the models that are `wanted` and have it.
+fn columns<'a>(
+    compared: &'a Comparison,
+    wanted: &[&str],
+    pick: impl Fn(&'a Simulated) -> Option<&'a [f64]>,
+) -> Vec<(&'a str, &'a [f64])> {
+    let models = compared.models.iter().filter(|m| wanted.contains(&m.model.as_str()));
+    models.filter_map(|m| Some((m.model.as_str(), pick(m)?))).collect()
+}
+
+/// Position and speed of some of the models beside the recording: in a free run, and started afresh from time to time.
+pub(crate) fn motions(out: &mut String, compared: &Comparison, wanted: &[&str]) {
     let length = compared.kind.length();
-    legend(out, models);
-    let of = |pick: fn(&crate::simulation::replay::Trajectory) -> &[f64]| -> Vec<(&str, &[f64])> {
-        let wanted = compared.models.iter().filter(|m| models.contains(&m.model.as_str()));
-        wanted.map(|m| (m.model.as_str(), pick(&m.free))).collect()
+    let motion = &compared.motion;
+    legend(out, wanted);
+    let position = |title: String, models, afresh| Picture {
+        title,
+        label: format!("position, {length}"),
+        recorded: &motion.position,
+        models,
+        afresh,
     };
-    let time = &compared.motion.time;
+    let free = columns(compared, wanted, |m| Some(&m.free.position));
+    picture(out, &motion.time, &position("Position".into(), free, None));
+    let afresh = columns(compared, wanted, |m| m.afresh.as_deref());
+    if !afresh.is_empty() {
+        let title = format!("Position, started from the measured state every {AFRESH_S} s");
+        picture(out, &motion.time, &position(title, afresh, Some(AFRESH_S)));
+    }
     picture(
         out,
-        time,
+        &motion.time,
         &Picture {
-            title: "Position",
-            label: format!("position, {length}"),
-            recorded: &compared.motion.position,
-            models: of(|t| &t.position),
+            title: "Speed".into(),
+            label: format!("speed, {length}/s"),
+            recorded: &motion.velocity,
+            models: columns(compared, wanted, |m| Some(&m.free.velocity)),
+            afresh: None,
         },
+    );
+}
+
+/// Position under the recorded reference with the loop that ran, where it was recognised.
+pub(crate) fn under_reference(out: &mut String, compared: &Comparison, wanted: &[&str]) {
+    let Some(feedback) = compared.feedback else { return };
+    let _ = write!(
+        out,
+        "<h2>Under the recorded reference</h2><p class=note>The loop that ran was told from its reference; it explains {:.0} % of the \
+         command. What else the command held stays as recorded.</p>",
+        100.0 * feedback.explained
     );
     picture(
         out,
-        time,
+        &compared.motion.time,
         &Picture {
-            title: "Speed",
-            label: format!("speed, {length}/s"),
-            recorded: &compared.motion.velocity,
-            models: of(|t| &t.velocity),
+            title: "Position".into(),
+            label: format!("position, {}", compared.kind.length()),
+            recorded: &compared.motion.position,
+            models: columns(compared, wanted, |m| m.under.as_ref().map(|u| u.position.as_slice())),
+            afresh: None,
+        },
+    );
+}
+
+/// Inertia times acceleration along the recorded motion.
+pub(crate) fn force(out: &mut String, compared: &Comparison, wanted: &[&str]) {
+    picture(
+        out,
+        &compared.motion.time,
+        &Picture {
+            title: "Force along the recorded motion".into(),
+            label: format!("inertia · acceleration, {}", compared.kind.force()),
+            recorded: &compared.force,
+            models: columns(compared, wanted, |m| Some(&m.force)),
+            afresh: None,
         },
     );
 }
@@ -117,9 +191,22 @@ fn position(off: Off, unit: &str) -> String {
     format!("{} {unit}", short(off.position_rms))
 }
 
+/// What positions are off, in thousandths of the unit where some are below a thousandth: the factor and the unit's name.
+pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
+    let unit = compared.kind.length();
+    let figures = compared.models.iter().map(|m| &m.figures);
+    let largest = figures.clone().map(|f| f.free_run.position_rms).fold(0.0, f64::max);
+    let smallest = figures.flat_map(|f| &f.windows).map(|w| w.off.position_rms).fold(largest, f64::min);
+    if largest < 1.0 || (smallest < 1e-3 && largest < 10.0) {
+        (1e3, format!("m{unit}"))
+    } else {
+        (1.0, unit.to_owned())
+    }
+}
+
 /// How far each model is off, in a table.
 pub(crate) fn table(out: &mut String, compared: &Comparison) {
-    let unit = compared.kind.length();
+    let (factor, unit) = scale(compared);
     let _ = write!(out, "<div class=scroll><table><tr><th>position off, rms, {unit}</th>");
     for model in &compared.models {
         let _ = write!(out, "<th class=n>{}</th>", safe(&model.model));
@@ -128,7 +215,7 @@ pub(crate) fn table(out: &mut String, compared: &Comparison) {
     let mut row = |name: String, of: &dyn Fn(&Figures) -> Option<Off>| {
         let _ = write!(out, "<tr><td>{name}</td>");
         for model in &compared.models {
-            let shown = of(&model.figures).map_or("–".to_owned(), |off| short(off.position_rms));
+            let shown = of(&model.figures).map_or("–".to_owned(), |off| short(factor * off.position_rms));
             let _ = write!(out, "<td class=n>{shown}</td>");
         }
         out.push_str("</tr>");
@@ -143,60 +230,6 @@ pub(crate) fn table(out: &mut String, compared: &Comparison) {
         row("under the recorded reference".into(), &|f| f.under_reference);
     }
     out.push_str("</table></div>");
-}
-
-/// The page of `simulate`.
-pub fn page(title: &str, notes: &[String], compared: &[Comparison]) -> String {
-    let mut out = String::with_capacity(400_000);
-    let _ = write!(
-        out,
-        "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
-         <title>Simulated: {0}</title><style>{STYLE}</style></head><body><main><p class=rig>{0}</p><h1>Simulated beside recorded</h1>",
-        safe(title)
-    );
-    for note in notes {
-        let _ = write!(out, "<p>{}.</p>", safe(note));
-    }
-    for one in compared {
-        let names: Vec<&str> = one.models.iter().map(|m| m.model.as_str()).collect();
-        let _ = write!(out, "<section><h2>{}: free run from the first row</h2>", safe(&one.file));
-        free_run(&mut out, one, &names);
-        table(&mut out, one);
-        if let Some(feedback) = one.feedback {
-            let _ = write!(
-                out,
-                "<h2>Under the recorded reference</h2><p class=note>The loop that ran was told from its reference; it explains {:.0} % of the \
-                 command. What else the command held stays as recorded.</p>",
-                100.0 * feedback.explained
-            );
-            let length = one.kind.length();
-            let models: Vec<(&str, &[f64])> = one
-                .models
-                .iter()
-                .filter_map(|m| Some((m.model.as_str(), m.under.as_ref()?.position.as_slice())))
-                .collect();
-            picture(
-                &mut out,
-                &one.motion.time,
-                &Picture {
-                    title: "Position",
-                    label: format!("position, {length}"),
-                    recorded: &one.motion.position,
-                    models,
-                },
-            );
-        }
-        let label = format!("inertia · acceleration, {}", one.kind.force());
-        let models = one.models.iter().map(|m| (m.model.as_str(), m.force.as_slice())).collect();
-        picture(
-            &mut out,
-            &one.motion.time,
-            &Picture { title: "Force along the recorded motion", label, recorded: &one.force, models },
-        );
-        out.push_str("</section>");
-    }
-    out.push_str("</main></body></html>\n");
-    out
 }
 
 /// The motions as a table, at most a thousand rows a second.

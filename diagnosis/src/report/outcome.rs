@@ -2,6 +2,7 @@
 
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
 use crate::numerics::digits::short;
@@ -75,6 +76,8 @@ pub struct Evidence {
     pub kind: Kind,
     /// The rig's label.
     pub rig: String,
+    /// Rows a second of the slowest recording, where they were looked at.
+    pub rate_hz: Option<f64>,
 }
 
 /// The outcome of a diagnosis.
@@ -195,6 +198,7 @@ impl Outcome {
             simulated: Vec::new(),
             kind: rig.kind,
             rig: rig.name.clone(),
+            rate_hz: None,
         };
         Self { report, evidence, nominal_rig: rig.clone(), refit_rig: rig.clone(), patched_rig: rig.clone() }
     }
@@ -249,13 +253,9 @@ impl Outcome {
                 .iter()
                 .take(4)
                 .map(|(name, p)| {
-                    format!(
-                        "{name} {} [{}, {}] {}",
-                        short(p.value),
-                        short(p.ci95[0]),
-                        short(p.ci95[1]),
-                        p.unit
-                    )
+                    let [low, high] = p.ci95;
+                    let text = format!("{name} {} [{}, {}]", short(p.value), short(low), short(high));
+                    format!("{text} {}", p.unit_in_words()).trim_end().to_owned()
                 })
                 .collect();
             let _ = writeln!(out, "  {} ({:.2}): {}", effect.name, effect.confidence, values.join("; "));
@@ -309,6 +309,9 @@ impl Outcome {
             f.unit,
             100.0 * r.unexplained_fraction
         );
+        if let Some(rate) = self.evidence.rate_hz {
+            let _ = writeln!(out, "  {}", shown_at(rate));
+        }
         if let Some(simulation) = &r.simulation {
             let named = |name: &str, x: Option<f64>| x.map(|x| format!("{name} {}", short(x)));
             let of = |m: &ByModel| {

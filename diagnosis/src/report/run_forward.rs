@@ -49,6 +49,6 @@ pub(crate) fn pooled(simulated: &[Comparison]) -> Option<Simulation> {
         unit: first.kind.length().into(),
         free_run: by_model(&|f| Some(f.free_run.position_rms)),
         windows,
-        worse: simulated.iter().find_map(|one| one.worse("patched", "refit")),
+        worse: simulated.iter().find_map(Comparison::worse_for_less_force),
     })
 }

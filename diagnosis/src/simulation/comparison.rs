@@ -14,6 +14,9 @@ pub struct Simulated {
     pub model: String,
     /// From the first row under the recorded command.
     pub free: Trajectory,
+    /// Position at every row, started from the measured state every [`AFRESH_S`], rad or m; none where the recording is shorter
+    /// than two of these.
+    pub afresh: Option<Vec<f64>>,
     /// Under the recorded reference, where there is one and the loop was recognised.
     pub under: Option<Trajectory>,
     /// Inertia times acceleration along the recorded motion, N·m or N.
@@ -104,7 +107,8 @@ impl Comparison {
                 under_reference: under.as_ref().map(|u| u.deviation(&beside.motion).into()),
                 start: beside.start,
             };
-            Simulated { model: name.clone(), free, under, force: beside.force(rig), figures }
+            let afresh = (whole > 2.0 * AFRESH_S).then(|| beside.started_every(rig, AFRESH_S));
+            Simulated { model: name.clone(), free, afresh, under, force: beside.force(rig), figures }
         };
         let models: Vec<Simulated> = models.par_iter().map(simulated).collect();
         let force = motion.accelerations().iter().map(|a| a * first.model.inertia).collect();
@@ -114,6 +118,16 @@ impl Comparison {
     /// The figures of a model of this name.
     pub fn figures(&self, model: &str) -> Option<&Figures> {
         self.models.iter().find(|m| m.model == model).map(|m| &m.figures)
+    }
+
+    /// A sentence where the model that leaves the least force, the patched one or else the refit, is off by more in its trajectory
+    /// than one before it; none where it is not.
+    pub fn worse_for_less_force(&self) -> Option<String> {
+        if self.figures("patched").is_some() {
+            self.worse("patched", "refit").or_else(|| self.worse("patched", "nominal"))
+        } else {
+            self.worse("refit", "nominal")
+        }
     }
 
     /// A sentence where a model is off by more in its trajectory than another, in the free run or in windows; none where not.
@@ -148,5 +162,7 @@ impl Comparison {
     }
 }
 
+/// Time between two starts from the measured state in the motion that is drawn so, s.
+pub const AFRESH_S: f64 = 2.0;
 /// What counts as worse, as a ratio.
 const MUCH: f64 = 1.05;

@@ -206,6 +206,13 @@ impl<'a> Beside<'a> {
         out
     }
 
+    /// Position at every row in windows of `seconds` one after the other, each started from the measured state.
+    pub(super) fn started_every(&self, rig: &Rig, seconds: f64) -> Vec<f64> {
+        let off = self.off(rig, seconds, 1);
+        // A last row alone is no window.
+        self.motion.position.iter().enumerate().map(|(i, q)| q + off.get(i).unwrap_or(&0.0)).collect()
+    }
+
     /// Inertia times the acceleration that a rig asks for along the recorded motion, N·m or N, as smooth as the speeds are.
     pub fn force(&self, rig: &Rig) -> Vec<f64> {
         let time = &self.motion.time;

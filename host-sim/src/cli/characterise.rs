@@ -42,12 +42,15 @@ impl Characterise {
         characterise::check(&config, &programmes)?;
         let mut bar = Progress::new("playing");
         let mut whole = None;
+        let is_virtual = self.device == "virtual";
         let news = |news: News| match news {
             News::Recording(programme) => whole = Some(programme.seconds()),
+            // The virtual device tilts itself.
+            News::Prompt(_) if is_virtual => {}
             News::Prompt(prompt) => eprintln!("{prompt}"),
             News::Played(seconds) => bar.show(seconds, whole, "s"),
         };
-        let tracks = if self.device == "virtual" {
+        let tracks = if is_virtual {
             let (truth, file) = match &self.plant {
                 Some(path) => (Rig::read(path).map_err(Failure::input)?, path.display().to_string()),
                 None => (nominal, "the nominal rig".to_owned()),

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use diagnosis::recording::Recording;
-use diagnosis::report::motion_picture;
+use diagnosis::report::{motion_picture, simulation_page};
 use diagnosis::rig::Rig;
 use diagnosis::simulation::comparison::Comparison;
 use diagnosis::simulation::replay::WINDOWS_S;
@@ -55,7 +55,42 @@ fn models(path: &Path) -> Result<Vec<(String, Rig)>, Failure> {
     Ok(out)
 }
 
+/// What the model is called whose values were fitted by motion.
+const MOTION_FITTED: &str = "motion-fitted";
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
 impl Simulate {
+    /// What to do after this, with the last of the rigs that were read called `last`.
+    fn next(&self, last: &str) -> Vec<String> {
+        let mut items = Vec::new();
+        let (rig, out) = (self.rig.display(), self.out.display());
+        let recording = self.recording.first().map(|path| path.display().to_string()).unwrap_or_default();
+        if last == "nominal" {
+            items.push(format!(
+                "Find what the simulation leaves out: `host-sim diagnose --rig {rig} --fit FILE.csv --holdout {recording} --out report`."
+            ));
+        }
+        if self.fit.is_empty() {
+            items.push(format!(
+                "Where only the trajectory matters, fit the values by motion, on recordings that do not judge: \
+                 `host-sim simulate --rig {rig} --fit FILE.csv --recording {recording} --out {out}`."
+            ));
+        } else {
+            items.push("Use the values that were fitted by motion: they stand in `fitted-rig.toml` beside this page.".into());
+        }
+        if self.export.is_empty() {
+            items.push(
+                "Take the last of these rigs where you simulate: the same command with `--export mjcf` writes it for MuJoCo, with \
+                 `--export urdf` or `--export json` for others."
+                    .into(),
+            );
+        }
+        items
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         let formats = super::export::formats(&self.export)?;
         let mut models = models(&self.rig)?;
@@ -65,26 +100,38 @@ impl Simulate {
         let recordings = read(&self.recording)?;
         let mut notes = Vec::new();
         let mut fitted_rig = None;
-        if !self.fit.is_empty() {
-            let (name, last) = &models[models.len() - 1];
-            let fitted = value_fit::fit(last, &read(&self.fit)?);
-            let files: Vec<String> = self.fit.iter().map(|p| p.display().to_string()).collect();
+        let last = models.last().map_or_else(String::new, |(name, _)| name.clone());
+        if let (false, Some((_, rig))) = (self.fit.is_empty(), models.last()) {
+            let fitted = value_fit::fit(rig, &read(&self.fit)?);
             notes.push(format!(
-                "\"{name}, fitted by motion\" has the values that bring its free run closest to {}: they serve trajectories, and are no evidence of physics",
-                files.join(", ")
+                "The motion-fitted simulation is the {last} one with the values that bring its free run closest to {}: they serve trajectories, and are no evidence of physics",
+                self.fit.iter().map(|path| file_name(path)).collect::<Vec<_>>().join(", ")
             ));
-            models.push((format!("{name}, fitted by motion"), fitted.clone()));
+            let whole = |path: &PathBuf| path.canonicalize().ok();
+            for path in
+                self.recording.iter().filter(|path| self.fit.iter().any(|fit| whole(fit) == whole(path)))
+            {
+                notes.push(format!(
+                    "{} was fitted by motion too: what the motion-fitted simulation is off there judges nothing",
+                    file_name(path)
+                ));
+            }
+            models.push((MOTION_FITTED.into(), fitted.clone()));
             fitted_rig = Some(fitted);
         }
         let compared: Vec<Comparison> =
             recordings.iter().map(|r| Comparison::new(r, &models, &WINDOWS_S)).collect();
         for one in &compared {
-            notes.extend(one.worse("patched", "refit").or_else(|| one.worse("patched", "nominal")));
+            notes.extend(one.worse_for_less_force());
+            notes.extend(one.worse(MOTION_FITTED, &last));
         }
         let json = serde_json::to_string_pretty(&motion_picture::summary(&compared, &notes))
             .map_err(Failure::failed)?;
         let mut files = vec![
-            ("simulation.html".to_owned(), motion_picture::page(&models[0].1.name, &notes, &compared)),
+            (
+                "simulation.html".to_owned(),
+                simulation_page::page(&models[0].1.name, &compared, &notes, &self.next(&last)),
+            ),
             ("simulation.json".to_owned(), json + "\n"),
         ];
         for (k, one) in compared.iter().enumerate() {
@@ -108,6 +155,9 @@ impl Simulate {
         })?;
         if let Some((_, last)) = models.last() {
             super::export::write(last, &formats, &self.out)?;
+        }
+        for one in &compared {
+            say!("{}.", simulation_page::sentence(one));
         }
         for text in compared.iter().flat_map(motion_picture::lines).chain(notes) {
             say!("{text}");

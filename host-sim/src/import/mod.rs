@@ -183,12 +183,7 @@ fn joined(wholes: Vec<Rows>, notes: &mut Vec<String>) -> Vec<Rows> {
 fn rate(runs: &[Rows], notes: &mut Vec<String>) {
     let steps: Vec<f64> = runs.iter().filter_map(|run| rows::median_step(&run.time)).collect();
     let Some(step) = steps.into_iter().max_by(f64::total_cmp) else { return };
-    let rate = 1.0 / step;
-    notes.push(format!(
-        "{rate:.0} rows a second: shows what happens below about {:.0} Hz; delays and lags much shorter than {:.1} ms do not show",
-        rate / 5.0,
-        1e3 * step
-    ));
+    notes.push(diagnosis::recording::shown_at(1.0 / step));
 }
 
 /// Names of the files, and the runs cut in two where that was asked for.
