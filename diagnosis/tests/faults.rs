@@ -7,7 +7,8 @@ use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 use std::f64::consts::TAU;
 
-/// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, and the delay of its drive.
+/// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
+/// lag of its drive, and the first-order filter behind which its position is read.
 #[derive(Clone, Copy)]
 struct Machine {
     inertia: f64,
@@ -15,11 +16,23 @@ struct Machine {
     forward: f64,
     backward: f64,
     gravity: f64,
+    offset: f64,
     delay_s: f64,
+    lag_s: f64,
+    filter_s: f64,
 }
 
-const AXIS: Machine =
-    Machine { inertia: 2.0, viscous: 8.0, forward: 3.0, backward: 3.0, gravity: 0.0, delay_s: 0.0 };
+const AXIS: Machine = Machine {
+    inertia: 2.0,
+    viscous: 8.0,
+    forward: 3.0,
+    backward: 3.0,
+    gravity: 0.0,
+    offset: 0.0,
+    delay_s: 0.0,
+    lag_s: 0.0,
+    filter_s: 0.0,
+};
 
 /// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
 #[derive(Clone, Copy)]
@@ -37,6 +50,8 @@ fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f6
     let steps = 40;
     let h = 1.0 / taken.rate / f64::from(steps);
     let (mut q, mut v) = taken.start;
+    let (mut driven, mut seen) = (command(0.0), q);
+    let follow = |by: f64| if by > 0.0 { 1.0 - (-h / by).exp() } else { 1.0 };
     let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut noise = || {
         random ^= random >> 12;
@@ -49,11 +64,13 @@ fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f6
         let t = f64::from(row) / taken.rate;
         out.time_s.push(t);
         out.command.push(command(t));
-        out.position_counts.push((q * taken.counts).floor());
+        out.position_counts.push((seen * taken.counts).floor());
         let disturbance = 0.05 * machine.forward.max(0.02 * machine.gravity) * noise();
         for i in 0..steps {
             let u = command(((t + f64::from(i) * h - machine.delay_s) * taken.rate).floor() / taken.rate);
-            let free = u + disturbance - machine.gravity * q.sin();
+            driven += (u - driven) * follow(machine.lag_s);
+            seen += (q - seen) * follow(machine.filter_s);
+            let free = driven + machine.offset + disturbance - machine.gravity * q.sin();
             let dry = if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
             if v == 0.0 && free.abs() <= dry {
                 continue;
@@ -225,6 +242,54 @@ fn a_delay_that_the_rig_knows_is_not_missing() {
     assert!(class.contains(&N::CommandDelay), "{class:?}");
     let known = diagnosed(&rig(WHOLE, "", "delay_s = 0.012", BENCH.counts), &fit, &holdout);
     assert!(names(&known).is_empty());
+}
+
+#[test]
+fn a_lag_an_offset_and_a_filter_that_the_rig_knows_are_not_missing() {
+    let model = format!("{WHOLE}\noffset = 1.5");
+    let machine = Machine { lag_s: 0.02, offset: 1.5, filter_s: 0.004, ..AXIS };
+    let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));
+    let (fit, holdout) = ([take(1)], [take(2)]);
+    let truth = rig(&model, "filter_s = 0.004", "lag_s = 0.02", BENCH.counts);
+    let known = diagnosed(&truth, &fit, &holdout);
+    assert!(names(&known).is_empty(), "{}", known.report.sentence);
+    assert!(known.report.fit.nominal.holdout < 0.02 * known.report.fit.force_rms.holdout);
+    let unknown = diagnosed(&rig(&model, "", "", BENCH.counts), &fit, &holdout);
+    let class = &unknown.report.effects[0].class;
+    assert!(class.contains(&N::ElectricalLag), "{class:?}");
+}
+
+#[test]
+fn twenty_rows_a_second_and_twenty_thousand_are_read_and_said_to_show_what_they_can() {
+    let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
+    let at = |rate: f64, seconds: f64, slower: f64| {
+        let taken = Taken { rate, seconds, ..BENCH };
+        let take = |seed| {
+            let command = mixed(14.0, seed as f64);
+            record(AXIS, taken, seed, move |t| command(slower * t))
+        };
+        diagnosed(&rig, &[take(1)], &[take(2)])
+    };
+    for (rate, seconds, slower, said) in [
+        (
+            20.0,
+            60.0,
+            0.3,
+            "20 rows a second: shows what happens below about 4 Hz; delays and lags much shorter than 50.00 ms do not show",
+        ),
+        (
+            20_000.0,
+            8.0,
+            1.0,
+            "20000 rows a second: shows what happens below about 4000 Hz; delays and lags much shorter than 0.05 ms do not show",
+        ),
+    ] {
+        let outcome = at(rate, seconds, slower);
+        assert_eq!(names(&outcome).first(), Some(&N::CoulombFriction), "{rate} Hz");
+        assert!(outcome.summary().contains(said), "{}", outcome.summary());
+    }
+    let slow = at(10.0, 60.0, 0.3).report;
+    assert!(slow.sentence.contains("rows a second where 20 to 20000 are read"), "{}", slow.sentence);
 }
 
 #[test]

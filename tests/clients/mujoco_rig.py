@@ -24,6 +24,8 @@ offset = 5.0e-5
 gain = 0.0234
 command_unit = "A"
 limit = 0.12
+delay_s = 0.001
+lag_s = 0.002
 [encoder]
 counts_per_unit = 636.6197724
 [[effect]]

@@ -104,6 +104,9 @@ impl Joint {
                 model.gravity_zero.unwrap_or(0.0)
             ));
         }
+        if let Some(filter) = rig.encoder.filter_s.filter(|s| *s > 0.0) {
+            joint.notes.push(format!("the position is read behind a first-order filter of {filter:.6e} s"));
+        }
         for effect in &rig.effects {
             let of = |key: &str| effect.coefficient(key);
             match effect.name {

@@ -22,6 +22,8 @@ pub struct Plant {
     position: f64,
     velocity: f64,
     time: f64,
+    /// The position behind the filter of the sensor that the rig knows.
+    filtered: f64,
     sensor: f64,
 }
 
@@ -48,6 +50,7 @@ impl Plant {
             position: 0.0,
             velocity: 0.0,
             time: 0.0,
+            filtered: 0.0,
             sensor: 0.0,
         }
     }
@@ -117,6 +120,8 @@ impl Plant {
                 };
         }
         self.position += self.velocity * dt;
+        self.filtered +=
+            (self.position - self.filtered) * self.filter_s().map_or(1.0, |s| 1.0 - (-dt / s).exp());
         self.time += dt;
     }
 
@@ -130,9 +135,13 @@ impl Plant {
         self.velocity
     }
 
-    /// What a sensor without steps reads: the position with what the rig's sensor effects add.
+    /// What a sensor without steps reads: the position behind the filter that the rig knows, with what its sensor effects add.
     pub fn reading(&self) -> f64 {
-        self.position + self.sensor
+        self.filtered + self.sensor
+    }
+
+    fn filter_s(&self) -> Option<f64> {
+        self.rig.encoder.filter_s.filter(|s| *s > 0.0)
     }
 
     /// Sets the time since the start, s, for a replay that begins within a recording.
@@ -140,9 +149,10 @@ impl Plant {
         self.time = time;
     }
 
-    /// Sets position and velocity, for replay from a measured state.
+    /// Sets position and velocity, for replay from a measured state: behind a known filter of the sensor the position is further on.
     pub fn place(&mut self, position: f64, velocity: f64) {
-        self.position = position;
+        self.position = position + velocity * self.filter_s().unwrap_or(0.0);
+        self.filtered = position;
         self.velocity = velocity;
     }
 
@@ -157,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_rig_knows_of_delay_and_gravity_is_run() {
+    fn what_the_rig_knows_of_delay_filter_and_gravity_is_run() {
         let mut rig = Rig::of_values(0.01, 0.1, 0.0);
         rig.actuator.delay_s = Some(0.05);
         let mut plant = Plant::new(&rig);
@@ -170,6 +180,17 @@ mod tests {
         run(0.01, 0.0);
         assert_eq!(run(0.04, 1.0), 0.0, "the command is under way");
         assert!(run(0.1, 1.0) > 0.1);
+        let mut rig = Rig::of_values(0.01, 0.1, 0.0);
+        rig.encoder.filter_s = Some(0.02);
+        let mut plant = Plant::new(&rig);
+        for _ in 0..20_000 {
+            plant.step(1.0, Surroundings::default(), 1e-4);
+        }
+        // At a constant speed a first-order filter is late by its time constant.
+        let late = (plant.position() - plant.reading()) / plant.velocity();
+        assert!((late - 0.02).abs() < 1e-3, "{late} s");
+        plant.place(3.0, 0.5);
+        assert_eq!((plant.reading(), plant.position()), (3.0, 3.01));
         let mut rig = Rig::of_values(0.01, 0.1, 0.0);
         rig.encoder.absolute = true;
         (rig.model.gravity, rig.model.gravity_zero) = (Some(1.0), Some(0.4));
