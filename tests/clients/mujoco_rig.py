@@ -4,6 +4,7 @@ python mujoco_rig.py PROGRAM, where PROGRAM is the built host-sim. Needs mujoco 
 """
 
 import csv
+import json
 import math
 import subprocess
 import sys
@@ -101,6 +102,17 @@ def compare(program, kind, rig, folder):
     share = worst / travel
     print(f"{kind}: MuJoCo {mujoco.__version__} is at most {worst:.3g} off over a travel of {travel:.3g}: {100 * share:.2f} %")
     assert share < 0.01, f"{kind}: {100 * share:.2f} % of the travel"
+    same_joint(folder / "out", kind)
+
+
+def same_joint(out, kind):
+    """The URDF, as MuJoCo reads it, and the JSON say of the joint what the MJCF says."""
+    said = json.loads((out / "patched-rig.json").read_text())["joint"]
+    for file in ["patched-rig.xml", "patched-rig.urdf"]:
+        model = mujoco.MjModel.from_xml_path(str(out / file))
+        for field, key in [("dof_M0", "inertia"), ("dof_damping", "damping"), ("dof_frictionloss", "frictionloss")]:
+            value = getattr(model, field)[0]
+            assert math.isclose(value, said[key], rel_tol=1e-6), f"{kind}: {file} has {key} {value}, the JSON {said[key]}"
 
 
 def main():
