@@ -4,7 +4,9 @@
 //! It speaks to any device, virtual or not, through the same `link` bytes, and leaves force laws to `control-core`.
 
 pub mod bedside;
+mod bounded_listener;
 pub mod characterise;
+pub mod class;
 pub mod debrief;
 pub mod device;
 pub mod driver;

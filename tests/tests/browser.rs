@@ -8,12 +8,9 @@ use control_core::controller::{Controller, Order, TickInput};
 use control_core::units::{Counts, Milliradians};
 use serde_json::{Value, json};
 use std::fs;
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
+use std::path::Path;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page};
+use tests::browser::{Chromium, Failure, Page, Places, Program, check};
 
 const DESKTOP: (u32, u32) = (1440, 900);
 const PHONE: (u32, u32) = (390, 844);
@@ -43,33 +40,9 @@ fn a_person_watches_takes_the_needle_stops_and_comes_back() {
     }
 }
 
-#[test]
-#[ignore = "once a patient was sent the demo stays stopped where the page waits for it; scrubbing has not been run in a browser yet"]
-fn a_patient_is_edited_and_a_replay_scrubbed() {
-    if let Err(failure) = edit_and_scrub() {
-        panic!("{failure}");
-    }
-}
-
-fn edit_and_scrub() -> Result<(), Failure> {
-    let places = Places::find()?;
-    let scratch = places.target.join("page-test-patients");
-    fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
-    let browser = Chromium::start(&scratch)?;
-    let recording = scratch.join("edited.mcap");
-    let _ = fs::remove_file(&recording);
-    let program = Program::start(&places.program, 0, Some(&recording))?;
-    let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
-    patients(&mut page, &scratch)?;
-    drop(page);
-    drop(program);
-    scrub(&browser, &places.program, &recording)
-}
-
 fn visit() -> Result<(), Failure> {
     let places = Places::find()?;
-    let scratch = places.target.join("page-test");
-    fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
+    let scratch = places.scratch("page-test")?;
     let browser = Chromium::start(&scratch)?;
     let recording = scratch.join("watched.mcap");
     let _ = fs::remove_file(&recording);
@@ -151,15 +124,11 @@ fn watch(page: &mut Page) -> Result<Vec<Value>, Failure> {
 
 /// The page as it is, to be looked at: light and dark.
 fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
-    photograph(page, &scratch.join("desktop.png"))?;
+    page.photograph(&scratch.join("desktop.png"))?;
     page.dark(true)?;
     std::thread::sleep(Duration::from_millis(300));
-    photograph(page, &scratch.join("desktop-dark.png"))?;
+    page.photograph(&scratch.join("desktop-dark.png"))?;
     page.dark(false)
-}
-
-fn photograph(page: &mut Page, file: &Path) -> Result<(), Failure> {
-    fs::write(file, page.screenshot()?).map_err(|e| format!("cannot write {}: {e}", file.display()))
 }
 
 /// A person takes the needle with the mouse and presses the skin: the force answers as the control core computes it.
@@ -357,18 +326,18 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))?;
     std::thread::sleep(Duration::from_millis(500));
     let flat = page.text(layers)?;
-    photograph(page, &scratch.join("turned-30.png"))?;
+    page.photograph(&scratch.join("turned-30.png"))?;
     page.evaluate(&turn(60))?;
     page.wait("the needle outside at 60°", A_FEW_INSERTIONS, &drawn(60.0))?;
     std::thread::sleep(Duration::from_millis(500));
     let steep = page.text(layers)?;
-    photograph(page, &scratch.join("turned-60.png"))?;
+    page.photograph(&scratch.join("turned-60.png"))?;
     let (before, after) = (numbers(&flat), numbers(&steep));
     let stay = before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 0.5);
     check("layers that stay where they are", stay, (&flat, &steep))?;
     page.wait("blood in the hub", A_FEW_INSERTIONS, "__stats.vessel === 'in_lumen' && __stats.flashback")?;
     page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
-    photograph(page, &scratch.join("through.png"))?;
+    page.photograph(&scratch.join("through.png"))?;
     page.wait(
         "a through-puncture told as one",
         SOON,
@@ -376,45 +345,6 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     )?;
     page.evaluate(&turn(30))?;
     page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))
-}
-
-/// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says why.
-fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
-    page.click("patient")?;
-    page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
-    let taken = "document.getElementById('patient-answer').textContent === 'The device has taken it.'";
-    let is =
-        |name: &str| format!("document.getElementById('subtitle').textContent.includes('Profile {name} ')");
-    let choose = |name: &str| {
-        format!(
-            "(() => {{ const choice = document.getElementById('patient-choice'); choice.value = '{name}'; \
-             choice.dispatchEvent(new Event('change')); }})()"
-        )
-    };
-    page.evaluate(&choose("firm-skin"))?;
-    page.wait("firm skin taken", SOON, &format!("{taken} && {}", is("firm-skin")))?;
-    page.wait("the demo in firm skin", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
-    let edit = |value: &str| {
-        format!(
-            "(() => {{ const input = document.querySelector('#patient-fields [data-key=friction_n_per_mm]'); \
-             input.value = '{value}'; input.dispatchEvent(new Event('input')); \
-             document.getElementById('patient-send').click(); }})()"
-        )
-    };
-    page.evaluate(&edit("-5"))?;
-    page.wait(
-        "a refusal with its reason",
-        SOON,
-        "document.getElementById('patient-answer').dataset.tone === 'bad' && \
-         document.getElementById('patient-answer').textContent.includes('friction')",
-    )?;
-    photograph(page, &scratch.join("patient.png"))?;
-    page.evaluate(&edit("0.03"))?;
-    page.wait("an edited patient taken", SOON, taken)?;
-    page.wait("the demo in it", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
-    page.evaluate(&choose("adult"))?;
-    page.wait("the adult again", SOON, &format!("{taken} && {}", is("adult")))?;
-    page.click("patient-close")
 }
 
 /// The program ends and is started again: the page says so, shows old data as old, and is back by itself.
@@ -460,123 +390,13 @@ fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<()
     }
     page.wait("the needle to follow the finger", SOON, &format!("__stats.depthMm > {before} + 1"))?;
     page.touch("touchEnd", at)?;
-    photograph(&mut page, &scratch.join("phone.png"))?;
+    page.photograph(&scratch.join("phone.png"))?;
     page.click("demo")?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
 
-/// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
-fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failure> {
-    let file = recording.to_str().ok_or("the target folder has a plain name")?;
-    let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
-    let mut page = Page::open(browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
-    page.wait(
-        "the slider",
-        SOON,
-        "!document.getElementById('scrub').hidden && !isNaN(__stats.firstFrameMs)",
-    )?;
-    page.click("stop")?;
-    page.wait("a pause", SOON, "document.getElementById('state').textContent === 'Recording paused'")?;
-    // Into the first insertion's hold, before it, and into it again.
-    let punctures = "document.querySelectorAll('#events [data-kind=puncture]').length";
-    for (at_s, place, given) in
-        [(4.2, "__stats.depthMm > 6", 2), (0.4, "__stats.depthMm < -3", 0), (4.2, "__stats.depthMm > 6", 2)]
-    {
-        page.evaluate(&format!(
-            "(() => {{ const place = document.getElementById('scrub-place'); place.value = '{at_s}'; \
-             place.dispatchEvent(new Event('input')); }})()"
-        ))?;
-        page.wait(&format!("the needle at {at_s} s"), SOON, &format!("{place} && {punctures} === {given}"))?;
-    }
-    let paused = page.number("__stats.depthMm")?;
-    std::thread::sleep(Duration::from_millis(600));
-    let still = page.number("__stats.depthMm")?;
-    check("a pause that stands still", paused == still, (paused, still))?;
-    page.click("start")?;
-    page.wait("the recording to go on", SOON, "__stats.depthMm < 0")?;
-    let complaints = page.complaints()?;
-    check("no errors in the console", complaints.is_empty(), &complaints)
-}
-
-fn check(what: &str, holds: bool, seen: impl std::fmt::Debug) -> Result<(), Failure> {
-    if holds { Ok(()) } else { Err(format!("{what}: not so, but {seen:?}")) }
-}
-
 fn row(name: &str, value: f64, unit: &str, better: &str) -> Value {
     json!({ "row": name, "value": (value * 1000.0).round() / 1000.0, "unit": unit, "wanted": null, "better": better,
             "peer": null, "peer_value": null })
-}
-
-/// Where things are, from where this test itself is: `target/release/deps/browser-…`.
-struct Places {
-    target: PathBuf,
-    program: PathBuf,
-}
-
-impl Places {
-    fn find() -> Result<Self, Failure> {
-        let own = std::env::current_exe().map_err(|e| e.to_string())?;
-        let profile = own.ancestors().nth(2).ok_or("the test is not in a target directory")?;
-        let program = profile.join(format!("host-sim{}", std::env::consts::EXE_SUFFIX));
-        if !program.exists() {
-            let at = program.display();
-            return Err(format!("no program at {at}: run `cargo xtask test`, which builds it first"));
-        }
-        let target = profile.parent().unwrap_or(profile).to_owned();
-        Ok(Self { target, program })
-    }
-}
-
-/// The program under test; dropped, it is ended.
-struct Program {
-    process: Child,
-    url: String,
-}
-
-impl Program {
-    /// Starts it and reads the address that it prints.
-    fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Failure> {
-        let port = port.to_string();
-        let record =
-            record.map(|file| file.to_str().ok_or("the target folder has a plain name")).transpose()?;
-        let mut arguments = vec!["run", "--port", &port];
-        arguments.extend(record.into_iter().flat_map(|file| ["--record", file]));
-        Self::start_with(path, &arguments)
-    }
-
-    fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Failure> {
-        let mut command = Command::new(path);
-        command.args(arguments);
-        let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
-        let mut process = spawned.map_err(|e| format!("cannot start {}: {e}", path.display()))?;
-        let stdout = BufReader::new(process.stdout.take().ok_or("no standard output")?);
-        let mut program = Self { process, url: String::new() };
-        let (sender, receiver) = mpsc::channel();
-        // Reads on after the address: the program may say more, and must not meet a closed pipe.
-        std::thread::spawn(move || {
-            for line in stdout.lines().map_while(Result::ok) {
-                let address = line.find("http://").and_then(|at| line[at..].split_whitespace().next());
-                let _ = address.map(|address| sender.send(address.to_owned()));
-            }
-        });
-        program.url = receiver.recv_timeout(SOON).map_err(|_| "the program printed no address")?;
-        Ok(program)
-    }
-
-    fn port(&self) -> Result<u16, Failure> {
-        let port = self.url.trim_end_matches('/').rsplit(':').next().and_then(|port| port.parse().ok());
-        port.ok_or_else(|| format!("no port in {}", self.url))
-    }
-
-    fn end(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        self.end();
-    }
 }

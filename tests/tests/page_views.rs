@@ -1,12 +1,9 @@
 //! The second view of the page (limb and ultrasound) from the program, and the whole simulator from a folder without a
 //! server, as `cargo xtask site` writes it.
 
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page};
+use tests::browser::{Chromium, Failure, Page, Places, Program};
 
 /// A start on a busy machine; a scripted insertion takes 6 s.
 const SOME_TIME: Duration = Duration::from_secs(60);
@@ -21,16 +18,13 @@ fn limb_and_ultrasound_are_drawn_and_the_folder_needs_no_server() {
 }
 
 fn visit() -> Result<(), Failure> {
-    let own = std::env::current_exe().map_err(|e| e.to_string())?;
-    let profile = own.ancestors().nth(2).ok_or("the test is not in a target directory")?;
-    let target = profile.parent().unwrap_or(profile);
-    let scratch = target.join("page-views");
-    std::fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
+    let places = Places::find()?;
+    let scratch = places.scratch("page-views")?;
     let browser = Chromium::start(&scratch)?;
-    let program = Program::start(&profile.join(format!("host-sim{}", std::env::consts::EXE_SUFFIX)))?;
+    let program = Program::start(&places.program, 0, None)?;
     look(&browser, &program.url, &scratch.join("program.png"))?;
     drop(program);
-    look(&browser, &site(target)?, &scratch.join("site.png"))
+    look(&browser, &site(&places.target)?, &scratch.join("site.png"))
 }
 
 /// The folder's page: in the target directory, or where `cargo xtask site` put it for this one.
@@ -49,8 +43,7 @@ fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Failure>
     page.click("view-body")?;
     page.wait("limb and ultrasound", SOME_TIME, DRAWN)?;
     page.wait("the needle in the image", SOME_TIME, IN_PLANE)?;
-    let picture = page.screenshot()?;
-    std::fs::write(photograph, picture).map_err(|e| format!("cannot write {}: {e}", photograph.display()))?;
+    page.photograph(photograph)?;
     page.wait("the needle outside", SOME_TIME, "__stats.depthMm < 0")?;
     page.evaluate(
         "{ const s = document.getElementById('probe-across'); s.value = 6; s.dispatchEvent(new Event('input')); }",
@@ -63,39 +56,4 @@ fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Failure>
     }
     page.click("view-section")?;
     page.wait("the section", SOME_TIME, "document.getElementById('section').clientHeight > 100")
-}
-
-/// The program; dropped, it is ended.
-struct Program {
-    process: Child,
-    url: String,
-}
-
-impl Program {
-    fn start(path: &Path) -> Result<Self, Failure> {
-        let spawned = Command::new(path)
-            .args(["run", "--port", "0"])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn();
-        let mut process = spawned.map_err(|e| format!("cannot start {}: {e}", path.display()))?;
-        let stdout = BufReader::new(process.stdout.take().ok_or("no standard output")?);
-        let mut program = Self { process, url: String::new() };
-        let (sender, receiver) = mpsc::channel();
-        std::thread::spawn(move || {
-            for line in stdout.lines().map_while(Result::ok) {
-                let address = line.find("http://").and_then(|at| line[at..].split_whitespace().next());
-                let _ = address.map(|address| sender.send(address.to_owned()));
-            }
-        });
-        program.url = receiver.recv_timeout(SOME_TIME).map_err(|_| "the program printed no address")?;
-        Ok(program)
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
 }

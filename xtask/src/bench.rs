@@ -14,14 +14,12 @@ use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Examples that measure: their package and name.
-const EXAMPLES: [(&str, &str); 6] = [
-    ("firmware", "tick_host"),
-    ("host-sim", "plant_speed"),
-    ("tissue", "xpbd_speed"),
-    ("ultrasound", "ultrasound_speed"),
-    ("host-sim", "stream_speed"),
-    ("diagnosis", "diagnose_speed"),
+/// Examples that measure: their package and name, and what the rows that they give begin with.
+const EXAMPLES: [(&str, &str, &str); 4] = [
+    ("firmware", "tick_host", "tick_host"),
+    ("host-sim", "plant_speed", "plant_"),
+    ("tissue", "xpbd_speed", "xpbd_"),
+    ("ultrasound", "ultrasound_speed", "ultrasound_"),
 ];
 /// The crate whose build and dependencies are what a user waits for.
 const MAIN: &str = "host-sim";
@@ -35,28 +33,50 @@ const BOARD_LINE: &str = "| ";
 /// What was measured, by name.
 type Values = BTreeMap<String, String>;
 
-/// Measures, prints the table, writes `target/bench.json`.
-pub(crate) fn run() -> Result<(), Failure> {
+/// Measures, prints the table, writes `target/bench.json`. Where `names` has any, only what gives these rows is run.
+pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
+    if let Some(unknown) = names.iter().find(|name| ROWS.iter().all(|row| row.name != **name)) {
+        let all: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
+        return Err(Failure::usage(format!(
+            "`{unknown}` is no row of the bench; they are: {}",
+            all.join(" ")
+        )));
+    }
+    let wants = |rows: &str| names.is_empty() || names.iter().any(|name| name.starts_with(rows));
     let mut values = Values::new();
     let mut troubles = vec![];
     let mut measure = |what: &str, measured: Result<Values, Failure>| match measured {
         Ok(new) => values.extend(new),
         Err(failure) => troubles.push(format!("{what}: {failure}")),
     };
-    measure("build", build_time());
-    measure("packages", packages());
-    measure("firmware", image());
-    for (package, name) in EXAMPLES {
-        if shell::top().join(package).join("examples").join(name).with_extension("rs").is_file() {
+    if wants("build_") {
+        measure("build", build_time());
+    }
+    if wants("packages") {
+        measure("packages", packages());
+    }
+    if wants("firmware_") {
+        measure("firmware", image());
+    }
+    for (package, name, rows) in EXAMPLES {
+        if wants(rows) {
             measure(name, example(package, name));
         }
     }
-    measure("peers", peers());
-    measure("stream", stream());
-    measure("diagnosis", diagnosis());
+    for (script, rows) in PEERS {
+        if wants(rows) {
+            measure(script, peer_program(script));
+        }
+    }
+    if wants("stream_") {
+        measure("stream", stream());
+    }
+    if wants("diagnose_") {
+        measure("diagnosis", diagnosis());
+    }
     let mut board_lines = vec![];
     for name in test::test_programs()? {
-        if measures(&name) {
+        if measures(&name, wants) {
             measure(&name, test_program(&name, &mut board_lines));
         }
     }
@@ -75,11 +95,11 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 /// Tests that print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
-fn measures(name: &str) -> bool {
+fn measures(name: &str, wants: impl Fn(&str) -> bool) -> bool {
     let path = shell::top().join("tests/tests").join(name).with_extension("rs");
     fs::read_to_string(path).is_ok_and(|text| {
-        text.contains(&format!("\"{BOARD_LINE}"))
-            || ROWS.iter().any(|row| {
+        (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
+            || ROWS.iter().filter(|row| wants(row.name)).any(|row| {
                 text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
             })
     })
@@ -170,20 +190,18 @@ fn image() -> Result<Values, Failure> {
     Ok(Values::from([("firmware_flash_bytes".into(), bytes.len().to_string())]))
 }
 
-/// Other people's solvers on the same tasks, in Python; pinned.
-const PEERS: [&str; 2] = ["numpy==2.4.6", "mujoco==4.0.0"];
+/// Other people's solvers on the same tasks, in Python, and the rows that they stand beside.
+const PEERS: [(&str, &str); 2] = [("soft_body.py", "xpbd_"), ("bmode.py", "ultrasound_")];
+/// What they need.
+const PEERS_PACKAGES: [&str; 2] = ["numpy==2.4.6", "mujoco==4.0.0"];
 
-/// Runs them: each prints the row that it stands beside.
-fn peers() -> Result<Values, Failure> {
-    let python = setup::python(&PEERS)?;
-    let mut values = Values::new();
-    for script in ["soft_body.py", "bmode.py"] {
-        let mut command = Command::new(&python);
-        // One core, as ours.
-        command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
-        values.extend(values_in(&shell::output(command.arg(shell::top().join("xtask/peers").join(script)))?));
-    }
-    Ok(values)
+/// Runs one of them: it prints the row that it stands beside.
+fn peer_program(script: &str) -> Result<Values, Failure> {
+    let python = setup::python(&PEERS_PACKAGES)?;
+    let mut command = Command::new(&python);
+    // One core, as ours.
+    command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+    shell::output(command.arg(shell::top().join("xtask/peers").join(script))).map(|text| values_in(&text))
 }
 
 /// The whole way of a sample: plant, control law, frame, bytes, frame again, tallies.

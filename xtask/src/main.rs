@@ -29,8 +29,9 @@ The project's chores.
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
+  cargo xtask class             a class over Zenoh: its tests, and thirty devices measured; builds for minutes
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
-  cargo xtask bench             measures, prints the table and writes target/bench.json
+  cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
@@ -53,9 +54,10 @@ fn main() -> ExitCode {
         "flash" => flash::run(rest),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
+        "class" => no_more(rest).and_then(|()| test::class()),
         "board-test" => no_more(rest).and_then(|()| board_test::run()),
         "mutants" => mutants::run(rest),
-        "bench" => no_more(rest).and_then(|()| bench::run()),
+        "bench" => bench::run(rest),
         other => Err(Failure::usage(format!(
             "`{other}` is no chore of this project; `cargo xtask help` lists them"
         ))),

@@ -81,6 +81,16 @@ pub(crate) fn node() -> Result<(), Failure> {
     }
 }
 
+/// What compiles and runs C#: Debian has Mono, and no registry that CI reaches has .NET.
+pub(crate) fn mono() -> Result<(), Failure> {
+    if ["mcs", "mono"].into_iter().all(shell::is_on_path) {
+        return Ok(());
+    }
+    let packages =
+        ["mono-mcs", "mono-runtime", "libmono-system-runtime-serialization4.0-cil", "libmono-system4.0-cil"];
+    install(&packages, "the test of the documented C# client")
+}
+
 /// How the image for the board is built on this machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Toolchain {

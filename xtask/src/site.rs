@@ -11,6 +11,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Of no use without devices to look at.
+const CLASS_PAGE: &str = "class.js";
 /// The page, and what takes the place of some of its modules.
 const PAGE: &str = "host-sim/page";
 const IN_PLACE: &str = "site-wasm/page";
@@ -83,7 +85,7 @@ fn scripts(folder: &Path) -> Result<BTreeMap<String, String>, Failure> {
     for entry in fs::read_dir(folder).map_err(|error| cannot(&error))?.flatten() {
         let path = entry.path();
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
-        if name.ends_with(".js") {
+        if name.ends_with(".js") && name != CLASS_PAGE {
             let text = fs::read_to_string(&path).map_err(|error| cannot(&error))?;
             modules.insert(
                 name.to_string(),

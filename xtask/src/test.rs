@@ -48,9 +48,11 @@ const STEPS: [Step; 13] = [
     Step { name: "prove", shows: "the small proof of the diagnosis", run: prove },
 ];
 
-/// What no machine without the hardware can run.
-const NEVER_HERE: &str =
-    "flashing and running on a real STM32F4DISCOVERY: needs the board and a person beside it";
+/// What this does not run, and why.
+const NEVER_HERE: [(&str, &str); 2] = [
+    ("hardware", "flashing and running on a real STM32F4DISCOVERY: needs the board and a person beside it"),
+    ("class", "devices and instructor over Zenoh, which builds for minutes: run `cargo xtask class`"),
+];
 
 /// When the whole run has to be over.
 struct Clock(Instant);
@@ -116,7 +118,7 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
     }
     println!("\nSummary");
     summary.iter().for_each(|line| println!("  {line}"));
-    println!("  hardware        -  not run: {NEVER_HERE}");
+    NEVER_HERE.iter().for_each(|(what, why)| println!("  {what:<9}      -  not run: {why}"));
     println!("steps: {passed} passed, {failed} failed");
     if failed == 0 {
         Ok(())
@@ -215,6 +217,8 @@ fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let top = shell::top();
     let program = shell::target().join("release/host-sim");
     clock.run(Command::new(&python).arg(top.join("tests/clients/streams.py")).arg(&program))?;
+    setup::mono()?;
+    clock.run(Command::new(&python).arg(top.join("tests/clients/documented.py")).arg(&program))?;
     passed(clock.run(Command::new(&python).arg(top.join("tests/clients/mujoco_rig.py")).arg(&program)))
 }
 
@@ -252,6 +256,20 @@ fn prove(clock: &Clock) -> Result<Ended, Failure> {
         "--",
         "--quick",
     ])))
+}
+
+/// The tests of a class, which need a build of their own, and the measurement of thirty devices.
+pub(crate) fn class() -> Result<(), Failure> {
+    let clock = Clock(Instant::now() + LIMIT);
+    let build = ["-p", "host-sim", "--features", "class", ANY_RUST];
+    let mut clippy = cargo();
+    clippy.args(["clippy", "--release", "--all-targets"]).args(build).args(["--", "-D", "warnings"]);
+    clock.run(&mut clippy)?;
+    let mut test = cargo();
+    test.args(["test", "--release", "--test", "class"]).args(build);
+    // One after the other: what is measured must not share the machine.
+    test.args(["--", "--include-ignored", "--nocapture", "--test-threads", "1"]);
+    clock.run(&mut test)
 }
 
 /// Nextest where it is installed, else cargo's own.

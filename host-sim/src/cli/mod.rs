@@ -1,6 +1,7 @@
 //! One module a command.
 
 mod characterise;
+mod class;
 mod diagnose;
 mod export;
 mod fit_force;
@@ -28,6 +29,7 @@ pub(crate) struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Run(run::Run),
+    Class(class::Class),
     Replay(recordings::Replay),
     Export(recordings::Export),
     Score(training::Score),
@@ -47,6 +49,7 @@ impl Cli {
             // As if `run` had been said: its defaults stand in one place.
             None => Self::parse_from(["host-sim", "run"]).run(),
             Some(Command::Run(command)) => command.run(),
+            Some(Command::Class(command)) => command.run(),
             Some(Command::Replay(command)) => command.run(),
             Some(Command::Export(command)) => command.run(),
             Some(Command::Score(command)) => command.run(),

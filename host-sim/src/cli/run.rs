@@ -1,5 +1,6 @@
 //! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
 
+use super::class::ClassFlags;
 use super::progress::Progress;
 use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
@@ -69,6 +70,8 @@ pub(crate) struct Run {
     port: u16,
     #[command(flatten)]
     streams: StreamFlags,
+    #[command(flatten)]
+    class: ClassFlags,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -100,6 +103,7 @@ impl Run {
         let (session, publisher) = session::open(profile.scene(source.clone(), shown_procedure.clone()));
         // The port is taken before the file is made: a page that cannot be served must not cost a recording.
         let _streams = self.streams.serve(&session)?;
+        let _class = self.class.join(&session, device)?;
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
             program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
@@ -148,6 +152,7 @@ impl Run {
     /// What clap cannot check.
     fn check(&self) -> Result<Option<f64>, Failure> {
         self.streams.check()?;
+        self.class.check()?;
         let not_yet = |name: &str| {
             Err(Failure::input(format_args!(
                 "--model {name} is not built yet: only the jog effect and the friction cone are; use --model jog"

@@ -14,7 +14,7 @@ use control_core::config::Tissue;
 use control_core::controller::Sample;
 use gesture::{Gesture, Place};
 use link::frames::{Event, EventKind};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 use vessel::Targets;
 
@@ -26,7 +26,8 @@ pub struct Score {
 }
 
 /// One insertion: from the first touch of the outermost layer until the tip has left it, or the recording ends.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Insertion {
     /// When it began, s into the recording.
     pub begin_s: f64,

@@ -43,8 +43,12 @@ pub struct NeedlePose {
     pub tip_mm: [f64; 3],
     /// Unit vector of the needle in the direction of insertion, the same axes.
     pub direction: [f64; 3],
+    /// Angle to the skin that the layers are met at.
+    pub angle_rad: f64,
     /// The state of the control law, as [`messages::Pose::state`] names it.
     pub state: &'static str,
+    /// Where the tip is as seen from the vessel, as [`messages::Pose::vessel`] names it.
+    pub vessel: &'static str,
 }
 
 impl From<&messages::Pose> for NeedlePose {
@@ -60,7 +64,9 @@ impl From<&messages::Pose> for NeedlePose {
             tilt_rad: pose.tilt_rad,
             tip_mm: direction.map(|part| part * pose.depth_mm),
             direction,
+            angle_rad: pose.angle_rad,
             state: pose.state,
+            vessel: pose.vessel,
         }
     }
 }

@@ -4,13 +4,13 @@
 use super::feed::Snapshot;
 use super::spec::Token;
 use super::{MOST_CLIENTS, SEND_TIMEOUT};
+use crate::bounded_listener::BoundedListener;
 use axum::Router;
 use axum::extract::ws::{Message, WebSocket};
 use axum::extract::{Query, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use axum::serve::ListenerExt;
 use serde::Deserialize;
 use std::io;
 use std::net::SocketAddr;
@@ -42,9 +42,8 @@ pub(super) async fn serve(
 ) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
-    let listener = listener.tap_io(|stream| {
-        let _ = stream.set_nodelay(true);
-    });
+    // A few more than may stream, so that one too many is told so.
+    let listener = BoundedListener::new(listener, 2 * MOST_CLIENTS);
     let shared = Shared { newest, token, places: Arc::new(Semaphore::new(MOST_CLIENTS)) };
     let router = Router::new().route("/", get(connect)).route("/pose", get(connect)).with_state(shared);
     tokio::spawn(async move {

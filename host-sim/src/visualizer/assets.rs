@@ -7,6 +7,7 @@ pub(super) struct Asset {
     pub(super) body: &'static [u8],
 }
 
+const PAGE: &str = "text/html; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 macro_rules! asset {
@@ -19,10 +20,16 @@ macro_rules! asset {
     };
 }
 
-/// All of them.
+/// The page of one device.
+pub(super) const DEVICE_PAGE: Asset = asset!("/", "index.html", PAGE);
+/// The page of a class.
+pub(super) const CLASS_PAGE: Asset = asset!("/", "class.html", PAGE);
+
+/// What the pages are made of.
 pub(super) const ASSETS: &[Asset] = &[
-    asset!("/", "index.html", "text/html; charset=utf-8"),
     asset!("/style.css", "style.css", "text/css; charset=utf-8"),
+    asset!("/class.css", "class.css", "text/css; charset=utf-8"),
+    asset!("/class.js", "class.js", SCRIPT),
     asset!("/icon.svg", "icon.svg", "image/svg+xml"),
     asset!("/main.js", "main.js", SCRIPT),
     asset!("/link.js", "link.js", SCRIPT),

@@ -102,7 +102,8 @@ impl Condenser {
         tick as f64 / f64::from(tick_hz)
     }
 
-    fn pose(&self, pose: &Pose) -> messages::Pose {
+    /// A pose as a page has it; the motor is that of the newest sample.
+    pub(crate) fn pose(&self, pose: &Pose) -> messages::Pose {
         messages::Pose {
             t_s: self.seconds(pose.tick),
             depth_mm: fine(pose.depth.0.to_num()),

@@ -1,14 +1,15 @@
 //! Serves the page on this computer only.
 
-use super::assets::{ASSETS, Asset};
+use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE};
 use super::connection;
+use super::watched::{self, Watches};
+use crate::bounded_listener::BoundedListener;
 use crate::session::Session;
 use axum::Router;
 use axum::extract::{State, WebSocketUpgrade};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
-use axum::serve::ListenerExt;
+use axum::routing::{MethodRouter, get};
 use std::fmt;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
@@ -19,6 +20,8 @@ use tokio::sync::oneshot;
 
 /// Longest message taken from a page, in bytes: an edited patient with all its layers has about 3,000.
 const LONGEST_MESSAGE: usize = 32_768;
+/// Connections at a time: eight pages with all their files. Whoever publishes does so to each.
+const MOST_CONNECTIONS: usize = 64;
 
 /// Why the page cannot be served.
 #[derive(Debug)]
@@ -100,8 +103,18 @@ impl Drop for Server {
     }
 }
 
-/// Serves `session` at `port` of 127.0.0.1 (0: any free one) on a thread of its own.
+/// Serves the page of `session` at `port` of 127.0.0.1 (0: any free one) on a thread of its own.
 pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
+    let shared = Shared { session, person: Arc::default() };
+    start(port, &DEVICE_PAGE, get(live).with_state(shared))
+}
+
+/// Serves a page of a class, which only looks at what `watches` give, as [`serve`] does.
+pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> {
+    start(port, &CLASS_PAGE, get(watched::live).with_state(watches))
+}
+
+fn start(port: u16, page: &'static Asset, live: MethodRouter) -> Result<Server, ServeError> {
     let failed = |error: io::Error| match error.kind() {
         io::ErrorKind::AddrInUse => ServeError::PortInUse { port },
         _ => ServeError::Io { port, error },
@@ -111,11 +124,10 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
     let address = listener.local_addr().map_err(failed)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
     let (stop, stopped) = oneshot::channel();
-    let shared = Shared { session, person: Arc::default() };
     let run = move || {
         runtime.block_on(async {
             tokio::select! {
-                () = listen(listener, shared) => {}
+                () = listen(listener, page, live) => {}
                 _ = stopped => {}
             }
         });
@@ -126,18 +138,14 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
     Ok(Server { address, stop: Some(stop), thread: Some(thread) })
 }
 
-async fn listen(listener: TcpListener, shared: Shared) {
+async fn listen(listener: TcpListener, page: &'static Asset, live: MethodRouter) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-    // Many small messages: each is wanted at once.
-    let listener = listener.tap_io(|stream| {
-        let _ = stream.set_nodelay(true);
-    });
-    let mut router = Router::new().route("/live", get(live));
-    for asset in ASSETS {
+    let mut router = Router::new().route("/live", live);
+    for asset in std::iter::once(page).chain(ASSETS) {
         router = router.route(asset.path, get(move || async move { file(asset) }));
     }
     // Ends only with its future.
-    let _ = axum::serve(listener, router.with_state(shared)).await;
+    let _ = axum::serve(BoundedListener::new(listener, MOST_CONNECTIONS), router).await;
 }
 
 fn file(asset: &'static Asset) -> Response {
@@ -164,7 +172,7 @@ async fn live(State(shared): State<Shared>, headers: HeaderMap, upgrade: WebSock
 
 /// Any site that a person visits may open a WebSocket to 127.0.0.1 and would drive the motor: the browser tells where the
 /// script came from, and that has to be here.
-fn is_own_page(headers: &HeaderMap) -> bool {
+pub(super) fn is_own_page(headers: &HeaderMap) -> bool {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let Some(host) = text(header::HOST) else { return false };
     let name = host.rsplit_once(':').map_or(host, |(name, _)| name);

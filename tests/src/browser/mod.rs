@@ -1,14 +1,21 @@
 //! A real browser for the test of the page: Debian's Chromium without a screen, driven over its DevTools protocol.
 //!
-//! [`chromium`] starts and ends it, [`devtools`] speaks to it, [`page`] says what a test means: click, drag, read.
-//! Nothing here knows what the page under test shows.
+//! [`chromium`] starts and ends it, [`devtools`] speaks to it, [`page`] says what a test means: click, drag, read;
+//! [`program`] starts what serves the page. Nothing here knows what the page under test shows.
 
 pub mod chromium;
 pub mod devtools;
 pub mod page;
+pub mod program;
 
 pub use chromium::Chromium;
 pub use page::Page;
+pub use program::{Places, Program};
 
 /// What went wrong with the browser, in one sentence.
 pub type Failure = String;
+
+/// An error with what was seen instead, where something does not hold.
+pub fn check(what: &str, holds: bool, seen: impl std::fmt::Debug) -> Result<(), Failure> {
+    if holds { Ok(()) } else { Err(format!("{what}: not so, but {seen:?}")) }
+}

@@ -115,6 +115,12 @@ impl Page {
         Ok(())
     }
 
+    /// Writes a picture of the view to `file`, to be looked at.
+    pub fn photograph(&mut self, file: &std::path::Path) -> Result<(), Failure> {
+        let picture = self.screenshot()?;
+        std::fs::write(file, picture).map_err(|e| format!("cannot write {}: {e}", file.display()))
+    }
+
     /// The view as a PNG.
     pub fn screenshot(&mut self) -> Result<Vec<u8>, Failure> {
         let picture = self.devtools.call("Page.captureScreenshot", json!({ "format": "png" }))?;

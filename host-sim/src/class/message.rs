@@ -1,0 +1,80 @@
+//! What a device says to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`. Units stand in the names.
+
+use crate::score::Insertion;
+use crate::session::Scene;
+use crate::visualizer::messages::Event;
+use serde::{Deserialize, Serialize};
+
+/// The part of a key that says what a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A JSON list of [`crate::streams::NeedlePose`]: all of 1 kHz since the last message, oldest first.
+    Pose,
+    /// One [`Event`].
+    Event,
+    /// A [`ClassScore`], at the end of each insertion.
+    Score,
+    /// An [`About`], once a second and whenever another patient is chosen: whoever comes later learns all from it.
+    About,
+}
+
+impl Kind {
+    const ALL: [(Self, &str); 4] =
+        [(Self::Pose, "pose"), (Self::Event, "event"), (Self::Score, "score"), (Self::About, "about")];
+
+    /// As it stands in a key.
+    pub fn as_str(self) -> &'static str {
+        Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
+    }
+
+    /// From a key's last part.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(_, known)| *known == name).map(|(kind, _)| *kind)
+    }
+}
+
+/// A trainee's insertions so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ClassScore {
+    /// Insertions that have ended.
+    pub insertions: u32,
+    /// Those of them that reached the vessel.
+    pub vessel: u32,
+    /// Those of them that went through the vessel's far wall.
+    pub through_far_wall: u32,
+    /// Insertions since the last one that reached the vessel and spared the far wall.
+    pub without_success: u32,
+    /// The last one; none before the first.
+    pub last: Option<Insertion>,
+}
+
+impl ClassScore {
+    /// One more has ended.
+    pub fn count(&mut self, insertion: Insertion) {
+        self.insertions += 1;
+        self.vessel += u32::from(insertion.vessel);
+        self.through_far_wall += u32::from(insertion.through_far_wall);
+        let good = insertion.vessel && !insertion.through_far_wall;
+        self.without_success = if good { 0 } else { self.without_success + 1 };
+        self.last = Some(insertion);
+    }
+}
+
+/// All that stays true for longer than a pose.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct About {
+    /// What is simulated, as the trainee's own page has it.
+    pub scene: Scene,
+    /// Whether the trainee's computer hears its device.
+    pub connected: bool,
+    /// Whether it records.
+    pub recording: bool,
+    /// The fault that has latched, in words.
+    pub fault: Option<String>,
+    /// How long the tip has been in the body and within 1 mm of one place, s; 0 outside.
+    pub still_s: f64,
+    /// Insertions so far.
+    pub score: ClassScore,
+    /// The last events, oldest first.
+    pub events: Vec<Event>,
+}

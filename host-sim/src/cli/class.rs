@@ -1,0 +1,111 @@
+//! `host-sim class`: the instructor's page; and the flags by which `run` joins a class.
+
+use super::run::stop_on_signals;
+use clap::Args;
+use control_core::Device;
+use host_sim::class::board::{Board, Sent};
+use host_sim::class::{self, Meeting, Membership, Name, USUAL_ADDRESS};
+use host_sim::failure::Failure;
+use host_sim::session::Session;
+use host_sim::streams::Token;
+use host_sim::visualizer::{self, Watch};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Between two looks at the signals.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Show a class of devices: everyone's needle, live scores, who is stuck, who is gone.
+///
+/// Devices join with `run --class NAME`. The page only looks: nothing can be started from it. Needs a build with
+/// `--features class`.
+#[derive(Args)]
+#[command(after_help = examples!("Examples:
+  host-sim class ward-3
+  host-sim class ward-3 --listen 192.168.1.20:7447 --class-token a-long-secret"))]
+pub(crate) struct Class {
+    /// Name of the class: letters, digits, ._-
+    name: Name,
+    /// Where devices connect to; an address that other computers reach needs --class-token
+    #[arg(long, default_value_t = USUAL_ADDRESS, value_name = "ADDRESS:PORT")]
+    listen: SocketAddr,
+    /// What every device has to know; at least 12 characters
+    #[arg(long, value_name = "TOKEN")]
+    class_token: Option<Token>,
+    /// Port of the page on this computer; 0 takes any free one
+    #[arg(long, default_value_t = 8720, value_name = "N")]
+    port: u16,
+}
+
+impl Class {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let meeting = Meeting { class: self.name, address: self.listen, token: self.class_token };
+        meeting.check("--listen").map_err(Failure::input)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+        let board = Arc::new(Board::default());
+        let _listener = class::listen(&meeting, board.clone()).map_err(Failure::failed)?;
+        let Meeting { class: name, address, .. } = meeting;
+        let shown = name.clone();
+        let watch = move || -> Watch {
+            let (board, name, mut sent) = (board.clone(), shown.clone(), Sent::default());
+            Box::new(move || board.text(&name, address, Instant::now(), &mut sent))
+        };
+        let server = visualizer::serve_watched(Arc::new(watch), self.port).map_err(Failure::failed)?;
+        say!("class {name} listens at {address}");
+        say!("class page at {}", server.url());
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(PAUSE);
+        }
+        Ok(())
+    }
+}
+
+/// How a run joins a class.
+#[derive(Args)]
+pub(crate) struct ClassFlags {
+    /// Publish pose, events and scores to the class of this name; needs a build with --features class
+    #[arg(long, value_name = "NAME")]
+    class: Option<Name>,
+    /// What the class calls this device; without it, this computer's name
+    #[arg(long, value_name = "NAME", requires = "class")]
+    class_as: Option<Name>,
+    /// Where the instructor's program listens; another computer's address needs --class-token
+    #[arg(long, default_value_t = USUAL_ADDRESS, value_name = "ADDRESS:PORT")]
+    class_at: SocketAddr,
+    /// The class's token, as the instructor gave it
+    #[arg(long, value_name = "TOKEN", requires = "class")]
+    class_token: Option<Token>,
+}
+
+impl ClassFlags {
+    /// What clap cannot check.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        self.meeting().map_or(Ok(()), |meeting| meeting.check("--class-at")).map_err(Failure::input)
+    }
+
+    /// Joins where that was asked for, and says so.
+    pub(crate) fn join(&self, session: &Session, device: Device) -> Result<Option<Membership>, Failure> {
+        let Some(meeting) = self.meeting() else { return Ok(None) };
+        let name = self.class_as.clone().unwrap_or_else(computer);
+        let membership = class::join(session.clone(), device, &meeting, &name).map_err(Failure::failed)?;
+        say!("class {} at {} as {name}", meeting.class, meeting.address);
+        Ok(Some(membership))
+    }
+
+    fn meeting(&self) -> Option<Meeting> {
+        let class = self.class.clone()?;
+        Some(Meeting { class, address: self.class_at, token: self.class_token.clone() })
+    }
+}
+
+/// This computer's name, as far as it fits into a key.
+fn computer() -> Name {
+    let told = std::fs::read_to_string("/etc/hostname").ok();
+    let told = told.or_else(|| std::env::var("COMPUTERNAME").ok()).unwrap_or_default();
+    let plain: String =
+        told.trim().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
+    plain.parse().unwrap_or_else(|_| Name::device())
+}

@@ -1,0 +1,54 @@
+//! A page that only looks: it is sent a text whenever there is one, and nothing that it says is listened to.
+
+use super::server::is_own_page;
+use axum::extract::ws::{Message, WebSocket};
+use axum::extract::{State, WebSocketUpgrade};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+/// What one page is told: the next JSON text, where there is one.
+pub type Watch = Box<dyn FnMut() -> Option<String> + Send>;
+/// A [`Watch`] for each page that comes.
+pub type Watches = Arc<dyn Fn() -> Watch + Send + Sync>;
+
+/// Between two looks: ten a second are enough for an overview.
+const PERIOD: Duration = Duration::from_millis(100);
+/// A page that takes nothing for so long is gone.
+const SEND_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest message that is read and thrown away, in bytes.
+const LONGEST_MESSAGE: usize = 1_024;
+
+pub(super) async fn live(
+    State(watches): State<Watches>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if !is_own_page(&headers) {
+        return (StatusCode::FORBIDDEN, "only the page of this program may look").into_response();
+    }
+    upgrade
+        .max_message_size(LONGEST_MESSAGE)
+        .max_frame_size(LONGEST_MESSAGE)
+        .on_upgrade(move |socket| tell(socket, watches()))
+}
+
+async fn tell(mut socket: WebSocket, mut watch: Watch) {
+    let mut due = interval(PERIOD);
+    due.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            said = socket.recv() => match said {
+                Some(Ok(_)) => continue,
+                _ => return,
+            },
+            _ = due.tick() => {}
+        }
+        let Some(text) = watch() else { continue };
+        if !matches!(timeout(SEND_TIMEOUT, socket.send(Message::Text(text.into()))).await, Ok(Ok(()))) {
+            return;
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! A virtual device in real time, as `host-sim run` runs it, and how late its control path was meanwhile.
+
+use host_sim::device::virtual_device::VirtualDevice;
+use host_sim::driver::Driver;
+use host_sim::pace::Pace;
+use host_sim::procedure::Procedure;
+use host_sim::profile::Profile;
+use host_sim::session::{self, Publisher, Session, Source};
+use host_sim::station::{Outcome, Outlets, Station};
+use host_sim::tally::Tally;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// A firmware whose PC is silent for longer takes the torque away: nothing may hold the control path up for so long.
+pub(crate) const HEARTBEAT_LIMIT: Duration = Duration::from_millis(200);
+
+/// The adult's session, and the end that feeds it.
+pub(crate) fn open() -> (Session, Publisher) {
+    let profile = Profile::find("adult").expect("it is built in");
+    let (session, publisher) = session::open(profile.scene(Source::Virtual, None));
+    (session, publisher)
+}
+
+/// What became of a run.
+pub(crate) struct Paced {
+    /// Its totals.
+    pub(crate) outcome: Outcome,
+    /// How far the control path was behind the clock, looked at every 100 ms, least first.
+    pub(crate) late: Vec<Duration>,
+}
+
+impl Paced {
+    /// The most that it was behind.
+    pub(crate) fn worst(&self) -> Duration {
+        self.late.last().copied().unwrap_or_default()
+    }
+
+    /// What it was behind half of the time at the most.
+    pub(crate) fn median(&self) -> Duration {
+        self.late[self.late.len() / 2]
+    }
+}
+
+/// Runs the scripted venepuncture for so long; `started` says whether the torque is on or waits for a person.
+pub(crate) fn run(publisher: Publisher, seconds: u64, started: bool) -> Paced {
+    let profile = Profile::find("adult").expect("it is built in");
+    let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
+    let device = VirtualDevice::new(&profile, procedure);
+    let outlets = Outlets::new(publisher, None, Tally::new(Some(seconds * 10_000)));
+    let stop = AtomicBool::new(false);
+    let station = Station::new(Driver::new(profile.config.patient.clone()), outlets, &stop);
+    let station = if started { station } else { station.wait_for_a_person() };
+    let (begin, mut looks, mut late) = (Instant::now(), 0_u32, Vec::new());
+    let look = |_| {
+        // The first look comes with tick 1,000, whose exchange was due 1 ms before it.
+        looks += 1;
+        let due = Duration::from_millis(100) * looks - Duration::from_millis(1);
+        late.push(begin.elapsed().saturating_sub(due));
+    };
+    let outcome = station.run_in_step(device, Pace::real_time(), look).expect("it runs");
+    late.sort();
+    Paced { outcome, late }
+}

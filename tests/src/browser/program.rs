@@ -1,0 +1,98 @@
+//! The program under test: found beside the test, started, asked where its page is, and ended.
+
+use super::Failure;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// A start on a busy machine.
+const START: Duration = Duration::from_secs(60);
+
+/// Where things are, from where the test itself is: `target/release/deps/browser-…`.
+pub struct Places {
+    /// The target directory.
+    pub target: PathBuf,
+    /// `host-sim` of the same build.
+    pub program: PathBuf,
+}
+
+impl Places {
+    /// Looks for them; the error says what to run where the program is not there.
+    pub fn find() -> Result<Self, Failure> {
+        let own = std::env::current_exe().map_err(|e| e.to_string())?;
+        let profile = own.ancestors().nth(2).ok_or("the test is not in a target directory")?;
+        let program = profile.join(format!("host-sim{}", std::env::consts::EXE_SUFFIX));
+        if !program.exists() {
+            let at = program.display();
+            return Err(format!("no program at {at}: run `cargo xtask test`, which builds it first"));
+        }
+        let target = profile.parent().unwrap_or(profile).to_owned();
+        Ok(Self { target, program })
+    }
+
+    /// A folder of one's own for pictures and recordings.
+    pub fn scratch(&self, name: &str) -> Result<PathBuf, Failure> {
+        let scratch = self.target.join(name);
+        std::fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
+        Ok(scratch)
+    }
+}
+
+/// A running program; dropped, it is ended.
+pub struct Program {
+    process: Child,
+    /// The address of its page.
+    pub url: String,
+}
+
+impl Program {
+    /// A virtual device with its page at `port` (0: any free one), recorded where that is wanted.
+    pub fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Failure> {
+        let port = port.to_string();
+        let record =
+            record.map(|file| file.to_str().ok_or("the target folder has a plain name")).transpose()?;
+        let mut arguments = vec!["run", "--port", &port];
+        arguments.extend(record.into_iter().flat_map(|file| ["--record", file]));
+        Self::start_with(path, &arguments)
+    }
+
+    /// Starts it and reads the address that it prints.
+    pub fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Failure> {
+        let mut command = Command::new(path);
+        command.args(arguments);
+        let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
+        let mut process = spawned.map_err(|e| format!("cannot start {}: {e}", path.display()))?;
+        let stdout = BufReader::new(process.stdout.take().ok_or("no standard output")?);
+        let mut program = Self { process, url: String::new() };
+        let (sender, receiver) = mpsc::channel();
+        // Reads on after the address: the program may say more, and must not meet a closed pipe.
+        std::thread::spawn(move || {
+            for line in stdout.lines().map_while(Result::ok) {
+                let address = line.find("http://").and_then(|at| line[at..].split_whitespace().next());
+                let _ = address.map(|address| sender.send(address.to_owned()));
+            }
+        });
+        program.url = receiver.recv_timeout(START).map_err(|_| "the program printed no address")?;
+        Ok(program)
+    }
+
+    /// The port of its page.
+    pub fn port(&self) -> Result<u16, Failure> {
+        let port = self.url.trim_end_matches('/').rsplit(':').next().and_then(|port| port.parse().ok());
+        port.ok_or_else(|| format!("no port in {}", self.url))
+    }
+
+    /// Ends it as a crash would.
+    pub fn end(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

@@ -1,0 +1,104 @@
+//! A patient is chosen and edited in the page while the demo goes on, and the recording of it is played and scrubbed.
+
+use std::path::Path;
+use std::time::Duration;
+use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+
+const DESKTOP: (u32, u32) = (1440, 900);
+const SOON: Duration = Duration::from_secs(10);
+/// The scripted venepuncture takes 6 s; a busy machine may be slow to begin.
+const A_FEW_INSERTIONS: Duration = Duration::from_secs(40);
+
+#[test]
+fn a_patient_is_edited_and_a_replay_scrubbed() {
+    if let Err(failure) = edit_and_scrub() {
+        panic!("{failure}");
+    }
+}
+
+fn edit_and_scrub() -> Result<(), Failure> {
+    let places = Places::find()?;
+    let scratch = places.scratch("page-test-patients")?;
+    let browser = Chromium::start(&scratch)?;
+    let recording = scratch.join("edited.mcap");
+    let _ = std::fs::remove_file(&recording);
+    let program = Program::start(&places.program, 0, Some(&recording))?;
+    let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
+    page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
+    patients(&mut page, &scratch)?;
+    drop(page);
+    drop(program);
+    scrub(&browser, &places.program, &recording)
+}
+
+/// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says why.
+fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+    page.click("patient")?;
+    page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
+    let taken = "document.getElementById('patient-answer').textContent === 'The device has taken it.'";
+    let is =
+        |name: &str| format!("document.getElementById('subtitle').textContent.includes('Profile {name} ')");
+    let choose = |name: &str| {
+        format!(
+            "(() => {{ const choice = document.getElementById('patient-choice'); choice.value = '{name}'; \
+             choice.dispatchEvent(new Event('change')); }})()"
+        )
+    };
+    page.evaluate(&choose("firm-skin"))?;
+    page.wait("firm skin taken", SOON, &format!("{taken} && {}", is("firm-skin")))?;
+    page.wait("the demo in firm skin", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
+    let edit = |value: &str| {
+        format!(
+            "(() => {{ const input = document.querySelector('#patient-fields [data-key=friction_n_per_mm]'); \
+             input.value = '{value}'; input.dispatchEvent(new Event('input')); \
+             document.getElementById('patient-send').click(); }})()"
+        )
+    };
+    page.evaluate(&edit("-5"))?;
+    page.wait(
+        "a refusal with its reason",
+        SOON,
+        "document.getElementById('patient-answer').dataset.tone === 'bad' && \
+         document.getElementById('patient-answer').textContent.includes('friction')",
+    )?;
+    page.photograph(&scratch.join("patient.png"))?;
+    page.evaluate(&edit("0.03"))?;
+    page.wait("an edited patient taken", SOON, taken)?;
+    page.wait("the demo in it", A_FEW_INSERTIONS, "__stats.forceN > 1.2")?;
+    page.evaluate(&choose("adult"))?;
+    page.wait("the adult again", SOON, &format!("{taken} && {}", is("adult")))?;
+    page.click("patient-close")
+}
+
+/// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
+fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failure> {
+    let file = recording.to_str().ok_or("the target folder has a plain name")?;
+    let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
+    let mut page = Page::open(browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
+    page.wait(
+        "the slider",
+        SOON,
+        "!document.getElementById('scrub').hidden && !isNaN(__stats.firstFrameMs)",
+    )?;
+    page.click("stop")?;
+    page.wait("a pause", SOON, "document.getElementById('state').textContent === 'Recording paused'")?;
+    // Into the first insertion's hold, before it, and into it again.
+    let punctures = "document.querySelectorAll('#events [data-kind=puncture]').length";
+    for (at_s, place, given) in
+        [(4.2, "__stats.depthMm > 6", 2), (0.4, "__stats.depthMm < -3", 0), (4.2, "__stats.depthMm > 6", 2)]
+    {
+        page.evaluate(&format!(
+            "(() => {{ const place = document.getElementById('scrub-place'); place.value = '{at_s}'; \
+             place.dispatchEvent(new Event('input')); }})()"
+        ))?;
+        page.wait(&format!("the needle at {at_s} s"), SOON, &format!("{place} && {punctures} === {given}"))?;
+    }
+    let paused = page.number("__stats.depthMm")?;
+    std::thread::sleep(Duration::from_millis(600));
+    let still = page.number("__stats.depthMm")?;
+    check("a pause that stands still", paused == still, (paused, still))?;
+    page.click("start")?;
+    page.wait("the recording to go on", SOON, "__stats.depthMm < 0")?;
+    let complaints = page.complaints()?;
+    check("no errors in the console", complaints.is_empty(), &complaints)
+}
