@@ -37,7 +37,8 @@ class Card {
   follow(member) {
     if (member.scene) this.begin(member.scene);
     this.tell(member);
-    if (member.gone || !member.pose) return;
+    // Of one who is gone the last is shown, and nothing of it is news.
+    if (!member.pose || (member.gone && this.pose)) return;
     if (this.pose && member.pose.t_s < this.pose.t_s && this.scene) this.begin(this.scene);
     this.pose = member.pose;
     for (const event of member.events) {
@@ -78,7 +79,7 @@ class Card {
   draw(seconds) {
     if (!this.pose || !this.tissue) return;
     const { depth_mm: depth, angle_rad: angle, force_n: force, motor_n: motor, vessel } = this.pose;
-    this.section ??= new Section(this.canvas, palette);
+    this.section ??= new Section(this.canvas, palette, true);
     this.tissue.move(depth, angle, force, vessel, seconds);
     this.section.draw({ depth, angle, force, motor, seconds, hand: 0, person: false, canDrag: false }, this.tissue);
   }

@@ -14,6 +14,8 @@ const ENTRY_SHARE = 0.42;
 const AIR_SHARE = 0.38;
 /** On a phone less is shown, larger. */
 const NARROW = { width: 560, mm: 23 };
+/** What the layers' names take of it, in CSS pixels. */
+const NAMES_WIDE = 84;
 const COLUMNS = 120;
 const FIBRES = 7;
 const FIBRE_DASH = [38, 13, 64, 21, 17, 11];
@@ -24,7 +26,9 @@ const PLACES = {
 };
 
 export class Section {
-  constructor(canvas, colours) {
+  /** `small`: among many others, with figures beside it: no ruler and no arrow. */
+  constructor(canvas, colours, small = false) {
+    this.small = small;
     this.surface = surface(canvas);
     this.colours = colours;
     this.axis = { x: 1, y: 0, angle: NaN };
@@ -48,10 +52,10 @@ export class Section {
     g.fillRect(0, 0, width, height);
     this.layers(g, tissue, width, height);
     this.vessel(g, tissue, width);
-    this.ruler(g, view, tissue);
+    if (!this.small) this.ruler(g, view, tissue);
     this.needle(g, view, tissue);
     this.angle(g, view);
-    this.forceArrow(g, view);
+    if (!this.small) this.forceArrow(g, view);
     this.names(g, tissue, width, height);
     this.scaleBar(g, height);
     this.across(g, view, tissue, width);
@@ -180,8 +184,23 @@ export class Section {
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "center";
     g.textBaseline = "top";
-    for (let mm = 5; mm <= reach; mm += 5) g.fillText(`${mm} mm`, mm * this.scale, 10);
+    const { width } = this.surface;
+    // On a phone the layers' names need the right edge.
+    const end = width < NARROW.width ? width - NAMES_WIDE : width;
+    for (let mm = 5; mm <= reach; mm += 5) {
+      if (this.x(mm * this.axis.x) < end) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
+    }
     g.restore();
+  }
+
+  /** Words that can be read on fat as on blood: light with a dark edge. */
+  onTissue(g, text, x, y) {
+    g.strokeStyle = this.colours["ruler-edge"];
+    g.fillStyle = this.colours.ruler;
+    g.lineWidth = 3;
+    g.lineJoin = "round";
+    g.strokeText(text, x, y);
+    g.fillText(text, x, y);
   }
 
   /** From here on x runs along the needle from `mm` past the entry point, in CSS pixels. */
@@ -387,18 +406,19 @@ export class Section {
   scaleBar(g, height) {
     const x = 12;
     const y = height - 16;
-    g.strokeStyle = this.colours["on-tissue"];
-    g.fillStyle = this.colours["on-tissue"];
-    g.lineWidth = 2;
     g.beginPath();
     g.moveTo(x, y - 4);
     g.lineTo(x, y);
     g.lineTo(x + 5 * this.scale, y);
     g.lineTo(x + 5 * this.scale, y - 4);
-    g.stroke();
+    for (const [colour, wide] of [["ruler-edge", 4], ["ruler", 2]]) {
+      g.strokeStyle = this.colours[colour];
+      g.lineWidth = wide;
+      g.stroke();
+    }
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "left";
     g.textBaseline = "bottom";
-    g.fillText("5 mm", x + 6, y - 4);
+    this.onTissue(g, "5 mm", x + 6, y - 4);
   }
 }

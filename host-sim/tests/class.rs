@@ -178,7 +178,8 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
         std::thread::sleep(Duration::from_secs(2));
         rustix::process::kill_process(pid, rustix::process::Signal::STOP)
     });
-    let run = paced::run(publisher, 8, true);
+    // Longer than Zenoh waits for a silent end (10 s): then it is another mute server.
+    let run = paced::run(publisher, 16, true);
     stop.join().expect("it ends").expect("it was running");
     check("a stalled instructor", &run);
     let begin = Instant::now();
