@@ -117,16 +117,15 @@ mod tests {
     use std::io::{Read, Write};
     use std::net::TcpStream as Client;
 
-    /// Serves nothing to two at a time that may be silent for 300 ms.
-    fn serve() -> (tokio::runtime::Runtime, SocketAddr) {
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+    /// Serves nothing to two at a time that may be silent for 300 ms, until the test ends.
+    fn serve() -> SocketAddr {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let listener = runtime.block_on(TcpListener::bind("127.0.0.1:0")).unwrap();
         let mut bounded = BoundedListener::new(listener, 2);
         bounded.silence = Duration::from_millis(300);
         let address = bounded.local_addr().unwrap();
-        runtime.spawn(async move { axum::serve(bounded, Router::new()).await });
-        (runtime, address)
+        std::thread::spawn(move || runtime.block_on(async { axum::serve(bounded, Router::new()).await }));
+        address
     }
 
     fn answer(client: &mut Client) -> io::Result<String> {
@@ -139,7 +138,7 @@ mod tests {
 
     #[test]
     fn one_too_many_is_closed_and_silence_makes_room() {
-        let (_runtime, address) = serve();
+        let address = serve();
         let mut silent: Vec<Client> = (0..2).map(|_| Client::connect(address).unwrap()).collect();
         std::thread::sleep(Duration::from_millis(50));
         let mut third = Client::connect(address).unwrap();

@@ -51,6 +51,13 @@ struct Member {
     events: Vec<Value>,
 }
 
+/// [`super::message::Poses`], as much of them as is wanted.
+#[derive(Debug, Deserialize)]
+struct Poses<N, P> {
+    newest: N,
+    poses: P,
+}
+
 /// What the board needs to understand of [`super::message::About`].
 #[derive(Debug, Deserialize)]
 struct About {
@@ -171,8 +178,8 @@ impl Member {
     fn take(&mut self, kind: Kind, bytes: &[u8]) -> Option<()> {
         match kind {
             Kind::Pose => {
-                let poses: Vec<IgnoredAny> = serde_json::from_slice(bytes).ok()?;
-                self.heard_poses += poses.len() as u64;
+                let told: Poses<IgnoredAny, Vec<IgnoredAny>> = serde_json::from_slice(bytes).ok()?;
+                self.heard_poses += told.poses.len() as u64;
                 self.poses.clear();
                 self.poses.extend_from_slice(bytes);
             }
@@ -204,7 +211,7 @@ impl Member {
 
     fn view(&self, name: &Name, now: Instant, sent: &mut Sent) -> MemberView {
         let silent = now.saturating_duration_since(self.heard);
-        let newest = serde_json::from_slice::<Vec<Value>>(&self.poses).ok().and_then(|mut poses| poses.pop());
+        let newest = serde_json::from_slice::<Poses<Value, IgnoredAny>>(&self.poses).ok();
         let is_new = sent.scenes.insert(name.clone(), self.scene_number) != Some(self.scene_number);
         MemberView {
             name: name.to_string(),
@@ -213,7 +220,7 @@ impl Member {
             connected: self.about.as_ref().is_some_and(|about| about.connected),
             recording: self.about.as_ref().is_some_and(|about| about.recording),
             stuck: self.about.as_ref().and_then(About::stuck),
-            pose: newest,
+            pose: newest.map(|told| told.newest),
             poses: self.heard_poses,
             score: self.about.as_ref().map(|about| about.score.clone()).unwrap_or_default(),
             events: self.events.clone(),
@@ -255,7 +262,7 @@ mod tests {
     fn a_device_that_falls_silent_is_gone_and_comes_back() {
         let (board, begin) = (Board::default(), Instant::now());
         let after = |ms: u64| begin + Duration::from_millis(ms);
-        assert!(board.hear("bed-1", "pose", br#"[{"depth_mm":1.0},{"depth_mm":2.0}]"#, begin));
+        assert!(board.hear("bed-1", "pose", br#"{"newest":{"depth_mm":2.0},"poses":[[],[]]}"#, begin));
         let seen = view(&board, after(1_000));
         assert_eq!((seen.gone, seen.pose), (false, Some(json!({ "depth_mm": 2.0 }))), "the newest");
         let seen = view(&board, after(5_000));
@@ -316,11 +323,11 @@ mod tests {
         }
         assert!(board.view(now, &mut Sent::default()).is_empty(), "nonsense makes no member");
         for number in 0..2 * MOST_MEMBERS {
-            board.hear(&format!("d{number}"), "pose", b"[]", now);
+            board.hear(&format!("d{number}"), "pose", br#"{"newest":null,"poses":[]}"#, now);
         }
         let seen = board.view(now, &mut Sent::default());
+        assert!(seen[0].pose.as_ref().is_none_or(Value::is_null));
         assert_eq!((seen.len(), board.refused()), (MOST_MEMBERS, (MOST_MEMBERS + bad.len()) as u64));
-        assert_eq!(seen[0].pose, None);
         for number in 0..100 {
             board.hear("d0", "event", format!(r#"{{"kind":"{number}"}}"#).as_bytes(), now);
         }

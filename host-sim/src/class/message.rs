@@ -2,13 +2,14 @@
 
 use crate::score::Insertion;
 use crate::session::Scene;
+use crate::streams::NeedlePose;
 use crate::visualizer::messages::Event;
 use serde::{Deserialize, Serialize};
 
 /// The part of a key that says what a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A JSON list of [`crate::streams::NeedlePose`]: all of 1 kHz since the last message, oldest first.
+    /// [`Poses`], fifty times a second.
     Pose,
     /// One [`Event`].
     Event,
@@ -32,6 +33,18 @@ impl Kind {
         Self::ALL.iter().find(|(_, known)| *known == name).map(|(kind, _)| *kind)
     }
 }
+
+/// Where the needle is, and the way there since the last message.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Poses {
+    /// The newest pose, in full.
+    pub newest: NeedlePose,
+    /// Every pose of 1 kHz since the last message, oldest first and the newest among them.
+    pub poses: Vec<PoseRow>,
+}
+
+/// A pose in short: time in s, depth in mm, speed in mm/s, the force that the control core asked for in N.
+pub type PoseRow = [f64; 4];
 
 /// A trainee's insertions so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,13 +1,12 @@
 //! What one device tells its class, from what its session brings. Pure: no clock, no network.
 
-use super::message::{About, ClassScore, Kind};
+use super::message::{About, ClassScore, Kind, Poses};
 use super::scoring::LiveScore;
 use crate::library::Text;
 use crate::profile::Profile;
 use crate::session::{Batch, PatientStatus, Scene};
-use crate::streams::NeedlePose;
 use crate::visualizer::condense::Condenser;
-use crate::visualizer::messages::Event;
+use crate::visualizer::messages::{self, Event};
 use control_core::Device;
 use link::frames::EventKind;
 use serde::Serialize;
@@ -47,7 +46,7 @@ impl Telling {
 
     /// The messages for what has arrived since the last call; every pose of it is in them. `now` is any clock that goes on.
     pub fn take(&mut self, batch: Batch, now: Duration) -> Vec<Message> {
-        let mut messages = Vec::new();
+        let mut told = Vec::new();
         if let Some(scene) = batch.scene.clone() {
             (self.scene, self.told) = (Some(scene), None);
         }
@@ -56,7 +55,7 @@ impl Telling {
         }
         for insertion in self.scoring.take(&batch) {
             self.score.count(insertion);
-            push(&mut messages, Kind::Score, &self.score);
+            push(&mut told, Kind::Score, &self.score);
         }
         let status = batch.link.clone();
         for happening in &batch.events {
@@ -69,17 +68,17 @@ impl Telling {
         let poses = batch.poses.clone();
         let (_, frame) = self.condenser.take(batch);
         for event in frame.events {
-            push(&mut messages, Kind::Event, &event);
+            push(&mut told, Kind::Event, &event);
             self.events.push_back(event);
             self.events.drain(..self.events.len().saturating_sub(EVENTS));
         }
         for pose in &poses {
             self.stillness.take(pose.tick, pose.depth.0.to_num());
         }
-        if !poses.is_empty() {
-            let poses: Vec<NeedlePose> =
-                poses.iter().map(|pose| (&self.condenser.pose(pose)).into()).collect();
-            push(&mut messages, Kind::Pose, &poses);
+        if let Some(newest) = frame.pose {
+            let row = |pose: messages::Pose| [pose.t_s, pose.depth_mm, pose.speed_mm_s, pose.force_n];
+            let poses = poses.iter().map(|pose| row(self.condenser.pose(pose))).collect();
+            push(&mut told, Kind::Pose, &Poses { newest: (&newest).into(), poses });
         }
         let is_due = self.told.is_none_or(|told| now >= told + ABOUT_PERIOD);
         if is_due && let Some(scene) = &self.scene {
@@ -92,10 +91,10 @@ impl Telling {
                 score: self.score.clone(),
                 events: self.events.iter().cloned().collect(),
             };
-            push(&mut messages, Kind::About, &about);
+            push(&mut told, Kind::About, &about);
             self.told = Some(now);
         }
-        messages
+        told
     }
 
     /// The patient that counts, from the text that the session gives of it.
@@ -202,14 +201,17 @@ mod tests {
             }
         }
         messages.extend(telling.take(subscription.drain(), Duration::from_secs(100)));
-        let expected = crate::score::score(&recording, None).unwrap().insertions;
+        // Through JSON too, which costs the last digit.
+        let expected =
+            serde_json::to_vec(&crate::score::score(&recording, None).unwrap().insertions).unwrap();
+        let expected: Vec<crate::score::Insertion> = serde_json::from_slice(&expected).unwrap();
         let told: Vec<ClassScore> =
             read(&messages, Kind::Score).map(|value| serde_json::from_value(value).unwrap()).collect();
         assert_eq!(told.iter().map(|score| score.last.clone().unwrap()).collect::<Vec<_>>(), expected);
         let last = told.last().unwrap();
         assert_eq!((last.insertions, last.vessel, last.without_success), (1, 1, 0));
         assert_eq!(
-            read(&messages, Kind::Pose).map(|list| list.as_array().unwrap().len()).sum::<usize>(),
+            read(&messages, Kind::Pose).map(|told| told["poses"].as_array().unwrap().len()).sum::<usize>(),
             poses
         );
         assert!(read(&messages, Kind::Event).any(|event| event["kind"] == "puncture"));
