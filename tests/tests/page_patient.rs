@@ -63,7 +63,7 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
         "a refusal with its reason",
         SOON,
         "document.getElementById('patient-answer').dataset.tone === 'bad' && \
-         document.getElementById('patient-answer').textContent.includes('friction')",
+         document.getElementById('patient-answer').textContent.includes('Friction is -5')",
     )?;
     page.photograph(&scratch.join("patient.png"))?;
     page.evaluate(&edit("0.03"))?;
