@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The part of a key that says what a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// [`Poses`], fifty times a second.
+    /// [`Poses`], 25 times a second.
     Pose,
     /// One [`Event`].
     Event,

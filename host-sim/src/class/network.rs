@@ -18,9 +18,9 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
-/// Between two looks at the session: 50 messages a second with twenty poses each. A message costs both ends far more than a
-/// pose in it.
-const PERIOD: Duration = Duration::from_millis(20);
+/// Between two looks at the session: 25 messages a second with forty poses each. A message costs both ends far more than a
+/// pose in it, and the instructor's page changes ten times a second.
+const PERIOD: Duration = Duration::from_millis(40);
 /// How long the end of a program waits for a goodbye that the network may not take.
 const GOODBYE: Duration = Duration::from_millis(500);
 /// What every key of this project begins with.
