@@ -209,7 +209,7 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 3] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0"];
+const CLIENTS: [&str; 4] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0"];
 
 fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let python = setup::python(&CLIENTS)?;
@@ -217,6 +217,7 @@ fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let top = shell::top();
     let program = shell::target().join("release/host-sim");
     clock.run(Command::new(&python).arg(top.join("tests/clients/streams.py")).arg(&program))?;
+    clock.run(Command::new(&python).arg(top.join("tests/clients/recording.py")).arg(&program))?;
     setup::mono()?;
     clock.run(Command::new(&python).arg(top.join("tests/clients/documented.py")).arg(&program))?;
     passed(clock.run(Command::new(&python).arg(top.join("tests/clients/mujoco_rig.py")).arg(&program)))
