@@ -1,6 +1,7 @@
-//! A patient is chosen and edited in the page while the demo goes on, and the recording of it is played and scrubbed.
+//! A patient is chosen and edited in the page while the demo goes on; a recording is played and scrubbed.
 
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use tests::browser::{Chromium, Failure, Page, Places, Program, check};
 
@@ -24,14 +25,14 @@ fn edit_and_scrub() -> Result<(), Failure> {
     let places = Places::find()?;
     let scratch = places.scratch("page-test-patients")?;
     let browser = Chromium::start(&scratch)?;
-    let recording = scratch.join("edited.mcap");
-    let _ = std::fs::remove_file(&recording);
-    let program = Program::start(&places.program, 0, Some(&recording))?;
+    let program = Program::start(&places.program, 0, None)?;
     let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
     page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     patients(&mut page, &scratch)?;
     drop(page);
     drop(program);
+    let recording = scratch.join("scrubbed.mcap");
+    record(&places.program, &recording)?;
     scrub(&browser, &places.program, &recording)
 }
 
@@ -72,6 +73,15 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     page.evaluate(&choose("adult"))?;
     page.wait("the adult again", SOON, &format!("{taken} && {}", is("adult")))?;
     page.click("patient-close")
+}
+
+/// Two rounds of the scripted venepuncture.
+fn record(path: &Path, recording: &Path) -> Result<(), Failure> {
+    let mut run = Command::new(path);
+    run.args(["run", "--headless", "--fast", "--seconds", "12", "--record"]).arg(recording);
+    let status =
+        run.stdout(Stdio::null()).status().map_err(|e| format!("cannot start {}: {e}", path.display()))?;
+    check("a recording", status.success(), status)
 }
 
 /// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
