@@ -199,7 +199,8 @@ const PEERS_PACKAGES: [&str; 2] = ["numpy==2.4.6", "mujoco==4.0.0"];
 fn peer_program(script: &str) -> Result<Values, Failure> {
     let python = setup::python(&PEERS_PACKAGES)?;
     let mut command = Command::new(&python);
-    // One core, as ours.
+    // MuJoCo leaves a log of its warnings where it runs. One core, as ours.
+    command.current_dir(shell::target());
     command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
     shell::output(command.arg(shell::top().join("xtask/peers").join(script))).map(|text| values_in(&text))
 }
