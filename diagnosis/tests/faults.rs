@@ -8,7 +8,8 @@ use diagnosis::{Outcome, Verdict, diagnose_recordings};
 use std::f64::consts::TAU;
 
 /// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
-/// lag of its drive, and the first-order filter behind which its position is read.
+/// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, and dry
+/// friction that comes and goes along the travel where the axis is slow.
 #[derive(Clone, Copy)]
 struct Machine {
     inertia: f64,
@@ -20,6 +21,8 @@ struct Machine {
     delay_s: f64,
     lag_s: f64,
     filter_s: f64,
+    limit: f64,
+    slow_grip: f64,
 }
 
 const AXIS: Machine = Machine {
@@ -32,6 +35,8 @@ const AXIS: Machine = Machine {
     delay_s: 0.0,
     lag_s: 0.0,
     filter_s: 0.0,
+    limit: f64::INFINITY,
+    slow_grip: 0.0,
 };
 
 /// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
@@ -68,17 +73,18 @@ fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f6
         let disturbance = 0.05 * machine.forward.max(0.02 * machine.gravity) * noise();
         for i in 0..steps {
             let u = command(((t + f64::from(i) * h - machine.delay_s) * taken.rate).floor() / taken.rate);
-            driven += (u - driven) * follow(machine.lag_s);
-            seen += (q - seen) * follow(machine.filter_s);
+            driven += (u.clamp(-machine.limit, machine.limit) - driven) * follow(machine.lag_s);
             let free = driven + machine.offset + disturbance - machine.gravity * q.sin();
-            let dry = if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
-            if v == 0.0 && free.abs() <= dry {
-                continue;
+            let grip = machine.slow_grip * (4.0 * q).sin().abs() * (-(v / 0.3).abs()).exp();
+            let dry =
+                grip + if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
+            if v != 0.0 || free.abs() > dry {
+                let way = if v == 0.0 { free.signum() } else { v.signum() };
+                let next = v + h * (free - machine.viscous * v - dry * way) / machine.inertia;
+                v = if next * v < 0.0 { 0.0 } else { next };
+                q += h * v;
             }
-            let way = if v == 0.0 { free.signum() } else { v.signum() };
-            let next = v + h * (free - machine.viscous * v - dry * way) / machine.inertia;
-            v = if next * v < 0.0 { 0.0 } else { next };
-            q += h * v;
+            seen += (q - seen) * follow(machine.filter_s);
         }
     }
     out
@@ -305,4 +311,34 @@ fn a_gravity_that_the_rig_knows_is_not_missing() {
         "a.toml",
     );
     assert!(without.expect_err("gravity needs absolute counts").to_string().contains("absolute"));
+}
+
+#[test]
+fn a_drive_that_is_limited_in_few_rows_is_no_outlier() {
+    let machine = Machine { limit: 27.0, ..AXIS };
+    let take = |seed| record(machine, BENCH, seed, mixed(14.0, seed as f64));
+    let (fit, holdout) = ([take(1), take(2)], [take(3)]);
+    let all = fit.iter().chain(&holdout).flat_map(|one| &one.command);
+    let (limited, rows) =
+        all.fold((0, 0), |(limited, rows), u| (limited + u32::from(u.abs() > 27.0), rows + 1));
+    let part = f64::from(limited) / f64::from(rows);
+    assert!((0.01..0.06).contains(&part), "{part} of the rows");
+    let outcome = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &fit, &holdout);
+    assert_eq!(names(&outcome), [N::CommandSaturation]);
+    let limit = outcome.report.effects[0].parameters["limit"].value;
+    assert!((26.0..28.0).contains(&limit), "{limit}");
+}
+
+#[test]
+fn friction_that_has_no_name_is_no_fault_of_the_command() {
+    // The inertia takes two per cent of the drive's force.
+    let machine = Machine { inertia: 0.02, viscous: 2.0, slow_grip: 2.5, ..AXIS };
+    let taken = Taken { seconds: 12.0, ..BENCH };
+    let take = |seed| record(machine, taken, seed, mixed(6.0, seed as f64));
+    let rig = rig("inertia = 0.02\nviscous = 2.0\ncoulomb = 3.0", "", "", BENCH.counts);
+    let outcome = diagnosed(&rig, &[take(1), take(2)], &[take(3)]);
+    let of_command =
+        [N::CommandDeadband, N::CommandSaturation, N::CommandDelay, N::ElectricalLag, N::TorqueRipple];
+    let names = names(&outcome);
+    assert!(names.iter().all(|name| !of_command.contains(name)), "{names:?}");
 }

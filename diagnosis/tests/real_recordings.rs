@@ -97,3 +97,25 @@ fn anticogging_names_cogging_or_did_not_run() {
     let explained = 1.0 - variance(&left) / variance(&force);
     assert!(explained >= 0.85, "{explained:.3} of the variance explained");
 }
+
+#[test]
+fn a_belt_that_stretches_loses_no_counts_or_did_not_run() {
+    let Some(dir) = shared("machines/cart-B") else { return };
+    let all = |kind: &str| -> Vec<String> {
+        let entries = std::fs::read_dir(&dir).expect("the folder is readable");
+        let names =
+            entries.map(|entry| entry.expect("it is readable").file_name().into_string().expect("UTF-8"));
+        let mut names: Vec<String> =
+            names.filter(|name| name.starts_with(kind) && name.ends_with(".csv")).collect();
+        names.sort();
+        names
+    };
+    let (fit, held) = (all("fit"), all("holdout"));
+    let fit: Vec<&str> = fit.iter().map(String::as_str).collect();
+    let held: Vec<&str> = held.iter().map(String::as_str).collect();
+    let outcome = run(&dir, &fit, &held);
+    println!("{}", outcome.summary());
+    for effect in &outcome.report.effects {
+        assert!(!effect.class.contains(&EffectName::MissedCounts), "{:?}", effect.class);
+    }
+}

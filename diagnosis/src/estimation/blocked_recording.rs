@@ -298,6 +298,14 @@ impl BlockedRecording {
         speed < self.stops_from && near.iter().all(|other| speed < 0.5 * self.v[*other].abs())
     }
 
+    /// Jumps of the reading per segment, where lost counts were found.
+    pub(crate) fn jumps(&self) -> impl Iterator<Item = usize> + '_ {
+        let changes = |block: usize| block > 0 && self.lost[block] != self.lost[block - 1];
+        // A jump within a block shows in this one and in the next.
+        let begins = move |block: &usize| changes(*block) && !changes(*block - 1);
+        self.segments.windows(2).map(move |bounds| (bounds[0]..bounds[1]).filter(begins).count())
+    }
+
     /// Whether each segment is known all but for a few blocks.
     pub(crate) fn known_segments(&self) -> impl Iterator<Item = bool> + '_ {
         self.segments.windows(2).map(|w| {

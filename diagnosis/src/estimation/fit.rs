@@ -1,5 +1,6 @@
 //! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
 
+use crate::effects::EffectName;
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::{Gains, Noise, robust_loss};
 use crate::estimation::model::{Column, Key, Model, Nominal, total};
@@ -19,6 +20,8 @@ pub(crate) struct Prepared {
     pub(crate) gains: Gains,
     /// Per segment: (XᵀX with the residual as the last row and column).
     pub(crate) segments: Vec<Square>,
+    /// What the model pays per segment for jumps that were found in this recording itself, in log-likelihood.
+    surcharges: Vec<f64>,
     /// Bounds of the segments in blocks, and the weight of each.
     bounds: Vec<usize>,
     weight: Vec<f64>,
@@ -35,7 +38,8 @@ impl Prepared {
         let segments = grams(track, &responses, &residual);
         let bounds = track.segments.clone();
         let weight = vec![1.0; segments.len()];
-        Self { columns, reference, residual, responses, gains, segments, bounds, weight }
+        let surcharges = surcharges(track, model);
+        Self { columns, reference, residual, responses, gains, segments, surcharges, bounds, weight }
     }
 
     /// Weighted residual square of each segment at a step from the reference.
@@ -61,6 +65,16 @@ impl Prepared {
         self.weight.iter().zip(self.bounds.windows(2)).map(|(weight, w)| (*weight, (w[1] - w[0]) as f64))
     }
 
+    /// Cost of each segment at a step from the reference, in log-likelihood.
+    pub(crate) fn costs(&self, places: &[usize], x: &[f64]) -> Vec<f64> {
+        let squares = self.squares(places, x);
+        let each = squares.iter().zip(self.weights()).zip(&self.surcharges);
+        each.map(|((square, (weight, count)), surcharge)| {
+            0.5 * count * robust_loss(square / weight / count).0 + surcharge
+        })
+        .collect()
+    }
+
     /// Weighs each segment by how far its residual square is above the noise.
     fn weigh(&mut self, squares: &[f64]) {
         for s in 0..self.segments.len() {
@@ -82,6 +96,20 @@ impl Prepared {
             self.responses.iter_mut().for_each(stretch);
         }
     }
+}
+
+/// What the size of one jump costs, in log-likelihood.
+const SIZE_COST: f64 = 2.5;
+
+/// What a model with lost counts pays in each segment of a recording, fitted or held out, in log-likelihood: when counts get
+/// lost nobody can tell beforehand, so every jump was found in the very recording that it explains, and pays for its place
+/// among all blocks and for its size.
+fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
+    if model.effects.iter().all(|effect| effect.name != EffectName::MissedCounts) || track.lost.is_empty() {
+        return vec![0.0; track.segment_count()];
+    }
+    let each = SIZE_COST + (track.blocks() as f64).ln();
+    track.jumps().map(|jumps| each * jumps as f64).collect()
 }
 
 /// Gram matrices of the columns and the residual, per segment.
@@ -163,9 +191,7 @@ impl Fit {
         }
         let mut cost = fit.solution.prior_cost;
         for (one, places) in fit.prepared.iter().zip(&fit.places) {
-            for (square, (weight, count)) in one.squares(places, &fit.solution.x).iter().zip(one.weights()) {
-                cost += 0.5 * count * robust_loss(square / weight / count).0;
-            }
+            cost += one.costs(places, &fit.solution.x).iter().sum::<f64>();
         }
         fit.log_likelihood = fit.prepared.iter().map(|one| one.gains.log_det).sum::<f64>() - cost;
         fit
@@ -248,11 +274,21 @@ impl Fit {
 
 /// Normal equations of all recordings.
 pub(crate) fn normal(prepared: &[Prepared], places: &[Vec<usize>], size: usize) -> (Square, Vec<f64>) {
+    normal_of(prepared, places, size, |_, _| true)
+}
+
+/// Normal equations of those segments (by recording and place in it) that are kept.
+pub(crate) fn normal_of(
+    prepared: &[Prepared],
+    places: &[Vec<usize>],
+    size: usize,
+    is_kept: impl Fn(usize, usize) -> bool,
+) -> (Square, Vec<f64>) {
     let mut m = Square::zero(size);
     let mut b = vec![0.0; size];
-    for (one, places) in prepared.iter().zip(places) {
+    for (recording, (one, places)) in prepared.iter().zip(places).enumerate() {
         let p = places.len();
-        for segment in &one.segments {
+        for (_, segment) in one.segments.iter().enumerate().filter(|(s, _)| is_kept(recording, *s)) {
             for i in 0..p {
                 b[places[i]] += segment.at(i, p);
                 for j in 0..p {
@@ -262,4 +298,44 @@ pub(crate) fn normal(prepared: &[Prepared], places: &[Vec<usize>], size: usize) 
         }
     }
     (m, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effect;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    #[test]
+    fn every_jump_pays_for_its_place_and_its_size_where_the_model_has_jumps() {
+        let time_s: Vec<f64> = (0..4000).map(|row| f64::from(row) / 1000.0).collect();
+        let rows = time_s.len();
+        let recording = Recording {
+            command: vec![0.0; rows],
+            position_counts: vec![0.0; rows],
+            time_s,
+            ..Recording::default()
+        };
+        let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
+        let n = track.blocks();
+        // One jump within a block, one between two.
+        track.lost = (0..n)
+            .map(|j| {
+                if j < 10 {
+                    0.0
+                } else if j == 10 {
+                    0.4
+                } else if j < 30 {
+                    1.0
+                } else {
+                    2.0
+                }
+            })
+            .collect();
+        let with = Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])], ..Model::default() };
+        let paid: f64 = surcharges(&track, &with).iter().sum();
+        assert!((paid - 2.0 * (SIZE_COST + (n as f64).ln())).abs() < 1e-9, "{paid}");
+        assert_eq!(surcharges(&track, &Model::default()).iter().sum::<f64>(), 0.0);
+    }
 }

@@ -64,6 +64,7 @@ pub(crate) fn verdict(
         || (disturbed && repeats)
         || swings.is_some()
         || foreign.is_some()
+        || assessment.foreign().is_some()
         || again.is_some()
     {
         (

@@ -6,6 +6,7 @@ pub(crate) mod excitation;
 pub(crate) mod free_form;
 pub(crate) mod joint;
 pub(crate) mod periodic;
+pub(crate) mod predictive;
 pub(crate) mod score_test;
 pub(crate) mod search;
 pub(crate) mod shape_search;

@@ -9,8 +9,9 @@ use crate::estimation::noise::Colour;
 use crate::io::rig::Kind;
 use crate::numerics::bootstrap::bootstrap;
 use crate::selection::excitation::Excitation;
+use crate::selection::predictive::left_out_costs;
 use crate::selection::search::{FitContext, FittedModel};
-use crate::validation::evidence::{EffectEvidence, Rival, evaluate_all, fit_costs};
+use crate::validation::evidence::{EffectEvidence, Rival, evaluate_all};
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use rayon::prelude::*;
@@ -31,9 +32,9 @@ const MOST_IN_CLASS: usize = 3;
 /// Standard errors behind within which a rival's shape is worth polishing.
 const WITHIN_REACH: f64 = 8.0;
 
-/// Costs per segment on fitted and held-out recordings under one noise.
+/// Costs per segment on left-out blocks of fitted and on held-out recordings under one noise.
 fn costs(candidate: &FittedModel, nominal: &Nominal, holdout: &[BlockedRecording]) -> Vec<f64> {
-    let mut out = fit_costs(candidate);
+    let mut out = left_out_costs(&candidate.fit);
     for evaluated in evaluate_all(candidate, nominal, holdout, &candidate.noise) {
         out.extend(evaluated.costs);
     }

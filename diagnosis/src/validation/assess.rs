@@ -79,10 +79,9 @@ pub(crate) struct Assessment {
 }
 
 impl Assessment {
-    /// Confidence of the surest effect, if the model has understood the recordings.
+    /// Confidence of the surest effect.
     fn surest(&self) -> f64 {
-        let all = self.effects.iter().map(|e| e.confidence).filter(|_| self.understood);
-        all.fold(0.0, f64::max)
+        self.effects.iter().map(|e| e.confidence).fold(0.0, f64::max)
     }
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
@@ -140,8 +139,6 @@ impl Assessment {
     fn contradiction(&self, assessed: &Assessed) -> Option<String> {
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
-        } else if !self.understood {
-            Some("with it the model still leaves too much of the force to have understood it".into())
         } else if !assessed.is_there {
             Some(parameters::NO_SIZE.into())
         } else if let Some(part) = assessed.creeps {

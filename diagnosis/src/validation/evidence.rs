@@ -3,18 +3,20 @@
 
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::{Noise, robust_loss};
+use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::{Key, Model, Nominal};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::selection::candidates;
 use crate::selection::periodic;
+use crate::selection::predictive::left_out_costs;
 use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::holdout::{self, HoldoutFit};
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
+use crate::validation::sizes::{played, sizes_on};
 use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.
@@ -25,7 +27,7 @@ pub(crate) struct EffectEvidence {
     pub(crate) rivals: Vec<Rival>,
     /// Held-out gain of the full model over the model without it.
     pub(crate) holdout: Gain,
-    /// The same on the fitted recordings.
+    /// The same on blocks of the fitted recordings that were left out of its fit.
     pub(crate) fit: Gain,
     /// How much less force it leaves on held-out recordings, over the square of what is left.
     pub(crate) force: Gain,
@@ -153,7 +155,7 @@ impl EffectEvidence {
             return format!("held-out recordings are less likely with it, by {:.0} nats", -self.holdout.sum);
         }
         format!(
-            "its gain of {:.0} nats on held-out recordings is unsure ({:.1} standard errors there, {:.1} on the fitted ones) and it takes {:.0} % of what the noise leaves",
+            "its gain of {:.0} nats on held-out recordings is unsure ({:.1} standard errors there, {:.1} on left-out blocks of the fitted ones) and it takes {:.0} % of what the noise leaves",
             self.holdout.sum,
             self.holdout.z,
             self.fit.z,
@@ -216,17 +218,6 @@ pub(crate) fn evaluate_all(
     tracks.iter().map(|track| holdout::evaluate(c, nominal, track, noise)).collect()
 }
 
-/// Costs per segment of a model on the recordings it was fitted to, under some noise.
-pub(crate) fn fit_costs(c: &FittedModel) -> Vec<f64> {
-    let mut out = Vec::new();
-    for (one, places) in c.fit.prepared.iter().zip(&c.fit.places) {
-        for (square, (weight, count)) in one.squares(places, &c.fit.solution.x).iter().zip(one.weights()) {
-            out.push(0.5 * count * robust_loss(square / weight / count).0);
-        }
-    }
-    out
-}
-
 /// What speaks for each effect of a model.
 pub(crate) fn judge_all(
     context: &FitContext,
@@ -235,7 +226,7 @@ pub(crate) fn judge_all(
 ) -> Vec<EffectEvidence> {
     let holdout: &[BlockedRecording] = &known(holdout, &last.model, context.span);
     let with = evaluate_all(last, context.nominal, holdout, &last.noise);
-    let with_fit = fit_costs(last);
+    let with_fit = left_out_costs(&last.fit);
     let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
     let left = |c: &FittedModel, tracks: &[BlockedRecording], totals: &[Total]| {
         forces(&estimator, tracks, totals, parameters::scale(context.nominal, c).0)
@@ -263,7 +254,7 @@ pub(crate) fn judge_all(
             let effect = less.effects.remove(i);
             let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
             let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
-            let without_fit = fit_costs(&without);
+            let without_fit = left_out_costs(&without.fit);
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
             let evaluated = evaluate_all(&without, context.nominal, holdout, &last.noise);
             let holdout_gain = holdout::compare(&with, &evaluated);
@@ -306,47 +297,6 @@ fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
     let dry = fit.value(Key::Coulomb).filter(|dry| name == EffectName::FrictionDrift && *dry > 0.0);
     let change = fit.value(Key::Term { effect, term: 0 });
     dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
-}
-
-/// Part of the mean square that an effect makes on one recording from which on another plays it.
-const PLAYED: f64 = 0.03;
-
-/// Sizes on the recordings that play an effect, fitted ones first.
-fn played(fitted: Vec<Size>, holdout: Vec<Size>) -> Vec<f64> {
-    let most = fitted.iter().chain(&holdout).map(|size| size.square).fold(0.0, f64::max);
-    let of = |sizes: Vec<Size>| -> Vec<f64> {
-        sizes.iter().filter(|size| size.square >= PLAYED * most).map(|size| size.factor).collect()
-    };
-    let (fitted, holdout) = (of(fitted), of(holdout));
-    if fitted.is_empty() || holdout.is_empty() { Vec::new() } else { [fitted, holdout].concat() }
-}
-
-/// How large an effect is on one recording.
-struct Size {
-    /// Factor on what it does that would leave the least.
-    factor: f64,
-    /// Mean square of what it does.
-    square: f64,
-}
-
-/// Sizes of an effect on each recording; what it does is the difference of what is left with it and without it.
-fn sizes_on(
-    estimator: &Estimator,
-    tracks: &[BlockedRecording],
-    with: &[Vec<f64>],
-    without: &[Vec<f64>],
-) -> Vec<Size> {
-    let one = |(track, (with, without)): (&BlockedRecording, (&Vec<f64>, &Vec<f64>))| {
-        let (mut along, mut square, mut moving) = (0.0, 0.0, 0.0);
-        for (j, _) in estimator.moving(track).iter().enumerate().filter(|(_, moving)| **moving) {
-            let done = without[j] - with[j];
-            along += done * with[j];
-            square += done * done;
-            moving += 1.0;
-        }
-        Size { factor: 1.0 + along / f64::max(square, 1e-300), square: square / f64::max(moving, 1.0) }
-    };
-    tracks.iter().zip(with.iter().zip(without)).map(one).collect()
 }
 
 #[cfg(test)]
@@ -457,14 +407,6 @@ mod tests {
             })
         };
         assert!(few(EffectName::MissedCounts) && !few(EffectName::PreslidingFriction));
-    }
-
-    #[test]
-    fn a_recording_that_hardly_plays_an_effect_says_nothing_of_its_size() {
-        let size = |factor, square| Size { factor, square };
-        let fitted = || vec![size(1.0, 1.0), size(1.8, 0.01)];
-        assert_eq!(played(fitted(), vec![size(0.9, 0.5)]), [1.0, 0.9]);
-        assert!(played(fitted(), vec![size(0.9, 0.01)]).is_empty(), "no held-out one plays it");
     }
 
     #[test]

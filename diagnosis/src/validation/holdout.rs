@@ -2,7 +2,7 @@
 //! the place along the travel at which it started).
 
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::{Noise, robust_loss};
+use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::model::{Key, Model, Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
@@ -224,15 +224,10 @@ fn evaluate_once(
     let places: Vec<usize> = (0..p).collect();
     let step: Vec<f64> = theta.iter().zip(&one.reference).map(|(a, b)| a - b).collect();
     let costs = one
-        .squares(&places, &step)
-        .iter()
-        .zip(one.weights())
+        .costs(&places, &step)
+        .into_iter()
         .zip(track.known_segments())
-        .map(
-            |((square, (_, count)), known)| {
-                if known { 0.5 * count * robust_loss(square / count).0 } else { 0.0 }
-            },
-        )
+        .map(|(cost, is_known)| if is_known { cost } else { 0.0 })
         .collect();
     let bias = offset.map_or(0.0, |o| theta[o]);
     HoldoutFit { total: total(track, &one.columns, &theta), bias, costs }

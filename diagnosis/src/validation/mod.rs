@@ -13,5 +13,6 @@ pub(crate) mod parameters;
 pub(crate) mod repeats;
 pub(crate) mod residual_maps;
 pub(crate) mod residuals;
+pub(crate) mod sizes;
 pub(crate) mod stepwise;
 pub(crate) mod tonal;
