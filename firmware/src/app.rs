@@ -14,6 +14,7 @@ const _: () = {
 mod app {
     use crate::SHARED;
     use crate::board::{self, Discovery, Statics};
+    use core::mem::MaybeUninit;
     use firmware::tasks::queues::Queues;
     use firmware::tasks::supervisor::Watch;
     use firmware::tasks::telemetry::Telemetry;
@@ -26,26 +27,32 @@ mod app {
 
     #[local]
     struct Local {
-        tick: Tick<Discovery>,
+        tick: &'static mut Tick<Discovery>,
         supply: board::Supply,
         supervisor: Watch<Discovery>,
         usb: Port<Discovery>,
-        telemetry: Telemetry<Discovery>,
+        telemetry: &'static mut Telemetry<Discovery>,
         tilt: Tilt<Discovery>,
     }
 
-    #[init(local = [queues: Queues = Queues::new(), statics: Statics = Statics::new()])]
+    // What is large has its place from the start: a `Local` that held it would be moved there over the stack.
+    #[init(local = [
+        queues: Queues = Queues::new(),
+        statics: Statics = Statics::new(),
+        tick_place: MaybeUninit<Tick<Discovery>> = MaybeUninit::uninit(),
+        telemetry_place: MaybeUninit<Telemetry<Discovery>> = MaybeUninit::uninit(),
+    ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let ends = context.local.queues.split();
         let parts = board::init(context.core, context.device, context.local.statics);
         let local = Local {
-            tick: Tick::new(
+            tick: context.local.tick_place.write(Tick::new(
                 &SHARED,
                 (parts.tick_timer, parts.encoder, parts.drive),
                 &parts.plan,
                 parts.heat,
                 ends.tick,
-            ),
+            )),
             supply: parts.supply,
             supervisor: Watch::new(
                 &SHARED,
@@ -55,12 +62,12 @@ mod app {
                 parts.drive_lines,
             ),
             usb: Port::new(&SHARED, parts.serial, ends.usb),
-            telemetry: Telemetry::new(
+            telemetry: context.local.telemetry_place.write(Telemetry::new(
                 &SHARED,
                 (parts.identity, &parts.plan, parts.reset_cause),
                 parts.store,
                 ends.telemetry,
-            ),
+            )),
             tilt: Tilt::new(&SHARED, parts.tilt),
         };
         (Shared {}, local)
@@ -78,8 +85,7 @@ mod app {
     /// and says so. Above every other task; no critical section masks it; never logs, never waits.
     #[task(binds = TIM4, priority = 16, local = [tick])]
     fn tick(context: tick::Context) {
-        // Its address is a constant that the compiler would put together anew at every access, two instructions each time.
-        core::hint::black_box(context.local.tick).run();
+        context.local.tick.run();
     }
 
     /// The supply falls: torque goes before the brown-out reset comes.

@@ -10,6 +10,7 @@ use control_core::config::Tissue;
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
 use control_core::{Order, Patient, Plan, TICK_HZ, TickOutput};
+use core::borrow::BorrowMut;
 use heapless::{Deque, HistoryBuf};
 
 /// Blocks that wait for the PC: 77 ms of samples.
@@ -33,8 +34,30 @@ pub struct Identity {
     pub firmware: [u8; 3],
 }
 
+/// What waits for the PC or for the control law. It is large, and may stand where it is at home from the start.
+pub struct Waiting {
+    acks: Deque<Ack, WAITING_ACKS>,
+    events: Deque<Event, WAITING_EVENTS>,
+    blocks: Deque<SampleBlock, WAITING_BLOCKS>,
+    orders: Deque<Order, WAITING_ORDERS>,
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Waiting {
+    /// Nothing waits.
+    pub const fn new() -> Self {
+        Self { acks: Deque::new(), events: Deque::new(), blocks: Deque::new(), orders: Deque::new() }
+    }
+}
+
 /// The device's end of the link.
-pub struct Endpoint {
+pub struct Endpoint<W = Waiting> {
+    waiting: W,
     identity: Identity,
     plan: Plan,
     decoder: Decoder,
@@ -46,22 +69,26 @@ pub struct Endpoint {
     limits: Limits,
     fault: Option<Fault>,
     sequence: u32,
-    acks: Deque<Ack, WAITING_ACKS>,
     hello_due: bool,
     device_due: bool,
-    events: Deque<Event, WAITING_EVENTS>,
     filling: SampleBlock,
-    blocks: Deque<SampleBlock, WAITING_BLOCKS>,
     pose: Option<Pose>,
     timing: Timing,
     timing_due: bool,
-    orders: Deque<Order, WAITING_ORDERS>,
 }
 
 impl Endpoint {
     /// `plan` is the one that the control law starts with; `reset_cause` is reported until a person starts again.
     pub fn new(identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
+        Self::with(Waiting::new(), identity, plan, reset_cause)
+    }
+}
+
+impl<W: BorrowMut<Waiting>> Endpoint<W> {
+    /// [`Endpoint::new`] with a place for what waits, in which nothing waits yet.
+    pub fn with(waiting: W, identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
         Self {
+            waiting,
             identity,
             plan: plan.clone(),
             decoder: Decoder::default(),
@@ -73,16 +100,12 @@ impl Endpoint {
             limits: Limits::default(),
             fault: reset_cause,
             sequence: 0,
-            acks: Deque::new(),
             hello_due: false,
             device_due: false,
-            events: Deque::new(),
             filling: SampleBlock::default(),
-            blocks: Deque::new(),
             pose: None,
             timing: Timing::default(),
             timing_due: false,
-            orders: Deque::new(),
         }
     }
 
@@ -99,14 +122,14 @@ impl Endpoint {
 
     /// The next order for the control law.
     pub fn next_order(&mut self) -> Option<Order> {
-        self.orders.pop_front()
+        self.waiting.borrow_mut().orders.pop_front()
     }
 
     /// The PC is gone: nothing waits for it any longer, and what it asked for and was not yet done is forgotten.
     pub fn disconnect(&mut self) {
         self.in_session = false;
         self.start_ordered = false;
-        self.orders.clear();
+        self.waiting.borrow_mut().orders.clear();
         self.decoder = Decoder::default();
         self.forget_waiting();
     }
@@ -186,7 +209,7 @@ impl Endpoint {
         if core::mem::take(&mut self.hello_due) {
             return Some(DeviceFrame::Hello(self.hello()));
         }
-        if let Some(ack) = self.acks.pop_front() {
+        if let Some(ack) = self.waiting.borrow_mut().acks.pop_front() {
             return Some(DeviceFrame::Ack(ack));
         }
         if !self.in_session {
@@ -195,13 +218,13 @@ impl Endpoint {
         if core::mem::take(&mut self.device_due) {
             return Some(DeviceFrame::Device(*self.plan.device()));
         }
-        if let Some(event) = self.events.pop_front() {
+        if let Some(event) = self.waiting.borrow_mut().events.pop_front() {
             return Some(DeviceFrame::Event(event));
         }
         if let Some(pose) = self.pose.take() {
             return Some(DeviceFrame::Pose(pose));
         }
-        if let Some(block) = self.blocks.pop_front() {
+        if let Some(block) = self.waiting.borrow_mut().blocks.pop_front() {
             return Some(DeviceFrame::Samples(block));
         }
         core::mem::take(&mut self.timing_due).then_some(DeviceFrame::Timing(self.timing))
@@ -232,7 +255,7 @@ impl Endpoint {
             // A PC that starts anew may use old ids again.
             self.answered.clear();
         } else if let Some(ack) = self.answered.oldest_ordered().find(|ack| ack.id == frame.id) {
-            let _ = self.acks.push_back(*ack);
+            let _ = self.waiting.borrow_mut().acks.push_back(*ack);
             return;
         }
         let result = self.carry_out(frame.command);
@@ -241,7 +264,7 @@ impl Endpoint {
             self.answered.write(ack);
         }
         // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered again.
-        let _ = self.acks.push_back(ack);
+        let _ = self.waiting.borrow_mut().acks.push_back(ack);
     }
 
     fn carry_out(&mut self, command: Command) -> Result<(), Rejection> {
@@ -259,7 +282,7 @@ impl Endpoint {
             Command::Stop => {
                 self.start_ordered = false;
                 // A stop must not wait behind other orders.
-                self.orders.clear();
+                self.waiting.borrow_mut().orders.clear();
                 self.order(Order::Stop)
             }
             Command::Start => {
@@ -319,7 +342,7 @@ impl Endpoint {
     }
 
     fn order(&mut self, order: Order) -> Result<(), Rejection> {
-        self.orders.push_back(order).map_err(|_| Rejection::Full)
+        self.waiting.borrow_mut().orders.push_back(order).map_err(|_| Rejection::Full)
     }
 
     fn note_events(&mut self, tick: u64, output: &TickOutput) {
@@ -374,29 +397,29 @@ impl Endpoint {
     }
 
     fn event(&mut self, tick: u64, kind: EventKind) {
-        if self.events.is_full() {
+        if self.waiting.borrow_mut().events.is_full() {
             // The missing number tells the PC that a frame was lost.
-            self.events.pop_front();
+            self.waiting.borrow_mut().events.pop_front();
             self.sequence = self.sequence.wrapping_add(1);
         }
-        let _ = self.events.push_back(Event { tick, kind });
+        let _ = self.waiting.borrow_mut().events.push_back(Event { tick, kind });
     }
 
     fn queue_block(&mut self) {
         let block = core::mem::take(&mut self.filling);
-        if self.blocks.is_full()
-            && let Some(oldest) = self.blocks.pop_front()
+        if self.waiting.borrow_mut().blocks.is_full()
+            && let Some(oldest) = self.waiting.borrow_mut().blocks.pop_front()
         {
             let dropped = oldest.samples.len() as u32;
             self.timing.dropped_samples = self.timing.dropped_samples.saturating_add(dropped);
         }
-        let _ = self.blocks.push_back(block);
+        let _ = self.waiting.borrow_mut().blocks.push_back(block);
     }
 
     fn forget_waiting(&mut self) {
-        self.acks.clear();
-        self.events.clear();
-        self.blocks.clear();
+        self.waiting.borrow_mut().acks.clear();
+        self.waiting.borrow_mut().events.clear();
+        self.waiting.borrow_mut().blocks.clear();
         self.filling = SampleBlock::default();
         self.pose = None;
         self.timing_due = false;

@@ -3,6 +3,7 @@
 use control_core::{Order, TickOutput};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
+use link::device::Waiting;
 
 /// A bulk packet of USB at full speed.
 pub const PACKET_BYTES: usize = 64;
@@ -44,6 +45,7 @@ pub struct Queues {
     from_pc: Queue<Packet, 16>,
     // 4 KiB: what a full-speed host takes in 4 ms at worst, 40 ms of stream.
     to_pc: Queue<Packet, 64>,
+    waiting: Waiting,
 }
 
 /// The tick's ends.
@@ -84,8 +86,8 @@ pub struct Ends {
     pub tick: TickEnds,
     /// The USB task's.
     pub usb: UsbEnds,
-    /// Telemetry's.
-    pub telemetry: TelemetryEnds,
+    /// Telemetry's, and its memory for what waits.
+    pub telemetry: (TelemetryEnds, &'static mut Waiting),
 }
 
 impl Default for Queues {
@@ -103,6 +105,7 @@ impl Queues {
             outputs: Queue::new(),
             from_pc: Queue::new(),
             to_pc: Queue::new(),
+            waiting: Waiting::new(),
         }
     }
 
@@ -116,13 +119,16 @@ impl Queues {
         Ends {
             tick: TickEnds { orders, large_orders, outputs },
             usb: UsbEnds { from_pc, to_pc },
-            telemetry: TelemetryEnds {
-                orders: orders_in,
-                large_orders: large_in,
-                outputs: outputs_out,
-                from_pc: from_pc_out,
-                to_pc: to_pc_in,
-            },
+            telemetry: (
+                TelemetryEnds {
+                    orders: orders_in,
+                    large_orders: large_in,
+                    outputs: outputs_out,
+                    from_pc: from_pc_out,
+                    to_pc: to_pc_in,
+                },
+                &mut self.waiting,
+            ),
         }
     }
 }

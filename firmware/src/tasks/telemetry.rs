@@ -13,7 +13,7 @@ use control_core::interlock::Interlock;
 use control_core::{Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use link::codec::MAX_FRAME;
-use link::device::{Endpoint, Identity};
+use link::device::{Endpoint, Identity, Waiting};
 use link::frames::{SaveFailure, Stage, Timing};
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
@@ -28,7 +28,7 @@ struct TorqueIsOn;
 /// Telemetry's own state.
 pub struct Telemetry<B: Board> {
     shared: &'static Shared,
-    endpoint: Endpoint,
+    endpoint: Endpoint<&'static mut Waiting>,
     store: Store<B::Flash>,
     /// CRC-32 of the device's and of the patient's part that a reset would bring back.
     saved: (u32, u32),
@@ -48,11 +48,11 @@ impl<B: Board> Telemetry<B> {
         shared: &'static Shared,
         (identity, plan, reset_cause): (Identity, &Plan, Option<Fault>),
         store: Store<B::Flash>,
-        ends: TelemetryEnds,
+        (ends, waiting): (TelemetryEnds, &'static mut Waiting),
     ) -> Self {
         Self {
             shared,
-            endpoint: Endpoint::new(identity, plan, reset_cause),
+            endpoint: Endpoint::with(waiting, identity, plan, reset_cause),
             store,
             saved: (link::codec::hash(plan.device()), link::codec::hash(plan.patient())),
             ends,

@@ -28,7 +28,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use link::Command;
 use link::codec::MAX_FRAME;
-use link::device::Identity;
+use link::device::{Identity, Waiting};
 use link::frames::{DeviceFrame, EventKind, PROTOCOL_VERSION, Rejection, SaveFailure};
 use link::host::{Commands, Reception};
 use std::boxed::Box;
@@ -265,7 +265,7 @@ fn shared() -> &'static Shared {
 }
 
 /// The ends of queues that live as long as the test's process.
-fn ends() -> (TickEnds, UsbEnds, TelemetryEnds) {
+fn ends() -> (TickEnds, UsbEnds, (TelemetryEnds, &'static mut Waiting)) {
     let queues: &'static mut Queues = Box::leak(Box::new(Queues::new()));
     let ends = queues.split();
     (ends.tick, ends.usb, ends.telemetry)
@@ -274,7 +274,7 @@ fn ends() -> (TickEnds, UsbEnds, TelemetryEnds) {
 /// A tick with its far ends; nothing has run yet.
 fn tick() -> (Tick<Fake>, &'static Shared, TelemetryEnds) {
     let shared = shared();
-    let (tick_ends, _, telemetry) = ends();
+    let (tick_ends, _, (telemetry, _)) = ends();
     let drive = Drive::new(Part, Eight, Part);
     (Tick::new(shared, (Part, Part, drive), &plan(), 0, tick_ends), shared, telemetry)
 }
@@ -499,7 +499,7 @@ fn the_tilt_task_gives_what_it_measures_and_trips_under_torque() {
 #[test]
 fn the_port_passes_packets_on_both_ways_and_ends_a_full_one() {
     let shared = shared();
-    let (_, usb, mut telemetry) = ends();
+    let (_, usb, (mut telemetry, _)) = ends();
     let mut port: Port<Fake> = Port::new(shared, Part, usb);
     let packet = |bytes: &[u8]| Packet::from_slice(bytes).unwrap();
     world().incoming.borrow_mut().push_back([1, 2, 3].into());
@@ -532,7 +532,7 @@ fn the_port_passes_packets_on_both_ways_and_ends_a_full_one() {
 #[test]
 fn a_port_without_room_keeps_its_interrupt_away() {
     let shared = shared();
-    let (_, usb, mut telemetry) = ends();
+    let (_, usb, (mut telemetry, _)) = ends();
     let mut port: Port<Fake> = Port::new(shared, Part, usb);
     world().usb_allowed.set(true);
     for _ in 0..40 {
