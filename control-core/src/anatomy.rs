@@ -23,8 +23,8 @@ pub const SMALLEST_ANGLE: Milliradians = Milliradians(87);
 pub const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
 /// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor does not heal a wall.
 const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
-/// Ticks between two looks at the tilt.
-const LOOK_TICKS: u32 = 16;
+/// Ticks from one look at the tilt to the next.
+pub(crate) const LOOK_TICKS: u32 = 16;
 /// Share of the way to the measured tilt at each look, as a shift: with [`LOOK_TICKS`], a time constant of 51 ms.
 const SMOOTHING: u32 = 5;
 /// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
@@ -98,7 +98,10 @@ pub(crate) struct Insertion {
     angle: Angle,
     /// The next look takes the tilt over as it is.
     is_new: bool,
-    next_look: u32,
+    /// Where the needle has turned to: reckoned in one of the next ticks, and taken over in another one, for both in one with
+    /// the look would be long.
+    turned: Option<Milliradians>,
+    next_angle: Option<Angle>,
     /// Of each layer, where it begins along the needle.
     tops: [I16F16; MAX_LAYERS],
     /// Of each wall, where the tip began to push it in.
@@ -122,7 +125,8 @@ impl Insertion {
         let mut insertion = Self {
             angle: Angle::new(LARGEST_ANGLE),
             is_new: true,
-            next_look: 1,
+            turned: None,
+            next_angle: None,
             tops: [I16F16::ZERO; MAX_LAYERS],
             origins: [I16F16::ZERO; MAX_LAYERS],
             carried: [I16F16::ZERO; MAX_LAYERS],
@@ -185,19 +189,19 @@ impl Insertion {
         above.iter().rposition(|&top| depth.0 >= top).unwrap_or(0)
     }
 
-    /// Takes over the tilt of the next tick as it is, without smoothing: what was before does not matter.
+    /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
     pub(crate) fn begin(&mut self) {
         self.is_new = true;
-        self.next_look = 1;
+        (self.turned, self.next_angle) = (None, None);
+    }
+
+    /// Whether the tilt is to be looked at without waiting for its turn.
+    pub(crate) fn is_new(&self) -> bool {
+        self.is_new
     }
 
     /// One tick with the tip at `depth` along the needle.
-    pub(crate) fn tick(&mut self, anatomy: &Anatomy, tilt: Milliradians, depth: Millimetres) -> Transitions {
-        self.next_look -= 1;
-        if self.next_look == 0 {
-            self.next_look = LOOK_TICKS;
-            self.look(anatomy, tilt);
-        }
+    pub(crate) fn tick(&mut self, anatomy: &Anatomy, depth: Millimetres) -> Transitions {
         let puncture = self.puncture(anatomy, depth);
         let mut transitions = Transitions { puncture, ..self.cross_layer(anatomy, depth) };
         self.is_pressing = anatomy.walls.get(self.given).is_some_and(|wall| wall.layer < self.touched);
@@ -205,8 +209,18 @@ impl Insertion {
         transitions
     }
 
-    /// Follows the tilt.
-    fn look(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
+    /// Takes over the tilt as it is, all at once. Like its parts out of the way of the ticks that look at nothing.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn look_anew(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
+        self.look(anatomy, tilt);
+        self.reckon_angle();
+        self.take_angle(anatomy);
+    }
+
+    /// Follows the tilt, every [`LOOK_TICKS`]; [`Self::reckon_angle`] and [`Self::take_angle`] come before the next look.
+    #[inline(never)]
+    pub(crate) fn look(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
         let measured = i32::from(anatomy.angle(tilt).0) << 16;
         let smoothed = if core::mem::take(&mut self.is_new) {
             measured
@@ -216,8 +230,23 @@ impl Insertion {
         self.angle.smoothed = smoothed;
         let off = smoothed - (i32::from(self.angle.taken.0) << 16);
         if off.unsigned_abs() > DEAD_BAND {
-            let taken = Milliradians(((smoothed + (1 << 15)) >> 16) as i16);
-            self.angle = Angle { smoothed, ..Angle::new(taken) };
+            self.turned = Some(Milliradians(((smoothed + (1 << 15)) >> 16) as i16));
+        }
+    }
+
+    /// The second part of a look.
+    #[inline(never)]
+    pub(crate) fn reckon_angle(&mut self) {
+        if let Some(turned) = self.turned.take() {
+            self.next_angle = Some(Angle { smoothed: self.angle.smoothed, ..Angle::new(turned) });
+        }
+    }
+
+    /// The third part of a look.
+    #[inline(never)]
+    pub(crate) fn take_angle(&mut self, anatomy: &Anatomy) {
+        if let Some(next) = self.next_angle.take() {
+            self.angle = next;
             self.place(anatomy);
         }
     }

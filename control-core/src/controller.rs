@@ -1,7 +1,7 @@
 //! The tick: strings the stages together and holds the operating mode. The device and the simulator call this and
 //! nothing else.
 
-use crate::anatomy::Insertion;
+use crate::anatomy::{self, Insertion};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
@@ -112,7 +112,7 @@ pub struct Controller {
     silent_ticks: u32,
     frozen_ticks: u32,
     runaway: runaway::Watch,
-    /// Ticks, for what is done in one of eight only.
+    /// Ticks, for what is done in one of eight or of sixteen only.
     turn: u32,
     tripped: Option<Fault>,
 }
@@ -228,6 +228,7 @@ impl Controller {
         let count = self.count(Counts(input.count.0.wrapping_mul(self.plan.encoder_sign)));
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
+        self.turn = (self.turn + 1) % anatomy::LOOK_TICKS;
         let (transitions, tissue) = self.meet(input.tilt, depth, speed);
         self.watch_host();
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
@@ -235,12 +236,11 @@ impl Controller {
             None => (MillinewtonMetres::default(), Limits::default()),
         };
         self.winding.tick(torque);
-        self.turn = (self.turn + 1) % 8;
-        if self.turn == LOOK_TURN {
+        if self.turn % 8 == LOOK_TURN {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
-        } else if transitions.puncture == 0 {
-            // A tick in which a wall gives way is long enough.
+        } else if transitions.is_empty() {
+            // A tick in which a layer is touched, gives way or is left is long enough.
             self.take_turn();
         }
         let codes = self.plan.dac.codes(torque);
@@ -273,7 +273,7 @@ impl Controller {
     /// What is slow enough to be done in one tick of eight, each in another one.
     fn take_turn(&mut self) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
-        let fault = match self.turn {
+        let fault = match self.turn % 8 {
             0 => return self.winding.warm(&self.plan.thermal),
             2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
             5 => self.runaway.look(&self.plan.runaway),
@@ -300,7 +300,15 @@ impl Controller {
         if self.mode == Mode::Exciting {
             return (Transitions::default(), Response::NONE);
         }
-        let transitions = self.insertion.tick(&self.plan.anatomy, tilt, depth);
+        const { assert!(anatomy::LOOK_TICKS == 16, "the turns below, which `take_turn` leaves free") };
+        match self.turn {
+            _ if self.insertion.is_new() => self.insertion.look_anew(&self.plan.anatomy, tilt),
+            3 => self.insertion.look(&self.plan.anatomy, tilt),
+            9 => self.insertion.reckon_angle(),
+            11 => self.insertion.take_angle(&self.plan.anatomy),
+            _ => {}
+        }
+        let transitions = self.insertion.tick(&self.plan.anatomy, depth);
         (transitions, self.tissue.tick(&self.plan.forces, &self.insertion, depth, speed))
     }
 
@@ -380,7 +388,7 @@ impl Controller {
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
                 // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
                 let torque = I16F16::from_bits(-scaled(given.0.to_bits(), radius.0.to_bits(), 16));
-                Some((MillinewtonMetres(torque), limits))
+                Some((MillinewtonMetres(self.runaway.steady(torque, self.limiter.given().0)), limits))
             }
             Mode::Exciting => {
                 let torque = self.player.as_mut().and_then(|player| player.tick(radius, depth, speed));

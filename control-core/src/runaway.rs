@@ -10,7 +10,11 @@
 //!
 //! **Too fast.** Whatever drives it.
 //!
-//! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again.
+//! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again. So does a needle
+//! that a stiff wall throws to and fro over one edge, as fast as any: the wall's force steps with the count, and the less the
+//! needle moves the sooner it is back. The two are told apart by taking the step away: when counts go to and fro, the torque is
+//! held for 10 ms at the mean of both sides. A chatter then has nothing that throws it, and ends; a hand that moves on past a
+//! dead channel does not.
 
 use crate::TICK_HZ;
 use crate::event::Fault;
@@ -26,6 +30,12 @@ const LOOKS: usize = 8;
 const FORGET_LOOKS: u32 = 6;
 /// Turns to and fro without getting on: more than a tremor or a rattle makes.
 const TURNS: u32 = 5;
+/// Turns at which the torque is held to see whether they go on without it.
+const DOUBTFUL_TURNS: u32 = 3;
+/// Ticks for which it is held: 10 ms.
+const HOLD_TICKS: u32 = 100;
+/// Turns in that time that a needle which coasts may still make.
+const COASTING_TURNS: u32 = 1;
 /// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
 const LEAST_COUNTS: i32 = 5;
 
@@ -90,6 +100,16 @@ pub(crate) struct Watch {
     /// Looks until a turn is forgotten.
     forget: u32,
     last_step: i32,
+    hold: Hold,
+}
+
+/// The torque while it is seen whether turns go on without the force's steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Hold {
+    torque: I16F16,
+    remaining_ticks: u32,
+    /// [`Watch::turns`] when it began.
+    turns: u32,
 }
 
 impl Watch {
@@ -101,9 +121,33 @@ impl Watch {
     /// A step of the needle that is none: back to where the one before came from. Called in every tick.
     pub(crate) fn is_back(&mut self, step: i32) -> bool {
         let is_back = step == self.last_step.wrapping_neg();
-        self.turns = if is_back { self.turns.wrapping_add(1) } else { 0 };
+        if is_back {
+            self.turns = self.turns.wrapping_add(1);
+        } else {
+            self.turns = 0;
+            self.hold.remaining_ticks = 0;
+        }
         self.last_step = step;
         is_back
+    }
+
+    /// The torque to ask for instead of `wanted`, where `before` was given in the tick before: itself, or what is held while
+    /// turns are in doubt. Called in every tick in which the law's force is given.
+    pub(crate) fn steady(&mut self, wanted: I16F16, before: I16F16) -> I16F16 {
+        if self.turns < DOUBTFUL_TURNS { wanted } else { self.held(wanted, before) }
+    }
+
+    #[cold]
+    fn held(&mut self, wanted: I16F16, before: I16F16) -> I16F16 {
+        if self.hold.remaining_ticks == 0 {
+            let torque = I16F16::from_bits(wanted.to_bits().midpoint(before.to_bits()));
+            self.hold = Hold { torque, remaining_ticks: HOLD_TICKS, turns: self.turns };
+        }
+        self.hold.remaining_ticks -= 1;
+        if self.hold.remaining_ticks == 0 && self.turns <= self.hold.turns + COASTING_TURNS {
+            self.turns = 0;
+        }
+        self.hold.torque
     }
 
     /// Takes the count and the torque in mN·m of a look, which the next three ticks judge.
@@ -149,7 +193,8 @@ impl Watch {
             return Some(Fault::EncoderChannel);
         }
         self.forget += 1;
-        if self.forget >= FORGET_LOOKS {
+        // While the torque is held every turn counts.
+        if self.forget >= FORGET_LOOKS && self.hold.remaining_ticks == 0 {
             self.forget = 0;
             self.turns = self.turns.saturating_sub(1);
         }
@@ -244,6 +289,62 @@ mod tests {
         assert_eq!(at(380.0), None);
         let (time, fault) = at(450.0).unwrap_or((1.0, Fault::Travel));
         assert!(fault == Fault::Overspeed && time < 0.0235, "{time}");
+    }
+
+    /// 30 g with 0.02 N of dry friction against a wall of 5.6 N/mm, whose force is a tick late and steps by 0.09 N at each count.
+    /// A hand leans on it with half of that over the first count. The torque is held where turns are in doubt, or never.
+    fn chattered(holds: bool) -> Option<(f64, Fault)> {
+        let mut watch = Watch::new(0);
+        let (mut depth, mut speed, mut last, mut given) = (-1e-5, 0.2, 0, 0.0);
+        (0..5_000).find_map(|tick| {
+            let count = (depth / 0.0157_f64).floor() as i32 + 1;
+            let step = count - core::mem::replace(&mut last, count);
+            if step != 0 {
+                watch.is_back(step);
+            }
+            // mm, mm/s, mN·m at 10 mm.
+            let free = 44.0 + given * 100.0;
+            let moved = speed + (free - f64::copysign(20.0, speed)) / 0.03 * 1e-4;
+            speed = if moved * speed < 0.0 && free.abs() <= 20.0 { 0.0 } else { moved };
+            depth += speed * 1e-4;
+            let wanted = I16F16::from_num(-0.88 * f64::from(count));
+            let torque = if holds { watch.steady(wanted, I16F16::from_num(given)) } else { wanted };
+            given = torque.to_num();
+            let fault = (tick % LOOK_TICKS == 0).then(|| {
+                watch.take(count, torque);
+                watch.count_turns()
+            });
+            fault.flatten().map(|fault| (f64::from(tick) / 1e4, fault))
+        })
+    }
+
+    #[test]
+    fn a_wall_that_chatters_over_one_count_is_no_dead_channel() {
+        assert_eq!(chattered(true), None);
+        let fault = chattered(false).map(|(_, fault)| fault);
+        assert_eq!(fault, Some(Fault::EncoderChannel), "by its counts alone it is one");
+    }
+
+    /// 20 mm/s past a dead channel, with the torque held: the hand moves on.
+    #[test]
+    fn a_dead_channel_goes_on_while_the_torque_is_held() {
+        let (bounds, mut watch) = (bounds(), Watch::new(0));
+        let mut last = 0;
+        let found = (0..1_000).find_map(|tick| {
+            let count = tick / 16 % 2;
+            let step = count - core::mem::replace(&mut last, count);
+            if step != 0 {
+                watch.is_back(step);
+            }
+            let torque = watch.steady(I16F16::from_num(-5 - count), I16F16::from_num(-6 + count));
+            let fault = (tick % 8 == 0).then(|| {
+                watch.take(count, torque);
+                watch.look(&bounds).or(watch.count_turns())
+            });
+            fault.flatten().map(|fault| (tick, fault))
+        });
+        let (tick, fault) = found.unwrap_or((1_000, Fault::Travel));
+        assert!(fault == Fault::EncoderChannel && tick < 200, "{fault:?} in tick {tick}");
     }
 
     #[test]
