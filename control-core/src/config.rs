@@ -60,6 +60,8 @@ pub struct Device {
     pub damping: Damping,
     /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
     pub passivity_damping: Damping,
+    /// What stands above was found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
+    pub commissioned: bool,
 }
 
 /// Whom the needle goes into: tissue, its law of force, and limits of its own, which may be narrower than the device's and
@@ -231,7 +233,7 @@ pub struct Parabola {
 }
 
 impl Default for Device {
-    /// A 10 mm roller on the motor and encoder of seed 001, a 12-bit converter.
+    /// A 10 mm roller on the motor and encoder of seed 001, a 12-bit converter: the virtual device, which is known to be so.
     fn default() -> Self {
         let mm = |whole: i32| Millimetres(I16F16::from_bits(whole << 16));
         // 28.8 mN·m.
@@ -260,7 +262,15 @@ impl Default for Device {
             damping: Damping::default(),
             // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
+            commissioned: true,
         }
+    }
+}
+
+impl Device {
+    /// A device that nobody has commissioned, taken for the default one: what a board is that has no record of its own.
+    pub fn unknown() -> Self {
+        Self { commissioned: false, ..Self::default() }
     }
 }
 

@@ -8,12 +8,15 @@ use crate::TICK_HZ;
 use crate::math::{multiply, scaled, times, upper_half};
 use crate::plan::{Field, Plan, Refusal, within};
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use fixed::types::{I2F30, I16F16, I32F32};
+use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Sines of a multisine at the most.
 pub const MAX_LINES: usize = 12;
+
+/// The largest torque that a device gives before it has been commissioned: 2 mN·m.
+pub const GENTLE_TORQUE: MillinewtonMetres = MillinewtonMetres(I16F16::from_bits(2 << 16));
 
 /// What to play.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,6 +93,23 @@ pub enum Signal {
 }
 
 impl Excitation {
+    /// Whether a device may play it of which nobody knows yet how it is wired: no servo, which would drive the wrong way, and
+    /// no more than [`GENTLE_TORQUE`].
+    pub fn is_gentle(&self) -> bool {
+        let torque = match &self.signal {
+            Signal::Multisine { torque, frequencies } => {
+                torque.0.saturating_mul_int(frequencies.len() as i32)
+            }
+            Signal::BreakawayRamps { torque, .. } => torque.0,
+            Signal::Hold
+            | Signal::SpeedStaircase { .. }
+            | Signal::Triangle { .. }
+            | Signal::ReversalLadder { .. } => I16F16::ZERO,
+        };
+        let has_servo = self.servo.stiffness.0 != I16F16::ZERO || self.servo.damping.0 != I8F24::ZERO;
+        torque <= GENTLE_TORQUE.0 && !has_servo
+    }
+
     /// Whether the device may play it under `plan`.
     pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
         let limits = &plan.device().limits;

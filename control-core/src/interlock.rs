@@ -21,17 +21,23 @@ pub enum Interlock {
     EncoderWire = 4,
     /// The configuration is being saved, which stops the processor.
     Saving = 5,
+    /// Nobody has found out how the device is wired.
+    NotCommissioned = 6,
+    /// Nobody has said where depth 0 is since the last reset.
+    NotZeroed = 7,
 }
 
 impl Interlock {
     /// All of them, each at the place of its number.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Supply,
         Self::EmergencyStop,
         Self::AmplifierNotReady,
         Self::AmplifierStuckOn,
         Self::EncoderWire,
         Self::Saving,
+        Self::NotCommissioned,
+        Self::NotZeroed,
     ];
 
     /// The fault that it is where torque is on.
@@ -42,8 +48,8 @@ impl Interlock {
             Self::AmplifierNotReady => Fault::AmplifierNotReady,
             Self::AmplifierStuckOn => Fault::AmplifierStuckOn,
             Self::EncoderWire => Fault::EncoderWire,
-            // Nobody begins to save while torque is on.
-            Self::Saving => Fault::Overrun,
+            // Nobody begins to save while torque is on; the last two keep a device from being started and come at no other time.
+            Self::Saving | Self::NotCommissioned | Self::NotZeroed => Fault::Overrun,
         }
     }
 }
@@ -61,6 +67,8 @@ impl fmt::Display for Interlock {
             }
             Self::EncoderWire => "an encoder wire is off; check the encoder's plug",
             Self::Saving => "the configuration is being saved; try again in two seconds",
+            Self::NotCommissioned => "nobody knows how this device is wired; run host-sim commission with it first",
+            Self::NotZeroed => "depth is not known since the device was switched on; hold the tip on the skin and press Zero depth here",
         })
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// Raised whenever the bytes of a stored record mean something else.
-pub const LAYOUT_VERSION: u8 = 2;
+pub const LAYOUT_VERSION: u8 = 3;
 /// Words of a cell: 1 KiB, room for the longest record.
 pub const CELL_WORDS: usize = 256;
 /// Erased flash.
@@ -97,13 +97,13 @@ pub enum Stored<T> {
     Damaged,
 }
 
-impl<T: Default> Stored<T> {
-    /// What to use, and whether a version was lost.
-    pub fn or_default(self) -> (T, bool) {
+impl<T> Stored<T> {
+    /// What to use, `otherwise` where there is none, and whether a version was lost.
+    pub fn or(self, otherwise: T) -> (T, bool) {
         match self {
             Stored::Found(record) => (record, false),
-            Stored::None => (T::default(), false),
-            Stored::Damaged => (T::default(), true),
+            Stored::None => (otherwise, false),
+            Stored::Damaged => (otherwise, true),
         }
     }
 }

@@ -32,6 +32,10 @@ pub enum Request {
     Excite(Excitation),
     /// Another patient; torque goes off for it.
     Patient(Box<Patient>),
+    /// Another device's part.
+    Device(Box<Device>),
+    /// Which device's part is in force.
+    ReportDevice,
 }
 
 /// The PC's side of a conversation.
@@ -131,6 +135,8 @@ impl Driver {
             Request::Zero => self.waiting.push_back(Command::Zero),
             Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
             Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
+            Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
+            Request::ReportDevice => self.waiting.push_back(Command::ReportDevice),
         }
     }
 

@@ -7,6 +7,7 @@ pub mod bedside;
 mod bounded_listener;
 pub mod characterise;
 pub mod class;
+pub mod commission;
 pub mod debrief;
 pub mod device;
 pub mod driver;

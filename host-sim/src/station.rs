@@ -118,6 +118,8 @@ pub struct Station<'a> {
     was_ready: bool,
     /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
     person_starts: bool,
+    /// The tip is at depth 0 when it is started for the first time.
+    zeroes_first: bool,
     /// Where the patient may be changed.
     bedside: Option<Bedside>,
 }
@@ -135,12 +137,26 @@ pub struct Outcome {
 impl<'a> Station<'a> {
     /// Not connected yet.
     pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
-        Self { driver, outlets, stop, was_ready: false, person_starts: false, bedside: None }
+        Self {
+            driver,
+            outlets,
+            stop,
+            was_ready: false,
+            person_starts: false,
+            zeroes_first: false,
+            bedside: None,
+        }
     }
 
     /// The torque stays off until a person asks for it in the page.
     pub fn wait_for_a_person(mut self) -> Self {
         self.person_starts = true;
+        self
+    }
+
+    /// Depth 0 is where the needle is when the device is started for the first time.
+    pub fn zeroing_first(mut self) -> Self {
+        self.zeroes_first = true;
         self
     }
 
@@ -235,6 +251,12 @@ impl<'a> Station<'a> {
             }
             self.patient_answer();
             self.start_once(now);
+            if let Some(why) =
+                self.driver.notice().filter(|_| !self.person_starts && !self.driver.has_started())
+            {
+                // Nobody would see it in a page.
+                return Err(Failure::failed(why));
+            }
             self.outlets.status(&self.driver, now);
             progress(self.outlets.tally.samples);
         }
@@ -278,6 +300,9 @@ impl<'a> Station<'a> {
         }
         self.was_ready = true;
         if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
+            if std::mem::take(&mut self.zeroes_first) {
+                self.driver.request(Request::Zero);
+            }
             self.driver.request(Request::Start);
         }
     }

@@ -117,7 +117,9 @@ fn a_port_in_use_is_one_line_and_status_one() {
 #[test]
 fn every_command_has_help_with_an_example() {
     assert!(run_well(&["--help"]).contains("Example"));
-    for command in ["run", "replay", "export", "score", "characterise", "import", "diagnose", "simulate"] {
+    for command in
+        ["run", "replay", "export", "score", "commission", "characterise", "import", "diagnose", "simulate"]
+    {
         let help = run_well(&[command, "--help"]);
         assert!(help.contains(&format!("host-sim {command}")) && help.contains("Example"), "{help}");
     }

@@ -16,7 +16,7 @@ fn main() {
     let end = Instant::now() + Duration::from_secs(seconds);
     let plan = Config::default().plan().expect("the default is sound");
     let identity = Identity { serial: [0; 12], firmware: [0; 3] };
-    let mut device = Endpoint::new(identity, &plan, None);
+    let mut device = Endpoint::new(identity, &plan, None).knowing_depth();
     let mut controller = Controller::new(plan);
     let mut reception = Reception::default();
     let (mut rounds, mut tick, mut id) = (0_u64, 0_u64, 0_u32);

@@ -6,9 +6,9 @@ use crate::frames::{
     Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
     PROTOCOL_VERSION, Pose, Rejection, SampleBlock, SaveFailure, Timing,
 };
-use control_core::config::Tissue;
+use control_core::config::{Device, Tissue};
 use control_core::event::{Fault, Limits};
-use control_core::interlock::Interlocks;
+use control_core::interlock::{Interlock, Interlocks};
 use control_core::{Order, Patient, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use heapless::{Deque, HistoryBuf};
@@ -65,6 +65,8 @@ pub struct Endpoint<W = Waiting> {
     in_session: bool,
     powered: bool,
     start_ordered: bool,
+    /// Somebody has said where depth 0 is.
+    zeroed: bool,
     interlocks: Interlocks,
     limits: Limits,
     fault: Option<Fault>,
@@ -96,6 +98,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             in_session: false,
             powered: false,
             start_ordered: false,
+            zeroed: false,
             interlocks: Interlocks::default(),
             limits: Limits::default(),
             fault: reset_cause,
@@ -107,6 +110,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             timing: Timing::default(),
             timing_due: false,
         }
+    }
+
+    /// Of a device whose depth is right from the start, as a virtual one's is.
+    pub fn knowing_depth(self) -> Self {
+        Self { zeroed: true, ..self }
     }
 
     /// Takes bytes from the PC, in pieces of any size.
@@ -286,7 +294,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.order(Order::Stop)
             }
             Command::Start => {
-                self.may_start()?;
+                self.may_give_torque()?;
+                self.is_commissioned()?;
+                if !self.zeroed {
+                    return Err(Rejection::Interlocked(Interlock::NotZeroed));
+                }
                 self.order(Order::Start)?;
                 self.start_ordered = true;
                 self.fault = None;
@@ -300,10 +312,17 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             {
                 Err(Rejection::Powered)
             }
-            Command::Zero => self.order(Order::Zero),
+            Command::Zero => {
+                self.order(Order::Zero)?;
+                self.zeroed = true;
+                Ok(())
+            }
             Command::Excite(excitation) => {
                 excitation.check(&self.plan).map_err(Rejection::Config)?;
-                self.may_start()?;
+                self.may_give_torque()?;
+                if !excitation.is_gentle() {
+                    self.is_commissioned()?;
+                }
                 self.order(Order::Excite(excitation))?;
                 self.start_ordered = true;
                 self.fault = None;
@@ -317,7 +336,13 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 let plan = Plan::new(&device, self.plan.patient())
                     .or_else(|_| Plan::new(&device, &Patient::nobody()))
                     .map_err(Rejection::Config)?;
-                self.configure(plan)
+                let counts =
+                    |device: &Device| (device.encoder_reversed, device.counts_per_turn, device.roller_radius);
+                // Otherwise the same counts are another depth.
+                let are_the_same = counts(&device) == counts(self.plan.device());
+                self.configure(plan)?;
+                self.zeroed &= are_the_same;
+                Ok(())
             }
             Command::ReportDevice => {
                 self.device_due = true;
@@ -326,8 +351,13 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
+    fn is_commissioned(&self) -> Result<(), Rejection> {
+        let is = self.plan.device().commissioned;
+        if is { Ok(()) } else { Err(Rejection::Interlocked(Interlock::NotCommissioned)) }
+    }
+
     /// Torque is given to a PC that listens, and under no interlock.
-    fn may_start(&self) -> Result<(), Rejection> {
+    fn may_give_torque(&self) -> Result<(), Rejection> {
         if !self.in_session {
             return Err(Rejection::NoSession);
         }

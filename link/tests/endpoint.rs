@@ -1,10 +1,13 @@
 //! The device's end by itself: what it says when, what it keeps, and what it forgets.
 
-use control_core::config::Config;
+use control_core::config::{self, Config};
 use control_core::controller::Sample;
 use control_core::event::Limits;
-use control_core::units::{Counts, Milliradians};
-use control_core::{Controller, Order, Refusal, TickInput};
+use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
+use control_core::interlock::Interlock;
+use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
+use control_core::{Controller, Order, Patient, Plan, Refusal, TickInput};
+use fixed::types::{I8F24, I16F16};
 use link::codec::{self, MAX_FRAME, TooLong};
 use link::device::{Endpoint, Identity};
 use link::frames::{
@@ -25,7 +28,7 @@ impl Device {
         let plan = Config::default().plan().expect("the default is sound");
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
-            endpoint: Endpoint::new(identity, &plan, None),
+            endpoint: Endpoint::new(identity, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             commands: Commands::default(),
             reception: Reception::default(),
@@ -49,6 +52,15 @@ impl Device {
     fn say(&mut self, command: Command) {
         let bytes = self.bytes(command);
         self.endpoint.receive(&bytes);
+    }
+
+    fn answer(&mut self, command: Command) -> Result<(), Rejection> {
+        self.say(command);
+        let mut acks = self.heard().into_iter().filter_map(|frame| match frame {
+            DeviceFrame::Ack(ack) => Some(ack.result),
+            _ => None,
+        });
+        acks.next_back().expect("every command is answered")
     }
 
     fn run(&mut self, ticks: u64) -> Vec<DeviceFrame> {
@@ -93,6 +105,47 @@ fn another_version_is_turned_away() {
         "{frames:?}"
     );
     assert!(!device.endpoint.in_session());
+}
+
+#[test]
+fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
+    let mut device = Device::in_session();
+    let plan = Plan::new(&config::Device::unknown(), &Patient::default()).expect("as sound as the default");
+    device.endpoint = Endpoint::new(Identity { serial: [0; 12], firmware: [0, 1, 0] }, &plan, None);
+    assert_eq!(device.answer(Command::Hello { version: PROTOCOL_VERSION }), Ok(()));
+    let interlocked = |interlock| Err(Rejection::Interlocked(interlock));
+    assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotCommissioned));
+    let excitation = |signal, damping: f64| {
+        let servo = Servo { stiffness: Stiffness::default(), damping: Damping(I8F24::from_num(damping)) };
+        Command::Excite(Excitation {
+            signal,
+            duration_ms: 100,
+            servo,
+            travel: Millimetres(I16F16::from_num(100)),
+        })
+    };
+    let ramps = |torque| Signal::BreakawayRamps { torque: MillinewtonMetres(torque), ramp_ms: 50 };
+    let sines = |torque| Signal::Multisine {
+        torque: MillinewtonMetres(torque),
+        frequencies: [10, 20].into_iter().collect(),
+    };
+    let most = GENTLE_TORQUE.0;
+    for (command, is_taken) in [
+        (excitation(ramps(most + I16F16::DELTA), 0.0), false),
+        (excitation(ramps(most), 0.001), false),
+        (excitation(sines(most / 2 + I16F16::DELTA), 0.0), false),
+        (excitation(sines(most / 2), 0.0), true),
+    ] {
+        let refused = interlocked(Interlock::NotCommissioned);
+        assert_eq!(device.answer(command), if is_taken { Ok(()) } else { refused });
+    }
+    device.answer(Command::Stop).expect("a stop is always taken");
+    assert_eq!(device.answer(Command::ConfigureDevice(config::Device::default())), Ok(()));
+    while device.endpoint.next_order().is_some() {}
+    assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotZeroed));
+    assert_eq!(device.answer(Command::Zero), Ok(()));
+    assert_eq!(device.answer(Command::ConfigureDevice(config::Device::default())), Ok(()), "the same one");
+    assert_eq!(device.answer(Command::Start), Ok(()));
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl Bench {
         let plan = Config::default().plan().expect("the default is sound");
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
-            device: Endpoint::new(identity, &plan, None),
+            device: Endpoint::new(identity, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             commands: Commands::default(),
             reception: Reception::default(),

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use control_core::Config;
 use control_core::config::Device;
 use control_core::controller::Sample;
+use control_core::interlock::Interlock;
 use link::codec::MAX_FRAME;
 use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
 use link::host::{Commands, Counts, Reception};
@@ -150,13 +151,18 @@ impl Pc {
         self.command(board, command).result.expect_err("the device refuses")
     }
 
-    /// Sends a command that the device has to carry out.
+    /// Sends a command that the device has to carry out. Where it does not know its depth when it is to start, the tip is on the
+    /// skin now, as a person says who is told so.
     ///
     /// # Panics
     ///
     /// When it refuses or does not answer.
     pub fn must(&mut self, board: &mut Board, command: Command) {
-        let ack = self.command(board, command);
+        let mut ack = self.command(board, command.clone());
+        if ack.result == Err(Rejection::Interlocked(Interlock::NotZeroed)) {
+            assert_eq!(self.command(board, Command::Zero).result, Ok(()), "the device refuses a zero");
+            ack = self.command(board, command);
+        }
         assert_eq!(ack.result, Ok(()), "the device refuses");
     }
 

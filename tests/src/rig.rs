@@ -63,7 +63,7 @@ impl Rig {
     /// When there is no torque.
     #[must_use]
     pub fn pressed_on(wiring: Wiring) -> Self {
-        let hand = plant::path(vec![(200 * MILLISECOND, 0), (500 * MILLISECOND, PRESSED)]);
+        let hand = plant::path(vec![(400 * MILLISECOND, 0), (700 * MILLISECOND, PRESSED)]);
         let hand = plant::by_hand(hand);
         let mut rig = Self { board: board_wired(wiring, hand), pc: Pc::new() };
         rig.pc.connect(&mut rig.board);
@@ -145,6 +145,7 @@ impl Rig {
 
         if !self.board.at_stop(|stopped| stopped.resets()).is_empty() {
             // It counts from where it found the shaft: skin begins there now.
+            self.pc.must(&mut self.board, Command::Zero);
             let now = self.board.now();
             let hand = plant::path(vec![(now, PRESSED), (now + 100 * MILLISECOND, 2 * PRESSED)]);
             self.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::by_hand(hand))));

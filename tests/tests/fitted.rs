@@ -63,7 +63,7 @@ fn eight_lines_carry_the_codes_of_an_eight_bit_configuration_and_never_another()
 /// A needle pressed into skin on a board with the inclinometer instead of the accelerometer.
 fn with_inclinometer() -> Rig {
     let wiring = Wiring { tilt: None, inclinometer: true, ..Wiring::default() };
-    let hand = plant::path(vec![(200 * MILLISECOND, 0), (500 * MILLISECOND, PRESSED)]);
+    let hand = plant::path(vec![(400 * MILLISECOND, 0), (700 * MILLISECOND, PRESSED)]);
     let mut rig = Rig { board: board_wired(wiring, plant::by_hand(hand)), pc: Pc::new() };
     rig.board.at_stop(|stopped| stopped.set_analogue(INCLINOMETER, LEVEL_MILLIVOLTS));
     rig.pc.connect(&mut rig.board);

@@ -23,6 +23,7 @@ fn pressed_on(wiring: Wiring) -> (Rig, Needle) {
     let needle = Needle::held_at(0.0);
     let mut rig = Rig { board: board_wired(wiring, needle.plant(0)), pc: Pc::new() };
     rig.pc.connect(&mut rig.board);
+    rig.pc.must(&mut rig.board, Command::Zero);
     needle.change(|state| state.hand_speed = 0.0125);
     rig.pc.run_ms(&mut rig.board, 200);
     needle.change(|state| state.hand_speed = 0.0);

@@ -16,6 +16,7 @@ use tests::scenario::{board, board_wired};
 fn connected(wiring: Wiring) -> Rig {
     let mut rig = Rig { board: board_wired(wiring, plant::held()), pc: Pc::new() };
     rig.pc.connect(&mut rig.board);
+    rig.pc.must(&mut rig.board, Command::Zero);
     rig
 }
 

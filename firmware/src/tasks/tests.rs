@@ -606,6 +606,10 @@ fn a_start_reaches_the_tick_with_its_session() {
     assert_eq!(desk.answer(Command::Start), Err(Rejection::NoSession));
     let mut desk = Desk::in_session();
     desk.shared.session.store(3, Relaxed);
+    let unknown = Err(Rejection::Interlocked(Interlock::NotZeroed));
+    assert_eq!(desk.answer(Command::Start), unknown, "nobody has said where depth 0 is");
+    assert_eq!(desk.answer(Command::Zero), Ok(()));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Zero)));
     assert_eq!(desk.answer(Command::Start), Ok(()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Start(3))));
     desk.shared.conditions.set(Interlock::AmplifierNotReady, true);
@@ -620,6 +624,7 @@ fn what_was_under_way_when_the_pc_went_is_thrown_away() {
         let mut desk = Desk::in_session();
         let session = desk.shared.session.load(Relaxed);
         desk.shared.powered.store(true, Relaxed);
+        desk.say(Command::Zero);
         desk.say(Command::Start);
         desk.shared.link.store(gone, Relaxed);
         assert!(desk.turn().is_empty(), "nobody listens");

@@ -1,5 +1,6 @@
 //! `host-sim characterise`: recordings that tell one physical effect from another.
 
+use super::confirm::needle_is_out;
 use super::progress::Progress;
 use super::run::stop_on_signals;
 use clap::Args;
@@ -28,6 +29,9 @@ pub(crate) struct Characterise {
     /// What the virtual device's mechanism really is: a rig file, with effects that the written rig.toml does not know
     #[arg(long, value_name = "RIG.toml")]
     plant: Option<PathBuf>,
+    /// Ask nothing: the needle is out
+    #[arg(long)]
+    yes: bool,
     /// Folder for the files
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -65,6 +69,7 @@ impl Characterise {
             let stop = Arc::new(AtomicBool::new(false));
             stop_on_signals(&stop)?;
             let mut port = SerialPort::find(&self.device)?;
+            needle_is_out(self.yes)?;
             characterise::on_port(&mut port, &programmes, &stop, news)?
         };
         drop(bar);

@@ -2,6 +2,8 @@
 
 mod characterise;
 mod class;
+mod commission;
+mod confirm;
 mod diagnose;
 mod export;
 mod fit_force;
@@ -36,6 +38,7 @@ enum Command {
     Debrief(training::Debrief),
     Profiles(training::Profiles),
     Reproduce(training::Reproduce),
+    Commission(commission::Commission),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
     Import(import::Import),
@@ -56,6 +59,7 @@ impl Cli {
             Some(Command::Debrief(command)) => command.run(),
             Some(Command::Profiles(command)) => command.run(),
             Some(Command::Reproduce(command)) => command.run(),
+            Some(Command::Commission(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),

@@ -56,6 +56,9 @@ pub(crate) struct Run {
     /// Serve no page; a real device is then powered up at once
     #[arg(long)]
     headless: bool,
+    /// With --headless: the tip is on the skin now, depth 0 is here
+    #[arg(long, requires = "headless")]
+    zero: bool,
     /// End after this many seconds of samples; without it, Ctrl-C ends the run in good order
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -87,7 +90,12 @@ enum Model {
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let seconds = self.check()?;
-        let part = self.device_config.as_deref().map(DevicePart::read).transpose()?;
+        let is_virtual = self.device == "virtual";
+        let mut part = self.device_config.as_deref().map(DevicePart::read).transpose()?;
+        if let Some(part) = part.as_mut().filter(|_| is_virtual) {
+            // It is built as its file says.
+            part.device.commissioned = true;
+        }
         let device = part.as_ref().map_or_else(Device::default, |part| part.device);
         let profile = Profile::find_for(&self.profile, &device)?;
         let profile = match self.angle {
@@ -95,7 +103,6 @@ impl Run {
             None => profile,
         };
         let procedure = Procedure::find(&self.procedure, &profile)?;
-        let is_virtual = self.device == "virtual";
         let mut serial = if is_virtual { None } else { Some(SerialPort::find(&self.device)?) };
 
         let source = if is_virtual { Source::Virtual } else { Source::Serial { path: self.device.clone() } };
@@ -125,7 +132,7 @@ impl Run {
         let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.device));
         let station = Station::new(driver, outlets, &stop).with_bedside(bedside);
         let station = if is_virtual || self.headless {
-            station
+            if self.zero { station.zeroing_first() } else { station }
         } else {
             // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
             say!("the torque is off: press Start in the page");

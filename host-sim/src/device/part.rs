@@ -52,6 +52,9 @@ pub fn to_toml(name: &str, device: &Device) -> Result<String, Failure> {
 struct File {
     format: u32,
     name: String,
+    /// As `commission` writes it; without it, the device refuses to start.
+    #[serde(default)]
+    commissioned: bool,
     #[serde(default)]
     drive: Drive,
     #[serde(default)]
@@ -116,7 +119,8 @@ fn tilt(key: &str, degrees: f64) -> Result<Milliradians, String> {
 
 impl File {
     fn device(&self) -> Result<Device, String> {
-        let (mut device, drive, control) = (Device::default(), &self.drive, &self.control);
+        let (mut device, drive, control) = (Device::unknown(), &self.drive, &self.control);
+        device.commissioned = self.commissioned;
         if let Some(radius) = drive.roller_radius_mm {
             device.roller_radius = Millimetres(fix("roller_radius_mm", radius)?);
         }
@@ -157,6 +161,7 @@ impl File {
         Self {
             format: 1,
             name: name.to_owned(),
+            commissioned: device.commissioned,
             drive: Drive {
                 roller_radius_mm: Some(device.roller_radius.0.to_num()),
                 counts_per_turn: Some(device.counts_per_turn),
@@ -229,7 +234,7 @@ mod tests {
     #[test]
     fn what_is_left_out_is_the_built_in_devices() {
         let part = parse("format = 1\nname = \"bench 3\"\n[drive]\nmotor_reversed = true\n").expect("sound");
-        assert_eq!(part.device, Device { motor_reversed: true, ..Device::default() });
+        assert_eq!(part.device, Device { motor_reversed: true, ..Device::unknown() });
         assert_eq!(part.name, "bench 3");
     }
 

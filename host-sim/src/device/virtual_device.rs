@@ -75,7 +75,7 @@ impl VirtualDevice {
         let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             plant,
-            endpoint: Endpoint::new(identity, &plan, None),
+            endpoint: Endpoint::new(identity, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             tick: 0,
             hand: Hand::Script { since: 0 },

@@ -28,6 +28,8 @@ pub(super) const ERASE_NANOS: u64 = 1_000_000_000;
 const FIRST_LARGE: u64 = 0x0802_0000;
 const FIRST_LARGE_NUMBER: u64 = 5;
 const LARGE: u64 = 0x2_0000;
+/// A sector holds a slot of the configuration.
+pub(super) const SLOT_BYTES: u64 = LARGE;
 /// The sectors the firmware may write: the last two of one megabyte.
 pub(super) const WRITABLE: std::ops::Range<u64> = 0x080C_0000..0x0810_0000;
 const ERASED: u32 = u32::MAX;
@@ -74,6 +76,11 @@ impl Array {
     #[must_use]
     pub fn word(&self, address: u64) -> u32 {
         self.words.get(&(address & !3)).copied().unwrap_or(ERASED)
+    }
+
+    /// Sets the word at `address`, as a programmer does.
+    pub(super) fn put(&mut self, address: u64, word: u32) {
+        self.words.insert(address, word);
     }
 
     /// Flips bits of the word at `address`, as an upset does.

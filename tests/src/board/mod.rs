@@ -14,6 +14,7 @@ mod machine;
 pub mod otg;
 pub mod plant;
 pub mod processor;
+mod record;
 mod rtt;
 mod run;
 pub mod tilt;
@@ -99,6 +100,8 @@ pub struct Wiring {
     pub supply: u32,
     /// How often the plant moves, in nanoseconds.
     pub plant_period: Nanos,
+    /// Whether the flash holds the record of a device that was commissioned, the default one.
+    pub commissioned: bool,
 }
 
 impl Default for Wiring {
@@ -113,6 +116,7 @@ impl Default for Wiring {
             current_monitor: false,
             supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,
+            commissioned: true,
         }
     }
 }
@@ -167,6 +171,9 @@ impl Board {
         let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
         let (probe, flash) = (Probe::default(), flash::Flash::default());
+        if wiring.commissioned {
+            record::commission(&mut flash.array());
+        }
         let machine =
             Machine::new(&wiring, probe.clone(), flash.clone()).map_err(|error| refuse(error.to_string()))?;
         let session =

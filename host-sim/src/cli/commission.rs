@@ -1,0 +1,109 @@
+//! `host-sim commission`: how a device is wired and built, found out before anybody holds its needle.
+
+use super::confirm::{confirm, needle_is_out};
+use super::run::stop_on_signals;
+use clap::Args;
+use host_sim::characterise::mechanism::Wiring;
+use host_sim::characterise::{self, written};
+use host_sim::commission::bench::WireLine;
+use host_sim::commission::mechanism::VirtualLine;
+use host_sim::commission::{self, Outcome, Step, Wish};
+use host_sim::device::Port;
+use host_sim::device::serial::SerialPort;
+use host_sim::failure::Failure;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Find out how a device is wired and built, and give it its part of the configuration.
+///
+/// Says each step before it is done. The motor moves in the last one only, by pulses of at most 2 mN·m. Until this has
+/// passed, a device refuses to start.
+#[derive(Args)]
+#[command(after_help = examples!("Examples:
+  host-sim commission
+  host-sim commission --device /dev/ttyACM0 --pull-mm 200 --out device.toml"))]
+pub(crate) struct Commission {
+    /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
+    #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
+    device: String,
+    /// Length of the strip of paper that is drawn through under the roller, 10 to 1,000 mm
+    #[arg(long, default_value_t = 100.0, value_name = "MM")]
+    pull_mm: f64,
+    /// Turns of the roller by hand, 1 to 20
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    turns: u32,
+    /// Counts a turn after quadrature, where the encoder's are known
+    #[arg(long, value_name = "N")]
+    counts_per_turn: Option<u16>,
+    /// Ask nothing: the needle is out
+    #[arg(long)]
+    yes: bool,
+    /// Write the device's part to this file too
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+}
+
+impl Commission {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let wish = self.wish()?;
+        let outcome = if self.device == "virtual" { self.on_virtual(&wish)? } else { self.on_port(&wish)? };
+        for line in outcome.lines() {
+            say!("{line}");
+        }
+        if let Some(path) = &self.out {
+            std::fs::write(path, outcome.to_toml(&self.device)?).map_err(|cause| {
+                Failure::input(format_args!(
+                    "{}: the file cannot be written ({cause}); the device is commissioned; choose another --out",
+                    path.display()
+                ))
+            })?;
+            say!("{}", path.display());
+        }
+        say!("commissioned");
+        Ok(())
+    }
+
+    fn wish(&self) -> Result<Wish, Failure> {
+        if !(10.0..=1000.0).contains(&self.pull_mm) {
+            return Err(Failure::input(format_args!(
+                "--pull-mm is {}; it must lie from 10 to 1000",
+                self.pull_mm
+            )));
+        }
+        if !(1..=20).contains(&self.turns) {
+            return Err(Failure::input(format_args!("--turns is {}; it must lie from 1 to 20", self.turns)));
+        }
+        if self.counts_per_turn.is_some_and(|counts| counts < 256) {
+            return Err(Failure::input("--counts-per-turn must lie from 256 to 65535"));
+        }
+        Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
+    }
+
+    fn on_virtual(&self, wish: &Wish) -> Result<Outcome, Failure> {
+        let scale = characterise::scale(&characterise::configuration())?;
+        let rig = written::nominal_rig(&scale);
+        let mut line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
+        commission::commission(&mut line, wish, |step: Step| {
+            eprintln!("{step}");
+            Ok(())
+        })
+    }
+
+    fn on_port(&self, wish: &Wish) -> Result<Outcome, Failure> {
+        let mut port = SerialPort::find(&self.device)?;
+        needle_is_out(self.yes)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+        let wire = port.open().map_err(Failure::failed)?;
+        let mut line = WireLine::new(wire, &stop);
+        commission::commission(&mut line, wish, |step: Step| {
+            if step.moves() {
+                confirm(&step, self.yes)
+            } else {
+                eprintln!("{step}");
+                Ok(())
+            }
+        })
+    }
+}

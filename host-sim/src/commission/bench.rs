@@ -1,0 +1,209 @@
+//! A conversation with a device that is being commissioned, one thing after the other: play this, watch that, take this part.
+
+use crate::device::Wire;
+use crate::driver::{Driver, Request};
+use crate::failure::Failure;
+use control_core::controller::Sample;
+use control_core::event::{Fault, State};
+use control_core::excitation::Excitation;
+use control_core::{Device, Patient, TICK_HZ};
+use link::frames::{DeviceFrame, EventKind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A device that is there answers within this.
+const TO_ANSWER: Duration = Duration::from_secs(5);
+/// How long to wait for a real device in one go.
+const PATIENCE: Duration = Duration::from_millis(2);
+
+/// What a hand does to the roller or to the device, for a line that has its own hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Act {
+    /// Nothing; nobody touches the roller.
+    HandsOff,
+    /// Turns the roller so many times in the direction of insertion.
+    Turn(u32),
+    /// Draws something through under the roller, in the direction of insertion, so many mm.
+    Pull(f64),
+    /// Tilts the needle to so many rad below the horizontal.
+    Tilt(f64),
+}
+
+/// A way to a device.
+pub trait Line {
+    /// Sends `out`, adds what has come to `into`, and says how long the line has been open.
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure>;
+
+    /// What is asked of the hand. Where a person has the hand, a prompt has asked already.
+    fn act(&mut self, act: Act);
+}
+
+/// A device behind a wire, in real time.
+pub struct WireLine<'a> {
+    wire: Box<dyn Wire>,
+    begin: Instant,
+    stop: &'a AtomicBool,
+}
+
+impl<'a> WireLine<'a> {
+    /// `stop` ends the conversation.
+    pub fn new(wire: Box<dyn Wire>, stop: &'a AtomicBool) -> Self {
+        Self { wire, begin: Instant::now(), stop }
+    }
+}
+
+impl Line for WireLine<'_> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+        let gone = |cause: std::io::Error| {
+            Failure::failed(format_args!("the device went away ({cause}); plug it in and commission again"))
+        };
+        if self.stop.load(Ordering::Relaxed) {
+            // A device whose heartbeat ends takes its torque away by itself.
+            return Err(Failure::failed("stopped before the end; the device was not commissioned"));
+        }
+        if !out.is_empty() {
+            self.wire.write(out).map_err(gone)?;
+        }
+        let mut bytes = [0; 1 << 12];
+        let count = self.wire.read(&mut bytes, PATIENCE).map_err(gone)?;
+        into.extend(&bytes[..count]);
+        Ok(self.begin.elapsed())
+    }
+
+    fn act(&mut self, _: Act) {}
+}
+
+/// The conversation.
+pub struct Bench<'a> {
+    line: &'a mut dyn Line,
+    driver: Driver,
+    now: Duration,
+    bytes: Vec<u8>,
+    samples: Vec<Sample>,
+    device: Option<Device>,
+    fault: Option<Fault>,
+    not_saved: Option<String>,
+}
+
+impl<'a> Bench<'a> {
+    /// Says hello and waits until the device listens.
+    pub fn open(line: &'a mut dyn Line) -> Result<Self, Failure> {
+        let mut driver = Driver::new(Patient::nobody());
+        driver.connected(Duration::ZERO);
+        let mut bench = Self {
+            line,
+            driver,
+            now: Duration::ZERO,
+            bytes: Vec::new(),
+            samples: Vec::new(),
+            device: None,
+            fault: None,
+            not_saved: None,
+        };
+        bench.settle()?;
+        Ok(bench)
+    }
+
+    /// Waits until the device listens: while a person was asked something, the line may have fallen silent.
+    pub fn settle(&mut self) -> Result<(), Failure> {
+        self.exchange()?;
+        self.until("the device did not answer; check that it runs this project's firmware", |bench| {
+            bench.driver.is_ready(bench.now)
+        })
+    }
+
+    /// The device's part of the configuration.
+    pub fn device(&mut self) -> Result<Device, Failure> {
+        self.device = None;
+        self.driver.request(Request::ReportDevice);
+        self.until("the device did not say how it is configured; start it again", |bench| {
+            bench.device.is_some()
+        })?;
+        self.device.ok_or_else(|| Failure::failed("the device did not say how it is configured"))
+    }
+
+    /// Gives the device its part and sees that it has taken and kept it.
+    pub fn configure(&mut self, device: &Device) -> Result<(), Failure> {
+        self.driver.request(Request::Device(Box::new(*device)));
+        if self.device()? != *device {
+            return Err(Failure::failed("the device did not take its new configuration; start it again"));
+        }
+        // An erasure of the flash takes a second or two, and what becomes of it is said afterwards.
+        let until = self.now + Duration::from_millis(100);
+        self.until("the device fell silent while it saved; start it again", |bench| bench.now >= until)?;
+        self.not_saved.take().map_or(Ok(()), |why| Err(Failure::failed(why)))
+    }
+
+    /// What the hand is asked to do, and samples until `is_done` says so or `longest` is over.
+    pub fn watch(
+        &mut self,
+        act: Act,
+        longest: Duration,
+        is_done: impl Fn(&[Sample]) -> bool,
+    ) -> Result<&[Sample], Failure> {
+        self.samples.clear();
+        self.line.act(act);
+        let end = self.now + longest;
+        while self.now < end && !is_done(&self.samples) {
+            self.exchange()?;
+        }
+        self.line.act(Act::HandsOff);
+        Ok(&self.samples)
+    }
+
+    /// Plays an excitation to its end or to a fault: the samples during which torque was on.
+    pub fn play(&mut self, excitation: &Excitation) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
+        self.samples.clear();
+        self.fault = None;
+        self.driver.request(Request::Excite(excitation.clone()));
+        let is_played = |sample: &Sample| sample.state == State::Excitation as u8;
+        self.until("the device did not begin to move; start it again", |bench| {
+            bench.fault.is_some() || bench.samples.iter().any(is_played)
+        })?;
+        self.until("the device did not end its movement; start it again", |bench| {
+            bench.fault.is_some() || bench.samples.last().is_some_and(|sample| !is_played(sample))
+        })?;
+        let played = self.samples.iter().copied().filter(is_played).collect();
+        Ok((played, self.fault))
+    }
+
+    fn until(&mut self, why_not: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), Failure> {
+        let end = self.now + TO_ANSWER;
+        while !is_so(self) {
+            self.exchange()?;
+            if let Some(why) = self.driver.refused().or(self.driver.notice()) {
+                return Err(Failure::failed(why));
+            }
+            if self.now > end {
+                return Err(Failure::failed(why_not));
+            }
+        }
+        Ok(())
+    }
+
+    fn exchange(&mut self) -> Result<(), Failure> {
+        self.bytes.clear();
+        let out = self.driver.transmit(self.now).to_vec();
+        self.now = self.line.exchange(&out, &mut self.bytes)?;
+        let mut frames = Vec::new();
+        self.driver.receive(self.now, &self.bytes, |frame| frames.push(frame.clone()));
+        for frame in frames {
+            match frame {
+                DeviceFrame::Samples(block) => self.samples.extend(&block.samples),
+                DeviceFrame::Device(device) => self.device = Some(device),
+                DeviceFrame::Event(event) => match event.kind {
+                    EventKind::Fault { cause } => self.fault = Some(cause),
+                    EventKind::NotSaved { cause } => self.not_saved = Some(cause.to_string()),
+                    _ => {}
+                },
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Samples of a stretch of time.
+pub fn ticks(time: Duration) -> usize {
+    (time.as_secs_f64() * f64::from(TICK_HZ)) as usize
+}
