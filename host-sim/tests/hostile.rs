@@ -111,7 +111,7 @@ fn the_control_path_does_not_notice_hostile_clients() {
         .iter()
         .map(|text| text.parse().expect("a stream"))
         .collect();
-    let streams = streams::serve(session.clone(), &specs, None).expect("free ports");
+    let streams = streams::serve(&session, &specs, None).expect("free ports");
     let page = visualizer::serve(session, 0).expect("a free port");
     let at = |kind| streams.addresses().iter().find(|(known, _)| *known == kind).expect("served").1;
     let (openigtlink, websocket) = (at(Kind::Openigtlink), at(Kind::Websocket));

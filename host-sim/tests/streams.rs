@@ -33,7 +33,7 @@ fn open(specs: &[&str], token: Option<&str>) -> (Streams, Publisher) {
     let (session, publisher) = session::open(scene());
     let specs: Vec<Spec> = specs.iter().map(|text| text.parse().expect("a stream")).collect();
     let token: Option<Token> = token.map(|text| text.parse().expect("a token"));
-    (streams::serve(session, &specs, token.as_ref()).expect("free ports"), publisher)
+    (streams::serve(&session, &specs, token.as_ref()).expect("free ports"), publisher)
 }
 
 /// Publishes poses ever deeper until `done` or ten seconds are over; whether it was done.
@@ -184,7 +184,7 @@ fn an_address_in_use_is_one_clear_line() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let spec: Spec = format!("websocket={}", taken.local_addr().expect("bound")).parse().expect("a stream");
     let (session, _publisher) = session::open(scene());
-    let error = streams::serve(session, &[spec], None).expect_err("it is in use").to_string();
+    let error = streams::serve(&session, &[spec], None).expect_err("it is in use").to_string();
     assert!(
         error.contains("websocket") && error.contains("--stream") && error.lines().count() == 1,
         "{error}"

@@ -27,8 +27,7 @@ impl StreamFlags {
         if self.streams.is_empty() {
             return Ok(None);
         }
-        let served =
-            streams::serve(session.clone(), &self.streams, self.token.as_ref()).map_err(Failure::failed)?;
+        let served = streams::serve(session, &self.streams, self.token.as_ref()).map_err(Failure::failed)?;
         for (kind, address) in served.addresses() {
             say!("{kind} stream at {address}");
         }

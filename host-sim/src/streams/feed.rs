@@ -1,6 +1,6 @@
 //! The newest pose of a session, for whoever asks.
 
-use crate::session::{Happening, Session};
+use crate::session::{Happening, Subscription};
 use crate::visualizer::condense::Condenser;
 use crate::visualizer::messages;
 use serde::Serialize;
@@ -71,9 +71,8 @@ impl From<&messages::Pose> for NeedlePose {
     }
 }
 
-/// Keeps `publish` at the newest of `session` for ever.
-pub(super) async fn run(session: Session, publish: watch::Sender<Snapshot>) {
-    let mut subscription = session.subscribe();
+/// Keeps `publish` at the newest of `subscription` for ever.
+pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<Snapshot>) {
     let mut condenser = Condenser::default();
     let mut due = interval(PERIOD);
     due.set_missed_tick_behavior(MissedTickBehavior::Delay);

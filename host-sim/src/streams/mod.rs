@@ -85,7 +85,7 @@ impl Drop for Streams {
 }
 
 /// Serves `session` by every stream of `specs`, all on one thread of their own.
-pub fn serve(session: Session, specs: &[Spec], token: Option<&Token>) -> Result<Streams, StreamError> {
+pub fn serve(session: &Session, specs: &[Spec], token: Option<&Token>) -> Result<Streams, StreamError> {
     let first = specs.first().copied().unwrap_or(Spec::of(Kind::Websocket));
     let failed = |error: io::Error| StreamError::new(&first, error);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
@@ -93,6 +93,8 @@ pub fn serve(session: Session, specs: &[Spec], token: Option<&Token>) -> Result<
     let (opened, addresses) = mpsc::channel();
     let specs = specs.to_vec();
     let token = token.cloned();
+    // Here, so that a pose published once this has returned is not lost.
+    let subscription = session.subscribe();
     let run = move || {
         runtime.block_on(async {
             let (publish, newest) = watch::channel(Snapshot::default());
@@ -108,7 +110,7 @@ pub fn serve(session: Session, specs: &[Spec], token: Option<&Token>) -> Result<
             }
             let _ = opened.send(Ok(bound));
             tokio::select! {
-                () = feed::run(session, publish) => {}
+                () = feed::run(subscription, publish) => {}
                 _ = stopped => {}
             }
         });
