@@ -4,6 +4,7 @@
 use diagnosis::effects::EffectName as N;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
+use diagnosis::simulation::{Plant, Surroundings};
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 use std::f64::consts::TAU;
 
@@ -23,6 +24,9 @@ struct Machine {
     filter_s: f64,
     limit: f64,
     slow_grip: f64,
+    cogging: f64,
+    /// White disturbance, as a part of the forward dry friction.
+    disturbance: f64,
 }
 
 const AXIS: Machine = Machine {
@@ -37,6 +41,8 @@ const AXIS: Machine = Machine {
     filter_s: 0.0,
     limit: f64::INFINITY,
     slow_grip: 0.0,
+    cogging: 0.0,
+    disturbance: 0.05,
 };
 
 /// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
@@ -55,7 +61,7 @@ fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f6
     let steps = 40;
     let h = 1.0 / taken.rate / f64::from(steps);
     let (mut q, mut v) = taken.start;
-    let (mut driven, mut seen) = (command(0.0), q);
+    let (mut driven, mut behind) = (command(0.0), 0.0);
     let follow = |by: f64| if by > 0.0 { 1.0 - (-h / by).exp() } else { 1.0 };
     let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut noise = || {
@@ -69,22 +75,30 @@ fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f6
         let t = f64::from(row) / taken.rate;
         out.time_s.push(t);
         out.command.push(command(t));
-        out.position_counts.push((seen * taken.counts).floor());
-        let disturbance = 0.05 * machine.forward.max(0.02 * machine.gravity) * noise();
+        out.position_counts.push(((q - behind) * taken.counts).floor());
+        let disturbance = machine.disturbance * machine.forward.max(0.02 * machine.gravity) * noise();
         for i in 0..steps {
-            let u = command(((t + f64::from(i) * h - machine.delay_s) * taken.rate).floor() / taken.rate);
+            // In rows, and a little on, so that rounding does not make the row before of it.
+            let rows = f64::from(row) + f64::from(i) / f64::from(steps) - machine.delay_s * taken.rate;
+            let u = command((rows + 1e-9).floor() / taken.rate);
             driven += (u.clamp(-machine.limit, machine.limit) - driven) * follow(machine.lag_s);
-            let free = driven + machine.offset + disturbance - machine.gravity * q.sin();
+            let free = driven + machine.offset + disturbance - machine.gravity * q.sin()
+                + machine.cogging * (12.0 * q).sin();
+            let at = q;
             let grip = machine.slow_grip * (4.0 * q).sin().abs() * (-(v / 0.3).abs()).exp();
             let dry =
                 grip + if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
             if v != 0.0 || free.abs() > dry {
                 let way = if v == 0.0 { free.signum() } else { v.signum() };
                 let next = v + h * (free - machine.viscous * v - dry * way) / machine.inertia;
+                let before = v;
                 v = if next * v < 0.0 { 0.0 } else { next };
-                q += h * v;
+                q += 0.5 * h * (before + v);
             }
-            seen += (q - seen) * follow(machine.filter_s);
+            // The filter's lag under the mean speed of the step.
+            let speed = (q - at) / h;
+            behind = (behind - machine.filter_s * speed) * (1.0 - follow(machine.filter_s))
+                + machine.filter_s * speed;
         }
     }
     out
@@ -263,6 +277,50 @@ fn a_lag_an_offset_and_a_filter_that_the_rig_knows_are_not_missing() {
     let unknown = diagnosed(&rig(&model, "", "", BENCH.counts), &fit, &holdout);
     let class = &unknown.report.effects[0].class;
     assert!(class.contains(&N::ElectricalLag), "{class:?}");
+}
+
+#[test]
+fn a_filter_that_the_rig_knows_is_behind_dry_friction_and_not_before_it() {
+    for filter_s in [0.004, 0.03] {
+        let machine = Machine { filter_s, disturbance: 0.0, ..AXIS };
+        let encoder = format!("filter_s = {filter_s}");
+        let of = |machine, model| {
+            let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));
+            let outcome = diagnosed(&rig(model, &encoder, "", BENCH.counts), &[take(1), take(2)], &[take(3)]);
+            (names(&outcome), outcome)
+        };
+        let (found, outcome) = of(machine, WHOLE);
+        assert!(found.is_empty(), "{filter_s} s: {}", outcome.report.sentence);
+        let (found, _) = of(machine, "inertia = 2.0\nviscous = 8.0");
+        assert_eq!(found, [N::CoulombFriction], "{filter_s} s");
+        let (found, outcome) = of(Machine { cogging: 1.5, ..machine }, WHOLE);
+        assert_eq!(found, [N::Cogging], "{filter_s} s");
+        let amplitude = outcome.report.effects[0].parameters["amplitude_1"].value;
+        assert!((1.45..1.55).contains(&amplitude), "{amplitude} N·m behind {filter_s} s");
+    }
+}
+
+#[test]
+fn the_virtual_device_without_noise_behind_a_known_filter_leaves_nothing_out() {
+    for filter_s in [0.0, 0.004, 0.03] {
+        let rig = rig(WHOLE, &format!("filter_s = {filter_s}"), "", BENCH.counts);
+        let take = |phase: f64| {
+            let (command, mut plant) = (mixed(16.0, phase), Plant::new(&rig));
+            let mut out = Recording { file: format!("{phase}.csv"), ..Recording::default() };
+            for row in 0..(BENCH.rate * BENCH.seconds) as u32 {
+                let t = f64::from(row) / BENCH.rate;
+                out.time_s.push(t);
+                out.command.push(command(t));
+                out.position_counts.push(plant.counts());
+                for _ in 0..20 {
+                    plant.step(command(t), Surroundings::default(), 1e-4);
+                }
+            }
+            out
+        };
+        let outcome = diagnosed(&rig, &[take(1.0), take(2.0)], &[take(3.0)]);
+        assert!(names(&outcome).is_empty(), "{filter_s} s: {}", outcome.report.sentence);
+    }
 }
 
 #[test]

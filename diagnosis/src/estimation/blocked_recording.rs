@@ -3,7 +3,7 @@
 //! A block's position is the mean of its rows; an input is held row by row and enters as what it does to velocity, to
 //! position and to the block's mean, so that time stamps are used as they stand and nothing is resampled.
 
-use crate::effects::{CommandLaw, Effect, EffectName};
+use crate::estimation::reading_lag::LagStep;
 use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -39,7 +39,11 @@ pub(crate) struct BlockedRecording {
     /// Mean over the rows of the time since the block's start, s, and of half its square, s².
     pub(crate) tau1: Vec<f64>,
     pub(crate) tau2: Vec<f64>,
-    /// Mean position since the first row, rad or m.
+    /// Time constant of a filter of the reading that the rig declares, s, and how the reading lags over each block; empty
+    /// where it declares none.
+    pub(crate) filter_s: Option<f64>,
+    pub(crate) reading_lag: Vec<LagStep>,
+    /// Mean reading since the first row, rad or m.
     pub(crate) z: Vec<f64>,
     /// Variance of that mean from quantisation alone.
     pub(crate) quantum: Vec<f64>,
@@ -120,6 +124,8 @@ impl BlockedRecording {
             span: Vec::with_capacity(n),
             tau1: Vec::with_capacity(n),
             tau2: Vec::with_capacity(n),
+            filter_s: rig.encoder.filter_s.filter(|s| *s > 0.0),
+            reading_lag: Vec::new(),
             z: Vec::with_capacity(n),
             quantum: Vec::with_capacity(n),
             command: as_known(
@@ -168,6 +174,10 @@ impl BlockedRecording {
             track.tau1.push(one / count);
             track.tau2.push(two / count);
             track.z.push(sum / count * scale);
+            if let Some(filter) = track.filter_s {
+                let rows = track.row_time[first..end].iter().map(|t| t - start);
+                track.reading_lag.push(LagStep::new(filter, track.span[j], rows));
+            }
             // Rows within one count tell no more than one of them.
             let moved = (recording.position_counts[end - 1] - recording.position_counts[first]).abs();
             let noise = rig.encoder.noise_counts.unwrap_or(0.0);
@@ -320,14 +330,9 @@ impl BlockedRecording {
     }
 }
 
-/// The command behind the delay and the lag that the rig already knows. A known filter of the reading is one of all that
-/// moves the axis, for both are linear: the command passes it too.
+/// The command behind the delay and the lag that the rig already knows.
 fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<f64> {
-    let filter =
-        rig.encoder.filter_s.filter(|x| *x > 0.0).and_then(|x| {
-            CommandLaw::new(&Effect::shaped(EffectName::ElectricalLag, &[("time_constant", x)]))
-        });
-    let mut laws: Vec<CommandLaw> = rig.known_command_laws().into_iter().chain(filter).collect();
+    let mut laws = rig.known_command_laws();
     command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, *h))).collect()
 }
 

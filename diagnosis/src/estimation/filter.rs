@@ -1,4 +1,5 @@
-//! The filter behind everything: position, velocity and a disturbance acceleration that comes and goes.
+//! The filter behind everything: position, velocity, a disturbance acceleration that comes and goes and, where the rig declares
+//! a filter in the reading, how far that lags.
 //!
 //! Innovations are linear in data and inputs, so a model that is linear in its coefficients becomes ordinary least squares
 //! on whitened innovations: weighted by what the sensor and the disturbance leave to be known, never differenced.
@@ -6,6 +7,7 @@
 //! for its cause (prediction-error identification in closed loop, Ljung 1999, chapter 13).
 
 use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::reading_lag::LagStep;
 use std::ops::Range;
 
 /// Noise of sensor and disturbance.
@@ -26,7 +28,7 @@ pub(crate) struct Noise {
 /// Gains of the filter over one recording; they do not depend on the data.
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
-    k: Vec<[f64; 3]>,
+    k: Vec<[f64; 4]>,
     /// 1/√S.
     pub(crate) weight: Vec<f64>,
     rho: Vec<f64>,
@@ -34,28 +36,49 @@ pub(crate) struct Gains {
     pub(crate) log_det: f64,
 }
 
-/// Symmetric 3×3: qq qv qd vv vd dd.
-type Sym = [f64; 6];
+/// A covariance of the states position, speed, disturbance and, as the fourth where the rig declares a filter in the
+/// reading, the lag of the reading.
+type Covariance<const N: usize> = [[f64; N]; N];
 
-struct Step {
-    h: f64,
-    rho: f64,
-    q: Sym,
+/// One block: what the state becomes over it, what of the state its mean reading shows, and the noise that it adds.
+struct Step<const N: usize> {
+    transition: [[f64; N]; N],
+    seen: [f64; N],
+    noise: Covariance<N>,
 }
 
-fn step_of(track: &BlockedRecording, noise: &Noise, j: usize) -> Step {
-    let h = track.span[j];
-    let white = if track.rest[j] { noise.rest.max(noise.white) } else { noise.white };
-    let rho = (-h / noise.tau).exp();
-    let q =
-        [white * h * h * h / 3.0, white * h * h / 2.0, 0.0, white * h, 0.0, noise.slow * (1.0 - rho * rho)];
-    Step { h, rho, q }
+impl<const N: usize> Step<N> {
+    fn new(track: &BlockedRecording, noise: &Noise, j: usize) -> Self {
+        let h = track.span[j];
+        let white = if track.rest[j] { noise.rest.max(noise.white) } else { noise.white };
+        let rho = (-h / noise.tau).exp();
+        let mut step = Self { transition: [[0.0; N]; N], seen: [0.0; N], noise: [[0.0; N]; N] };
+        step.transition[0][..3].copy_from_slice(&[1.0, h, 0.5 * h * h]);
+        step.transition[1][..3].copy_from_slice(&[0.0, 1.0, h]);
+        step.transition[2][2] = rho;
+        step.seen[..3].copy_from_slice(&[1.0, track.tau1[j], track.tau2[j]]);
+        step.noise[0][..2].copy_from_slice(&[white * h * h * h / 3.0, white * h * h / 2.0]);
+        step.noise[1][..2].copy_from_slice(&[white * h * h / 2.0, white * h]);
+        step.noise[2][2] = noise.slow * (1.0 - rho * rho);
+        if let (4, Some(lag)) = (N, track.reading_lag.get(j)) {
+            let LagStep { end, seen, white: by_white } = lag;
+            step.transition[3].copy_from_slice(&[0.0, end.speed, end.acceleration, end.lag]);
+            step.seen[1] -= seen.speed;
+            step.seen[2] -= seen.acceleration;
+            step.seen[3] = -seen.lag;
+            for (other, unit) in [0, 1, 3].into_iter().zip(by_white) {
+                step.noise[3][other] = white * unit;
+                step.noise[other][3] = white * unit;
+            }
+        }
+        step
+    }
 }
 
 /// Variance of the place at the start over that of one reading: as good as unknown, and far from rounding.
 const DIFFUSE: f64 = 1e4;
 
-fn initial(track: &BlockedRecording, noise: &Noise) -> Sym {
+fn initial<const N: usize>(track: &BlockedRecording, noise: &Noise) -> Covariance<N> {
     let reach = track.z.iter().fold(0.0_f64, |m, z| m.max(z.abs())).max(1e-12);
     let duration = track.start[track.blocks() - 1].max(1e-3);
     let speed = 100.0 * reach / duration.min(1.0);
@@ -63,39 +86,56 @@ fn initial(track: &BlockedRecording, noise: &Noise) -> Sym {
     // of one, whatever the unit of length.
     let error = DIFFUSE * noise.sensor * track.quantum[0];
     let span = track.span[0].max(1e-9);
-    [(reach * reach).max(error), 0.0, 0.0, (speed * speed).max(error / (span * span)), 0.0, noise.slow]
+    let mut p = [[0.0; N]; N];
+    p[0][0] = (reach * reach).max(error);
+    p[1][1] = (speed * speed).max(error / (span * span));
+    p[2][2] = noise.slow;
+    if N == 4 {
+        // As unsure as the place of which it is the difference.
+        p[3][3] = p[0][0];
+    }
+    p
 }
 
 /// Measurement update: innovation variance, gain, covariance after it.
-fn update(p: &Sym, h1: f64, h2: f64, r: f64) -> (f64, [f64; 3], Sym) {
-    let a = [p[0] + h1 * p[1] + h2 * p[2], p[1] + h1 * p[3] + h2 * p[4], p[2] + h1 * p[4] + h2 * p[5]];
-    let s = a[0] + h1 * a[1] + h2 * a[2] + r;
-    let k = [a[0] / s, a[1] / s, a[2] / s];
-    let after = [
-        p[0] - k[0] * a[0],
-        p[1] - k[0] * a[1],
-        p[2] - k[0] * a[2],
-        p[3] - k[1] * a[1],
-        p[4] - k[1] * a[2],
-        p[5] - k[2] * a[2],
-    ];
+fn update<const N: usize>(p: &Covariance<N>, seen: &[f64; N], r: f64) -> (f64, [f64; N], Covariance<N>) {
+    let a = times(p, seen);
+    let s = product(seen, &a) + r;
+    let k = a.map(|a| a / s);
+    let mut after = *p;
+    for i in 0..N {
+        for j in i..N {
+            after[i][j] -= k[i] * a[j];
+            after[j][i] = after[i][j];
+        }
+    }
     (s, k, after)
 }
 
-fn predict(p: &Sym, step: &Step) -> Sym {
-    let (h, rho) = (step.h, step.rho);
-    let g = 0.5 * h * h;
-    // Rows of F·P with F = [1 h g; 0 1 h; 0 0 rho].
-    let f0 = [p[0] + h * p[1] + g * p[2], p[1] + h * p[3] + g * p[4], p[2] + h * p[4] + g * p[5]];
-    let f1 = [p[1] + h * p[2], p[3] + h * p[4], p[4] + h * p[5]];
-    [
-        f0[0] + h * f0[1] + g * f0[2] + step.q[0],
-        f0[1] + h * f0[2] + step.q[1],
-        rho * f0[2] + step.q[2],
-        f1[1] + h * f1[2] + step.q[3],
-        rho * f1[2] + step.q[4],
-        rho * rho * p[5] + step.q[5],
-    ]
+fn predict<const N: usize>(p: &Covariance<N>, step: &Step<N>) -> Covariance<N> {
+    let f = &step.transition;
+    let mut out = step.noise;
+    for i in 0..N {
+        // Row of F·P, for P is symmetric.
+        let row = times(p, &f[i]);
+        for j in i..N {
+            out[i][j] += product(&row, &f[j]);
+            out[j][i] = out[i][j];
+        }
+    }
+    out
+}
+
+fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn times<const N: usize>(m: &[[f64; N]; N], x: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| product(&m[i], x))
+}
+
+fn transposed_times<const N: usize>(m: &[[f64; N]; N], x: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| (0..N).map(|k| m[k][i] * x[k]).sum())
 }
 
 /// A stretch whose mean square innovation is above this counts by the logarithm of it: one bad stretch (an impact, a
@@ -111,9 +151,55 @@ pub(crate) fn robust_loss(mean_square: f64) -> (f64, f64) {
     }
 }
 
+/// Innovations at the start that only find the state.
+fn settling(track: &BlockedRecording) -> usize {
+    if track.reading_lag.is_empty() { 3 } else { 4 }
+}
+
+/// The filter's state on its way through a recording.
+struct Walk<'a> {
+    gains: &'a Gains,
+    track: &'a BlockedRecording,
+    settling: usize,
+    position: f64,
+    speed: f64,
+    disturbance: f64,
+    lag: f64,
+}
+
+impl<'a> Walk<'a> {
+    fn new(gains: &'a Gains, track: &'a BlockedRecording, position: f64) -> Self {
+        Self { gains, track, settling: settling(track), position, speed: 0.0, disturbance: 0.0, lag: 0.0 }
+    }
+
+    /// The whitened innovation of a block with a mean reading under an input: change of speed, of position and of the reading.
+    fn step(&mut self, j: usize, reading: f64, [dv, dq, dz]: [f64; 3]) -> f64 {
+        let (track, h, k) = (self.track, self.track.span[j], &self.gains.k[j]);
+        let (v, d) = (self.speed, self.disturbance);
+        let lag = track.reading_lag.get(j);
+        let behind = lag.map_or(0.0, |LagStep { seen, .. }| {
+            seen.lag * self.lag + seen.speed * v + seen.acceleration * d + seen.dv * dv + seen.dq * dq
+        });
+        let e = reading - (self.position + v * track.tau1[j] + d * track.tau2[j] + dz - behind);
+        let (q, v, d) = (self.position + k[0] * e, v + k[1] * e, d + k[2] * e);
+        if let Some(LagStep { end, .. }) = lag {
+            let own = end.lag * (self.lag + k[3] * e);
+            self.lag = own + end.speed * v + end.acceleration * d + end.dv * dv + end.dq * dq;
+        }
+        self.position = q + (v + 0.5 * d * h) * h + dq;
+        self.speed = v + d * h + dv;
+        self.disturbance = d * self.gains.rho[j];
+        if j < self.settling { 0.0 } else { e * self.gains.weight[j] }
+    }
+}
+
 impl Gains {
     /// Runs the covariance over a recording.
     pub(crate) fn new(track: &BlockedRecording, noise: &Noise) -> Self {
+        if track.reading_lag.is_empty() { Self::of::<3>(track, noise) } else { Self::of::<4>(track, noise) }
+    }
+
+    fn of<const N: usize>(track: &BlockedRecording, noise: &Noise) -> Self {
         let n = track.blocks();
         let mut gains = Self {
             k: Vec::with_capacity(n),
@@ -121,15 +207,18 @@ impl Gains {
             rho: Vec::with_capacity(n),
             log_det: 0.0,
         };
-        let mut p = initial(track, noise);
+        let mut p = initial::<N>(track, noise);
+        let settling = settling(track);
         for j in 0..n {
-            let (s, k, after) = update(&p, track.tau1[j], track.tau2[j], noise.sensor * track.quantum[j]);
-            let step = step_of(track, noise, j);
+            let step = Step::<N>::new(track, noise, j);
+            let (s, k, after) = update(&p, &step.seen, noise.sensor * track.quantum[j]);
             p = predict(&after, &step);
-            gains.k.push(k);
+            let mut of_all = [0.0; 4];
+            of_all[..N].copy_from_slice(&k);
+            gains.k.push(of_all);
             gains.weight.push(1.0 / s.sqrt());
-            gains.rho.push(step.rho);
-            if j >= 3 {
+            gains.rho.push(step.transition[2][2]);
+            if j >= settling {
                 gains.log_det -= 0.5 * s.ln();
             }
         }
@@ -138,23 +227,10 @@ impl Gains {
 
     /// Whitened innovations of the data under a model's total input.
     pub(crate) fn innovations(&self, track: &BlockedRecording, total: &Total) -> Vec<f64> {
-        let n = track.blocks();
-        let mut out = Vec::with_capacity(n);
-        let (mut q, mut v, mut d) = (track.z[0], 0.0, 0.0);
-        for j in 0..n {
-            let h = track.span[j];
-            let e = track.z[j] - (q + v * track.tau1[j] + d * track.tau2[j] + total.dz[j]);
-            let k = &self.k[j];
-            q += k[0] * e;
-            v += k[1] * e;
-            d += k[2] * e;
-            // The first three innovations only find the initial state.
-            out.push(if j < 3 { 0.0 } else { e * self.weight[j] });
-            q += (v + 0.5 * d * h) * h + total.dq[j];
-            v += d * h + total.dv[j];
-            d *= self.rho[j];
-        }
-        out
+        let mut walk = Walk::new(self, track, track.z[0]);
+        (0..track.blocks())
+            .map(|j| walk.step(j, track.z[j], [total.dv[j], total.dq[j], total.dz[j]]))
+            .collect()
     }
 
     /// What one unit of an input does to the whitened innovations, with the sign of a regressor.
@@ -192,20 +268,8 @@ impl Gains {
         over: Range<usize>,
         input: impl Fn(usize) -> [f64; 3],
     ) -> Vec<f64> {
-        let (mut q, mut v, mut d) = (0.0, 0.0, 0.0);
-        let mut run = |j: usize| {
-            let (h, [dv, dq, dz]) = (track.span[j], input(j));
-            let e = q + v * track.tau1[j] + d * track.tau2[j] + dz;
-            let k = &self.k[j];
-            q -= k[0] * e;
-            v -= k[1] * e;
-            d -= k[2] * e;
-            q += (v + 0.5 * d * h) * h + dq;
-            v += d * h + dv;
-            d *= self.rho[j];
-            if j < 3 { 0.0 } else { e * self.weight[j] }
-        };
-        over.map(&mut run).collect()
+        let mut walk = Walk::new(self, track, 0.0);
+        over.map(|j| -walk.step(j, 0.0, input(j))).collect()
     }
 }
 
@@ -220,93 +284,98 @@ pub(crate) struct Smoothed {
     pub(crate) v_sd: Vec<f64>,
 }
 
-/// Rauch–Tung–Striebel smoother with the model's input.
+/// Fixed-interval smoother with the model's input.
 pub(crate) fn smooth(track: &BlockedRecording, noise: &Noise, total: &Total) -> Smoothed {
+    if track.reading_lag.is_empty() {
+        smooth_of::<3>(track, noise, total)
+    } else {
+        smooth_of::<4>(track, noise, total)
+    }
+}
+
+/// What the filter knew after a block's reading.
+struct Filtered<const N: usize> {
+    state: [f64; N],
+    covariance: Covariance<N>,
+    innovation: f64,
+    variance: f64,
+    gain: [f64; N],
+}
+
+/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
+/// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
+fn smooth_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total) -> Smoothed {
     let n = track.blocks();
-    let mut after: Vec<([f64; 3], Sym)> = Vec::with_capacity(n);
-    let mut p = initial(track, noise);
-    let mut s = [track.z[0], 0.0, 0.0];
+    let mut filtered: Vec<Filtered<N>> = Vec::with_capacity(n);
+    let mut p = initial::<N>(track, noise);
+    let mut s = [0.0; N];
+    s[0] = track.z[0];
     for j in 0..n {
-        let (h, h1, h2) = (track.span[j], track.tau1[j], track.tau2[j]);
-        let e = track.z[j] - (s[0] + s[1] * h1 + s[2] * h2 + total.dz[j]);
-        let (_, k, pa) = update(&p, h1, h2, noise.sensor * track.quantum[j]);
-        for (s, k) in s.iter_mut().zip(k) {
-            *s += k * e;
+        let step = Step::<N>::new(track, noise, j);
+        let (dv, dq, mut dz) = (total.dv[j], total.dq[j], total.dz[j]);
+        let lag = track.reading_lag.get(j);
+        if let Some(LagStep { seen, .. }) = lag {
+            dz -= seen.dv * dv + seen.dq * dq;
         }
-        after.push((s, pa));
-        let step = step_of(track, noise, j);
-        s = [
-            s[0] + (s[1] + 0.5 * s[2] * h) * h + total.dq[j],
-            s[1] + s[2] * h + total.dv[j],
-            s[2] * step.rho,
-        ];
-        p = predict(&pa, &step);
+        let innovation = track.z[j] - (product(&step.seen, &s) + dz);
+        let (variance, gain, covariance) = update(&p, &step.seen, noise.sensor * track.quantum[j]);
+        let state = std::array::from_fn(|i| s[i] + gain[i] * innovation);
+        s = times(&step.transition, &state);
+        s[0] += dq;
+        s[1] += dv;
+        if let Some(LagStep { end, .. }) = lag {
+            s[3] += end.dv * dv + end.dq * dq;
+        }
+        p = predict(&covariance, &step);
+        filtered.push(Filtered { state, covariance, innovation, variance, gain });
     }
     let mut out = Smoothed { x: vec![0.0; n], v: vec![0.0; n], d: vec![0.0; n], v_sd: vec![0.0; n] };
-    let (mut later, mut later_p) = (after[n - 1].0, after[n - 1].1);
+    // What later readings say: the adjoint and its covariance.
+    let (mut adjoint, mut known) = ([0.0; N], [[0.0; N]; N]);
     for j in (0..n).rev() {
-        let (s, pa) = &after[j];
-        let (mut now, mut now_p) = (*s, *pa);
+        let Filtered { state, covariance, innovation, variance, gain } = &filtered[j];
+        let step = Step::<N>::new(track, noise, j);
+        let f = &step.transition;
         if j + 1 < n {
-            let step = step_of(track, noise, j);
-            let pp = predict(pa, &step);
-            let (h, rho) = (step.h, step.rho);
-            let predicted =
-                [s[0] + (s[1] + 0.5 * s[2] * h) * h + total.dq[j], s[1] + s[2] * h + total.dv[j], s[2] * rho];
-            let g = smoother_gain(pa, h, rho, &pp);
-            let delta = [later[0] - predicted[0], later[1] - predicted[1], later[2] - predicted[2]];
-            for (row, now) in g.iter().zip(&mut now) {
-                *now += row[0] * delta[0] + row[1] * delta[1] + row[2] * delta[2];
-            }
-            let mut dp = later_p;
-            for (a, b) in dp.iter_mut().zip(&pp) {
-                *a -= b;
-            }
-            let full = |m: &Sym, a: usize, b: usize| m[[[0, 1, 2], [1, 3, 4], [2, 4, 5]][a][b]];
-            let places = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-            for (place, (a, b)) in places.into_iter().enumerate() {
-                let mut sum = 0.0;
-                for i in 0..3 {
-                    for l in 0..3 {
-                        sum += g[a][i] * full(&dp, i, l) * g[b][l];
-                    }
-                }
-                now_p[place] += sum;
+            adjoint = transposed_times(f, &adjoint);
+            known = between(f, &known);
+        }
+        let back = times(covariance, &adjoint);
+        let [q, v, d] = [0, 1, 2].map(|i| state[i] - back[i]);
+        let less = product(&covariance[1], &times(&known, &covariance[1]));
+        let half = 0.5 * track.span[j];
+        let a = d + total.dv[j] / track.span[j];
+        out.x[j] = q + (v + 0.5 * a * half) * half;
+        out.v[j] = v + a * half;
+        out.d[j] = d;
+        out.v_sd[j] = (covariance[1][1] - less).max(0.0).sqrt();
+        // Back over the block's own reading.
+        let seen = &step.seen;
+        let of_gain = product(gain, &adjoint);
+        adjoint = std::array::from_fn(|i| adjoint[i] - seen[i] * (of_gain + innovation / variance));
+        let mut left = [[0.0; N]; N];
+        for (i, row) in left.iter_mut().enumerate() {
+            *row = std::array::from_fn(|k| f64::from(u8::from(i == k)) - gain[i] * seen[k]);
+        }
+        known = between(&left, &known);
+        for i in 0..N {
+            for k in 0..N {
+                known[i][k] += seen[i] * seen[k] / variance;
             }
         }
-        let half = 0.5 * track.span[j];
-        let a = now[2] + total.dv[j] / track.span[j];
-        out.x[j] = now[0] + (now[1] + 0.5 * a * half) * half;
-        out.v[j] = now[1] + a * half;
-        out.d[j] = now[2];
-        out.v_sd[j] = now_p[3].max(0.0).sqrt();
-        later = now;
-        later_p = now_p;
     }
     out
 }
 
-/// P·Fᵀ·P⁻ of the smoother.
-fn smoother_gain(p: &Sym, h: f64, rho: f64, predicted: &Sym) -> [[f64; 3]; 3] {
-    let g = 0.5 * h * h;
-    let row = |a: f64, b: f64, c: f64| [a + h * b + g * c, b + h * c, rho * c];
-    let m = [row(p[0], p[1], p[2]), row(p[1], p[3], p[4]), row(p[2], p[4], p[5])];
-    // Scaled so that the inverse is of numbers near one, whatever the units.
-    let d = [predicted[0].sqrt(), predicted[3].sqrt(), predicted[5].sqrt()]
-        .map(|x| if x > 0.0 { 1.0 / x } else { 0.0 });
-    let [a, b, c] = [1.0 + 1e-13, predicted[1] * d[0] * d[1], predicted[2] * d[0] * d[2]];
-    let [e, f, i] = [1.0 + 1e-13, predicted[4] * d[1] * d[2], 1.0 + 1e-13];
-    let det = a * (e * i - f * f) - b * (b * i - f * c) + c * (b * f - e * c);
-    let w = if det.abs() > 1e-300 { 1.0 / det } else { 0.0 };
-    let inverse = [
-        [(e * i - f * f) * w, (c * f - b * i) * w, (b * f - c * e) * w],
-        [(c * f - b * i) * w, (a * i - c * c) * w, (b * c - a * f) * w],
-        [(b * f - c * e) * w, (b * c - a * f) * w, (a * e - b * b) * w],
-    ];
-    let mut out = [[0.0; 3]; 3];
-    for (out, m) in out.iter_mut().zip(&m) {
-        for (col, out) in out.iter_mut().enumerate() {
-            *out = (0..3).map(|l| m[l] * d[l] * inverse[l][col] * d[col]).sum();
+/// Mᵀ·P·M of a symmetric P.
+fn between<const N: usize>(m: &[[f64; N]; N], p: &Covariance<N>) -> Covariance<N> {
+    let mut out = [[0.0; N]; N];
+    let columns: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|k| m[k][i]));
+    for i in 0..N {
+        let row = times(p, &columns[i]);
+        for j in i..N {
+            out[i][j] = product(&row, &columns[j]);
+            out[j][i] = out[i][j];
         }
     }
     out

@@ -52,7 +52,9 @@ fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
         let h = 1.0 / track.block_rate();
         let mut quantum: Vec<f64> = track.quantum.clone();
         quantum.sort_by(f64::total_cmp);
-        sum += noise.sensor * quantum[quantum.len() / 2] * h;
+        // Behind a filter of the reading the axis is known that much worse, at the end of the band.
+        let lag = track.filter_s.map_or(0.0, |s| TAU * hz * s);
+        sum += noise.sensor * quantum[quantum.len() / 2] * h * (1.0 + lag * lag);
         count += 1.0;
     }
     // ∫ ω⁴/(1 + (ω/ωc)⁶)² df over both sides = ωc⁵/(2π) · 2 · π/36 · 1/sin(5π/6)

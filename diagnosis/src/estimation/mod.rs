@@ -9,6 +9,7 @@ pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod plausibility;
 pub(crate) mod quasi_static;
+pub(crate) mod reading_lag;
 pub(crate) mod refit;
 pub(crate) mod regressors;
 pub(crate) mod slices;

@@ -41,6 +41,8 @@ fn excerpt(track: &BlockedRecording, total: &Total, from: usize, to: usize) -> E
         span: cut(&track.span),
         tau1: cut(&track.tau1),
         tau2: cut(&track.tau2),
+        filter_s: track.filter_s,
+        reading_lag: track.reading_lag.get(from..to).map_or_else(Vec::new, <[_]>::to_vec),
         z: track.z[from..to].iter().map(|z| z - z0).collect(),
         quantum: cut(&track.quantum),
         row_time: [].into(),
