@@ -10,11 +10,11 @@
 //! taken over in steps of a milliradian with three quarters of one as dead band; a layer that was touched is left only
 //! 0.2 mm further out. Noise of a milliradian therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
-use crate::config::{MAX_LAYERS, Tissue};
 use crate::event::{Transitions, VesselState};
 use crate::math::{reciprocal, scaled, sine};
+use crate::tissue::{MAX_LAYERS, Tissue};
 use crate::units::{Millimetres, Milliradians};
-use fixed::types::{I8F24, I16F16};
+use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 
 /// The smallest angle to the skin that is told apart: 5°. Below it, layers stay where they are met at 5°.
@@ -83,11 +83,19 @@ struct Angle {
     smoothed: i32,
     /// 1/sin of what is taken: length along the needle for each length perpendicular to the skin.
     path_per_depth: I8F24,
+    /// Its sine, the other way round.
+    depth_per_path: I2F30,
 }
 
 impl Angle {
     fn new(angle: Milliradians) -> Self {
-        Self { taken: angle, smoothed: i32::from(angle.0) << 16, path_per_depth: reciprocal(sine(angle)) }
+        let sine = sine(angle);
+        Self {
+            taken: angle,
+            smoothed: i32::from(angle.0) << 16,
+            path_per_depth: reciprocal(sine),
+            depth_per_path: sine,
+        }
     }
 }
 
@@ -149,6 +157,11 @@ impl Insertion {
     /// Length along the needle for each length perpendicular to the skin.
     pub(crate) fn path_per_depth(&self) -> I8F24 {
         self.angle.path_per_depth
+    }
+
+    /// Length perpendicular to the skin for each length along the needle.
+    pub(crate) fn depth_per_path(&self) -> I2F30 {
+        self.angle.depth_per_path
     }
 
     /// Where the tip is as seen from the vessel.

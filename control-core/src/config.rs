@@ -9,11 +9,10 @@ use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// What is left of an indentation when a wall gives way, where nobody knows better: 0.3, an assumption.
-pub const SPRING_BACK: I16F16 = I16F16::from_bits(19_661);
-
-/// Layers of a tissue at the most.
-pub const MAX_LAYERS: usize = 6;
+pub use crate::law::{
+    Cutting, Fixture, ForceTable, FrictionLaw, Law, Lugre, MAX_ANGLES, MAX_DEPTHS, MAX_SPEEDS, Sparte,
+};
+pub use crate::tissue::{Layer, MAX_LAYERS, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 
 /// All that the control law needs to know: the two parts, which are sent and stored apart. Neither holds the other's keys.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,8 +69,11 @@ pub struct Device {
 pub struct Patient {
     /// Largest force at the roller, where it is to be less than what the device gives.
     pub largest_force: Option<Newtons>,
-    /// The law of friction inside tissue.
-    pub friction: FrictionLaw,
+    /// All forces of the law are given to the hand at this share, 0.1–1: a declared scale where they are more than the motor
+    /// has.
+    pub scale: I16F16,
+    /// The law of force.
+    pub law: Law,
     /// The tissue, outermost layer first.
     pub layers: Vec<Layer, MAX_LAYERS>,
     /// What is to be known of the vessel beyond its layers; without it, the needle goes through its axis.
@@ -132,104 +134,6 @@ pub enum SpeedMethod {
     Window,
     /// Counts over the time between the edges that delimit them; finer at low speed.
     EdgeTiming,
-}
-
-/// The law of friction inside tissue (seed 001, eq. 2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum FrictionLaw {
-    /// Equation 2 as printed. It lets go of a resting needle within a second.
-    Paper {
-        /// S_f1: depth in tissue over which the friction level grows by e.
-        level_length: Millimetres,
-        /// Largest friction level L_f, 1–32.
-        level_cap: I16F16,
-        /// Time constant τ of the anchor, 5–1,000 ms: `S_f2 = 1 − e^{−T/τ}`.
-        anchor_ms: u16,
-        /// K_f: force for each mm between needle and anchor at level 1.
-        stiffness: Stiffness,
-        /// T_f_max = −T_f_min.
-        limit: Newtons,
-    },
-    /// A clamped proxy: holds a resting needle, slips at the friction limit.
-    Cone {
-        /// Stiffness of the hold below the limit.
-        stiffness: Stiffness,
-    },
-}
-
-/// A vessel among the layers, the one whose near wall is of [`Tissue::Vessel`]: a tube with its axis level with the skin and
-/// along the way that the needle points, oval across. Its depth and its vertical diameter are those of its two walls' layers
-/// over the axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Vessel {
-    /// Horizontal diameter, 0.2–30 mm.
-    pub width: Millimetres,
-    /// How far the needle's plane passes beside the axis; half the width and more is past the vessel.
-    pub offset: Millimetres,
-}
-
-/// One layer of tissue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Layer {
-    /// What it is, for events and pictures.
-    pub tissue: Tissue,
-    /// Depth of its outer face, perpendicular to the skin.
-    pub depth: Millimetres,
-    /// Its wall, where it has one that gives way.
-    pub wall: Option<Wall>,
-    /// Friction limit gained for each mm of needle inside it.
-    pub friction: FrictionPerMillimetre,
-}
-
-/// What a layer is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u8)]
-pub enum Tissue {
-    /// Skin.
-    Skin = 0,
-    /// Subcutaneous fat.
-    Fat = 1,
-    /// Muscle.
-    Muscle = 2,
-    /// A blood vessel: its puncture is the aim.
-    Vessel = 3,
-    /// Anything else.
-    Other = 4,
-    /// The bursa of a joint.
-    Bursa = 5,
-    /// Tendon.
-    Tendon = 6,
-    /// Cartilage.
-    Cartilage = 7,
-    /// The far wall of the vessel above it, and what lies under that: its puncture is a mistake.
-    FarWall = 8,
-}
-
-/// The jog effect of a wall: it rises along one parabola and, once punctured, falls along another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Wall {
-    /// Force against travel past contact until it gives way; its vertex is at or before contact.
-    pub elastic: Parabola,
-    /// Travel past contact at which it gives way, up to 30 mm.
-    pub puncture_travel: Millimetres,
-    /// Force against travel past contact once it has given way; its vertex is beyond `puncture_travel`, and past it the
-    /// force is `base`.
-    pub relief: Parabola,
-    /// Slope with which the relief force lets go when the needle is drawn back.
-    pub unload: Stiffness,
-    /// Part of the indentation that is left when the wall has just given way, 0–1; it goes as far as the relief goes.
-    pub spring_back: I16F16,
-}
-
-/// `f(T) = (T − vertex)²/compliance + base` (seed 001, eq. 1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Parabola {
-    /// n: travel past contact at which the parabola turns.
-    pub vertex: Millimetres,
-    /// a, 0.05–1,000 mm²/N.
-    pub compliance: JogCompliance,
-    /// b: force at the vertex.
-    pub base: Newtons,
 }
 
 impl Default for Device {
@@ -309,7 +213,8 @@ impl Default for Patient {
         ];
         Self {
             largest_force: None,
-            friction: FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(65_536)) },
+            scale: I16F16::ONE,
+            law: Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(65_536)) }),
             layers: layers.into_iter().collect(),
             vessel: None,
         }
@@ -327,8 +232,9 @@ impl Patient {
         };
         Self {
             largest_force: None,
+            scale: I16F16::ONE,
             // The softest hold that there may be: any limit of stiffness bears it.
-            friction: FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(3_276)) },
+            law: Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(I16F16::from_bits(3_276)) }),
             layers: core::iter::once(nothing).collect(),
             vessel: None,
         }

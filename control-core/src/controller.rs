@@ -5,13 +5,13 @@ use crate::anatomy::{self, Insertion};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
+use crate::law::{Memory, Response};
 use crate::math::scaled;
 use crate::passivity::Observer;
 use crate::plan::Plan;
 use crate::runaway::{self, LOOK_TICKS};
 use crate::safety::Limiter;
 use crate::thermal::{WARM_TICKS, Winding};
-use crate::tissue::{Response, Tissue};
 use crate::units::{
     Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
 };
@@ -58,6 +58,8 @@ pub struct TickOutput {
     pub angle: Milliradians,
     /// Where the tip is as seen from the vessel.
     pub vessel: VesselState,
+    /// The force across the needle that would hold its direction; this device cannot give it.
+    pub lateral: Newtons,
 }
 
 /// One tick as it is streamed and recorded.
@@ -105,7 +107,7 @@ pub struct Controller {
     previous: Option<Counts>,
     speed: SpeedEstimator,
     insertion: Insertion,
-    tissue: Tissue,
+    memory: Memory,
     observer: Observer,
     winding: Winding,
     limiter: Limiter,
@@ -145,12 +147,12 @@ impl Controller {
         Self {
             speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
             insertion: Insertion::new(&plan.anatomy),
+            memory: plan.law.memory(),
             plan,
             mode: Mode::Idle,
             player: None,
             origin: Counts(0),
             previous: None,
-            tissue: Tissue::default(),
             observer: Observer::default(),
             winding,
             limiter: Limiter::default(),
@@ -211,7 +213,7 @@ impl Controller {
     /// As if the needle had never been in this tissue.
     fn withdraw(&mut self) {
         self.insertion = Insertion::new(&self.plan.anatomy);
-        self.tissue = Tissue::default();
+        self.memory = self.plan.law.memory();
     }
 
     fn power_up(&mut self, mode: Mode) {
@@ -232,7 +234,10 @@ impl Controller {
         let (transitions, tissue) = self.meet(input.tilt, depth, speed);
         self.watch_host();
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
-            Some((wanted, limits)) => self.limit(wanted, limits),
+            Some((wanted, limits)) => {
+                let limits = if tissue.estimated { limits.with(Limits::ESTIMATED) } else { limits };
+                self.limit(wanted, limits)
+            }
             None => (MillinewtonMetres::default(), Limits::default()),
         };
         self.winding.tick(torque);
@@ -267,6 +272,7 @@ impl Controller {
             force: tissue.force,
             angle: self.insertion.angle(),
             vessel: self.insertion.vessel(),
+            lateral: tissue.lateral,
         }
     }
 
@@ -308,8 +314,13 @@ impl Controller {
             11 => self.insertion.take_angle(&self.plan.anatomy),
             _ => {}
         }
-        let transitions = self.insertion.tick(&self.plan.anatomy, depth);
-        (transitions, self.tissue.tick(&self.plan.forces, &self.insertion, depth, speed))
+        let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
+        let response = {
+            let (law, plan) = (&self.plan.config.patient.law, &self.plan.law);
+            self.memory.tick(law, plan, &self.insertion, depth, speed)
+        };
+        transitions.barrier = response.barrier;
+        (transitions, response)
     }
 
     /// Counts past the zero in the tick before.
@@ -387,7 +398,7 @@ impl Controller {
                 let (given, damped) = self.observer.tick(self.plan.bounce_damping, depth, resisting);
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
                 // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
-                let torque = I16F16::from_bits(-scaled(given.0.to_bits(), radius.0.to_bits(), 16));
+                let torque = I16F16::from_bits(-scaled(given.0.to_bits(), self.plan.lever.to_bits(), 16));
                 Some((MillinewtonMetres(self.runaway.steady(torque, self.limiter.given().0)), limits))
             }
             Mode::Exciting => {

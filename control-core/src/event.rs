@@ -157,6 +157,8 @@ impl Limits {
     pub const THERMAL: Self = Self(8);
     /// The passivity observer adds damping.
     pub const PASSIVITY: Self = Self(16);
+    /// Nothing was measured at this speed and angle: the force is an estimate.
+    pub const ESTIMATED: Self = Self(32);
 
     /// Both sets together.
     pub fn with(self, other: Self) -> Self {
@@ -205,6 +207,8 @@ pub struct Transitions {
     pub exit: u8,
     /// The tip has come into a vessel's lumen, from either side: blood shows in the hub.
     pub flashback: bool,
+    /// The needle has just been turned further than the tissue around it lets it.
+    pub barrier: bool,
 }
 
 impl Transitions {

@@ -6,7 +6,8 @@
 
 use crate::TICK_HZ;
 use crate::math::{multiply, scaled, times, upper_half};
-use crate::plan::{Field, Plan, Refusal, within};
+use crate::plan::Plan;
+use crate::refusal::{Field, Refusal, within};
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
 use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;

@@ -1,6 +1,6 @@
 //! What the device computes ten thousand times a second: encoder count in, DAC code out.
 //!
-//! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → [`tissue`] (the
+//! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → `law` (the
 //! force law) → torque → [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
 //! operating mode; [`config`] is what a person writes and [`plan`] what may run, or the reason why not.
 //!
@@ -23,16 +23,19 @@ pub mod event;
 pub mod excitation;
 pub mod friction;
 pub mod interlock;
-pub mod jog;
 pub mod kinematics;
+mod law;
 mod math;
 mod passivity;
 pub mod plan;
+mod proxy;
+mod refusal;
 mod runaway;
 pub mod safety;
 mod thermal;
-pub mod tissue;
+mod tissue;
 pub mod units;
+mod wall;
 
 pub use config::{Config, Device, Patient};
 pub use controller::{Controller, Order, TickInput, TickOutput};

@@ -16,8 +16,7 @@ pub(crate) fn exp(x: I16F16) -> I16F16 {
     // Round(x·log2(e)), 0 to 12; what is left of it lies in [−0.5, 0.5).
     let whole = (power + (1 << 15)) >> 16;
     let fraction_q32 = (power - (whole << 16)) << 16;
-    let mantissa_q30 =
-        EXP2_Q30.iter().rev().fold(0, |sum, coefficient| coefficient + upper_half(sum, fraction_q32));
+    let mantissa_q30 = exp2_q30(fraction_q32);
     // 2^whole · mantissa: Q30 to Q16 is a shift by 14, of which `whole` is taken back.
     let shift = 14 - whole;
     I16F16::from_bits((mantissa_q30 + (1 << (shift - 1))) >> shift)
@@ -51,6 +50,31 @@ pub(crate) fn reciprocal(x: I2F30) -> I8F24 {
     let rough_q16 = ((1_u32 << 31) / (x >> 15) as u32) as i32;
     let error_q30 = (1 << 30) - scaled(x, rough_q16, 16);
     I8F24::from_bits((rough_q16 << 8) + scaled(rough_q16, error_q30, 22))
+}
+
+/// e^−x for 0 ≤ x, to 1.2e-5: the last place of x·log2(e).
+pub(crate) fn exp_negative(x: I16F16) -> I2F30 {
+    // Beyond 21 nothing is left in 30 bits.
+    let x = x.clamp(I16F16::ZERO, I16F16::from_bits(21 << 16));
+    let power = -scaled(x.to_bits(), LOG2_E.to_bits(), 30);
+    let whole = (power + (1 << 15)) >> 16;
+    let mantissa_q30 = exp2_q30((power - (whole << 16)) << 16);
+    I2F30::from_bits(mantissa_q30 >> -whole)
+}
+
+/// 2^f for f in [−0.5, 0.5), Q32 in, Q30 out.
+fn exp2_q30(fraction_q32: i32) -> i32 {
+    EXP2_Q30.iter().rev().fold(0, |sum, coefficient| coefficient + upper_half(sum, fraction_q32))
+}
+
+/// `part / whole` in Q28 for `0 ≤ part ≤ whole`, `whole` above zero, to 2e-5 of itself: two divisions of 32 bits.
+pub(crate) fn share(part: i32, whole: i32) -> i32 {
+    let whole = whole.max(1).cast_unsigned();
+    let places = whole.leading_zeros();
+    let (part, whole) = (part.max(0).cast_unsigned() << places, (whole << places) >> 16);
+    let first = part / whole;
+    let rest = ((part - first * whole) << 12) / whole;
+    ((first << 12) + rest).min(1 << 28).cast_signed()
 }
 
 /// `a · b`, saturating, with `b` in [−2, 2) and fine steps.
@@ -102,6 +126,23 @@ mod tests {
         }
         assert_eq!(exp(I16F16::MAX), exp(I16F16::from_bits(8 << 16)));
         assert_eq!(exp(I16F16::MIN), I16F16::ONE);
+    }
+
+    #[test]
+    fn a_negative_power_and_a_share_follow_their_twins() {
+        for step in 0..=12 * 256 {
+            let x = f64::from(step) / 256.0;
+            let got = exp_negative(x.to_fixed::<I16F16>()).to_num::<f64>();
+            assert!((got - (-x).exp()).abs() < 1.2e-5, "exp(-{x}) = {got}");
+        }
+        assert_eq!(exp_negative(I16F16::MAX), 0);
+        for whole in [1, 2, 3, 1_000, 65_537, 3_000_000, i32::MAX] {
+            for part in [0, 1, whole / 7, whole / 2, whole - 1, whole].map(|part| part.min(whole)) {
+                let exact = f64::from(part) / f64::from(whole);
+                let got = f64::from(share(part, whole)) / f64::from(1 << 28);
+                assert!((got - exact).abs() <= 3.1e-5 * exact + 5e-9, "{part}/{whole} = {got}");
+            }
+        }
     }
 
     #[test]

@@ -2,21 +2,20 @@
 //! that is unstable, overflows or asks for more than the motor has is refused with the reason, never clamped.
 
 mod layers;
-mod refusal;
 
 use crate::TICK_HZ;
 use crate::anatomy::Anatomy;
-use crate::config::{Config, Device, FrictionLaw, Patient, Tissue};
-use crate::friction::Law;
+use crate::config::{Config, Device, Patient, Tissue};
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
+use crate::law;
 use crate::passivity::BounceDamping;
+pub use crate::refusal::{Field, Refusal};
+use crate::refusal::{milli, within};
 use crate::runaway;
 use crate::safety::{DacScale, TorqueLimits};
 use crate::thermal::ThermalLimits;
-use crate::tissue::Forces;
 use crate::units::Newtons;
 use fixed::types::{I2F30, I16F16, U16F16};
-pub use refusal::{Field, Refusal};
 
 /// 7 N/mm: the stiffness limit with one tick of delay.
 const LARGEST_STIFFNESS: I16F16 = I16F16::from_bits(7 << 16);
@@ -32,7 +31,9 @@ pub struct Plan {
     pub(crate) config: Config,
     pub(crate) scale: Scale,
     pub(crate) anatomy: Anatomy,
-    pub(crate) forces: Forces,
+    pub(crate) law: law::Plan,
+    /// Length by which a force of the law becomes the torque that is given: the roller's radius at the declared scale.
+    pub(crate) lever: I16F16,
     pub(crate) torque_limits: TorqueLimits,
     /// Torque under which a motor that is not held moves.
     pub(crate) frozen_torque: U16F16,
@@ -56,13 +57,23 @@ impl Plan {
         check_ceiling(config)?;
         let mm_per_count = mm_per_count(config.device.roller_radius, config.device.counts_per_turn);
         let scale = Scale::new(mm_per_count);
-        check_friction(config)?;
-        let (anatomy, forces) = layers::plan(config)?;
+        within(Field::Scale, patient.scale, milli(100), I16F16::ONE)?;
+        let met = layers::met(config)?;
+        let ground = law::Ground {
+            layers: &met.layers,
+            configured: patient.layers.len(),
+            travel: device.limits.travel.0,
+            largest: largest_asked(config),
+            stiffest: stiffest(config),
+        };
+        let law = law::Plan::new(&patient.law, &ground)?;
+        let anatomy = layers::plan(config, &met);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;
         Ok(Self {
             scale,
             anatomy,
-            forces,
+            law,
+            lever: device.roller_radius.0.saturating_mul(patient.scale),
             torque_limits: TorqueLimits {
                 torque: largest_torque(config),
                 slew_per_tick: config.device.limits.slew_per_tick.0,
@@ -122,15 +133,6 @@ impl Plan {
     pub fn zero_torque_code(&self) -> crate::units::DacCode {
         self.dac.zero()
     }
-}
-
-pub(crate) fn within(field: Field, value: I16F16, low: I16F16, high: I16F16) -> Result<(), Refusal> {
-    if value < low || value > high { Err(Refusal::OutOfRange { field, value, low, high }) } else { Ok(()) }
-}
-
-/// Q16 of thousandths, for the ranges below.
-const fn milli(thousandths: i64) -> I16F16 {
-    I16F16::from_bits((thousandths * 65_536 / 1000) as i32)
 }
 
 /// Whether a device may be as `device` says, whoever the patient.
@@ -201,35 +203,20 @@ fn check_ceiling(config: &Config) -> Result<(), Refusal> {
     within(Field::LargestForce, force, milli(10), ceiling)
 }
 
-fn check_friction(config: &Config) -> Result<(), Refusal> {
-    let layer = config.patient.layers.len() as u8;
-    let limit = config.device.limits.stiffness.0;
-    match config.patient.friction {
-        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit: force } => {
-            within(Field::LevelLength, level_length.0, milli(1_000), milli(1_000_000))?;
-            within(Field::LevelCap, level_cap, milli(1_000), milli(32_000))?;
-            within(Field::AnchorMs, I16F16::from_num(anchor_ms.min(30_000)), milli(5_000), milli(1_000_000))?;
-            within(Field::FrictionStiffness, stiffness.0, milli(1), limit)?;
-            within(Field::FrictionLimit, force.0, milli(1), largest_force(config))?;
-            let slope = friction_slope(&config.patient.friction);
-            if slope > limit { Err(Refusal::TooStiff { layer, slope, limit }) } else { Ok(()) }
-        }
-        FrictionLaw::Cone { stiffness } => within(Field::FrictionStiffness, stiffness.0, milli(50), limit),
-    }
-}
-
-/// The steepest slope of friction.
-fn friction_slope(law: &FrictionLaw) -> I16F16 {
-    match *law {
-        FrictionLaw::Paper { stiffness, level_cap, .. } => stiffness.0.saturating_mul(level_cap),
-        FrictionLaw::Cone { stiffness } => stiffness.0,
-    }
-}
-
 /// What the torque limit gives at the roller, mN·m over mm being N, or less where the patient wants less.
 fn largest_force(config: &Config) -> I16F16 {
     let ceiling = config.device.limits.torque.0.saturating_div(config.device.roller_radius.0);
     config.patient.largest_force.map_or(ceiling, |force| force.0.min(ceiling))
+}
+
+/// The force that a law may ask for: more than the device gives where the scale that is declared makes it less.
+fn largest_asked(config: &Config) -> I16F16 {
+    largest_force(config).saturating_div(config.patient.scale)
+}
+
+/// The slope that a law may have.
+fn stiffest(config: &Config) -> I16F16 {
+    config.device.limits.stiffness.0.saturating_div(config.patient.scale)
 }
 
 /// The torque that [`largest_force`] takes.
@@ -238,40 +225,4 @@ fn largest_torque(config: &Config) -> I16F16 {
     let wanted =
         config.patient.largest_force.map(|force| force.0.saturating_mul(config.device.roller_radius.0));
     wanted.map_or(ceiling, |torque| torque.min(ceiling))
-}
-
-fn plan_friction(law: &FrictionLaw) -> Law {
-    match *law {
-        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => Law::Paper {
-            per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
-            level_cap,
-            follow: follow_share(anchor_ms),
-            stiffness,
-            limit,
-        },
-        FrictionLaw::Cone { stiffness } => {
-            Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
-        }
-    }
-}
-
-/// `1 − e^{−T/τ}` for T of one tick: with T/τ ≤ 0.02 three terms of the series leave less than 1e-8.
-fn follow_share(anchor_ms: u16) -> I2F30 {
-    let y = I2F30::ONE / i32::from(anchor_ms.max(1)) / 10;
-    let y2 = y.saturating_mul(y);
-    y - y2 / 2 + y2.saturating_mul(y) / 6
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_anchor_follows_by_its_share_of_a_tick() {
-        for anchor_ms in [5_u16, 60, 1_000] {
-            let exact = -(-0.1 / f64::from(anchor_ms)).exp_m1();
-            let share = follow_share(anchor_ms).to_num::<f64>();
-            assert!((share - exact).abs() < 1.2e-8, "{anchor_ms} ms: {share} for {exact}");
-        }
-    }
 }

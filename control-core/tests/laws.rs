@@ -1,6 +1,6 @@
 //! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
 
-use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall};
+use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall};
 use control_core::event::{Fault, State};
 use control_core::units::{
     Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Milliradians, Newtons, Stiffness,
@@ -10,6 +10,11 @@ use fixed::types::I16F16;
 
 /// A needle straight into the skin: lengths along it are depths.
 const STRAIGHT: Milliradians = Milliradians(1_571);
+
+/// The default's.
+fn cone() -> FrictionLaw {
+    FrictionLaw::Cone { stiffness: Stiffness(I16F16::ONE) }
+}
 
 fn paper() -> FrictionLaw {
     FrictionLaw::Paper {
@@ -116,9 +121,9 @@ fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
 
 #[test]
 fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
-    for (law, held) in [(Config::default().patient.friction, true), (paper(), false)] {
+    for (law, held) in [(cone(), true), (paper(), false)] {
         let mut c = started(&Config {
-            patient: Patient { friction: law, ..Patient::default() },
+            patient: Patient { law: Law::Jog(law), ..Patient::default() },
             ..Config::default()
         });
         let mut at = 0.0;
@@ -139,9 +144,9 @@ fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
 
 #[test]
 fn friction_opposes_withdrawal() {
-    for law in [Config::default().patient.friction, paper()] {
+    for law in [cone(), paper()] {
         let mut c = started(&Config {
-            patient: Patient { friction: law, ..Patient::default() },
+            patient: Patient { law: Law::Jog(law), ..Patient::default() },
             ..Config::default()
         });
         let (mut at, mut inwards, mut outwards) = (0.0, 0.0, 0.0);

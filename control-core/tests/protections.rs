@@ -1,7 +1,7 @@
 //! The protections that only show over time: the winding's heat and the energy of a stiff wall. Each is also seen to
 //! matter: without it the bound that it holds is broken.
 
-use control_core::config::{Config, FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Wall};
+use control_core::config::{Config, FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::Limits;
 use control_core::units::{
     Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
@@ -25,7 +25,8 @@ fn stiff_wall() -> Config {
         base: Newtons(q(base)),
     };
     let friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
-    let mut config = Config { patient: Patient { friction, ..Patient::default() }, ..Config::default() };
+    let mut config =
+        Config { patient: Patient { law: Law::Jog(friction), ..Patient::default() }, ..Config::default() };
     config.device.limits.stiffness = Stiffness(q(7.0));
     // What rings is faster than a hand: the protection against that is not the one that is looked at here.
     config.device.limits.max_counts_per_tick = 200;

@@ -1,6 +1,6 @@
 //! What may not run is refused with the reason; the last value that may run is not.
 
-use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
+use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 use control_core::plan::Field;
 use control_core::units::{
     Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
@@ -40,7 +40,7 @@ type ChangedLaw = fn(&mut FrictionLaw);
 /// A tissue that asks for next to nothing, so that what is tested is alone in being refused.
 fn weak(config: &mut Config) {
     config.device.limits.stiffness = Stiffness(q(2.0));
-    config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
+    config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) });
     config.patient.layers = [layer(0.0, None)].into_iter().collect();
 }
 
@@ -71,14 +71,15 @@ fn wall() -> Wall {
 #[test]
 fn each_value_has_a_range_and_its_ends_belong_to_it() {
     let paper = |config: &mut Config, change: fn(&mut FrictionLaw)| {
-        config.patient.friction = FrictionLaw::Paper {
+        let mut law = FrictionLaw::Paper {
             level_length: Millimetres(q(23.0)),
             level_cap: q(1.0),
             anchor_ms: 60,
             stiffness: Stiffness(q(0.5)),
             limit: Newtons(q(0.5)),
         };
-        change(&mut config.patient.friction);
+        change(&mut law);
+        config.patient.law = Law::Jog(law);
     };
     let ranges: [Range; 17] = [
         (Field::RollerRadius, [4.0, 3.99], [25.0, 25.01], |c, v| c.device.roller_radius.0 = q(v)),
@@ -121,7 +122,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
                     weak(config);
                     set(config, value);
                     if name == Field::StiffnessLimit && value < 0.05 {
-                        config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(value)) };
+                        config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(value)) });
                     }
                 })
             };
@@ -168,7 +169,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
     }
     assert_eq!(field(|config| paper(config, |_| {})), None);
     assert_eq!(
-        field(|c| c.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.04)) }),
+        field(|c| c.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.04)) })),
         Some(Field::FrictionStiffness)
     );
 }
@@ -226,7 +227,7 @@ fn inside_tissue_the_slopes_of_a_wall_and_of_friction_add_up() {
     let below = |hold: f64| {
         refusal(|config| {
             weak(config);
-            config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(hold)) };
+            config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(hold)) });
             config.patient.layers = [layer(0.0, None), layer(1.0, Some(wall()))].into_iter().collect();
         })
     };
@@ -237,7 +238,7 @@ fn inside_tissue_the_slopes_of_a_wall_and_of_friction_add_up() {
     let on_the_way_in = |layers: &[Layer]| {
         refusal(|config| {
             weak(config);
-            config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
+            config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) });
             config.patient.layers = layers.iter().copied().collect();
         })
     };
@@ -252,13 +253,13 @@ fn friction_as_printed_is_as_stiff_as_its_highest_level() {
     let with_cap = |level_cap: f64| {
         refusal(|config| {
             weak(config);
-            config.patient.friction = FrictionLaw::Paper {
+            config.patient.law = Law::Jog(FrictionLaw::Paper {
                 level_length: Millimetres(q(23.0)),
                 level_cap: q(level_cap),
                 anchor_ms: 60,
                 stiffness: Stiffness(q(1.0)),
                 limit: Newtons(q(0.5)),
-            };
+            });
         })
     };
     // The limit is 2 N/mm; the number of layers stands for friction.

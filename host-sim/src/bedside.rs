@@ -49,7 +49,7 @@ impl Bedside {
             }
         };
         // The scripted hand must find its way in it.
-        self.procedure.iter().try_for_each(|p| Procedure::find(p, &profile).map(drop))?;
+        self.procedure.iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
         self.asked = Some(profile);
         Ok(patient)
@@ -77,7 +77,7 @@ impl Bedside {
 
     /// What the scripted hand does in the patient that counts.
     pub fn procedure(&self) -> Option<Procedure> {
-        self.procedure.as_ref().and_then(|p| Procedure::find(p, &self.profile).ok())
+        self.procedure.as_ref().and_then(|wanted| hand(wanted, &self.profile).ok())
     }
 
     /// For the recording.
@@ -94,6 +94,12 @@ impl Bedside {
             answer,
         }
     }
+}
+
+/// What was asked of the hand, or where that has no sense in this patient, what the patient's file says.
+fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Failure> {
+    Procedure::find(wanted, profile)
+        .or_else(|cause| Procedure::find(&profile.procedure, profile).map_err(|_| cause))
 }
 
 #[cfg(test)]

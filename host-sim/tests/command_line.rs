@@ -86,7 +86,7 @@ fn bad_input_is_one_line_and_status_two() {
     refused(&with(&["--procedure", "juggle"]), 2, &["juggle", "venepuncture"]);
     refused(&with(&["--procedure", broken]), 2, &["broken.toml", "line 2"]);
     refused(&with(&["--record", "/no/such/folder/a.mcap"]), 2, &["/no/such/folder/a.mcap", "--record"]);
-    refused(&with(&["--model", "xr"]), 2, &["xr", "jog"]);
+    refused(&with(&["--model", "xr", "--profile", "adult"]), 2, &["adult", "law.model is jog", "phantom"]);
     refused(&with(&["--model", "magic"]), 2, &["magic"]);
     refused(&with(&["--device", "/dev/no-such-port"]), 2, &["--fast"]);
     refused(&run(&["run", "--headless", "--seconds", "nan"]), 2, &["seconds"]);

@@ -51,6 +51,7 @@ fn called(refusal: Refusal) -> &'static str {
         Refusal::ReliefAboveElastic { .. } => "relief above elastic",
         Refusal::BeyondTravel { .. } => "beyond travel",
         Refusal::NoVessel { .. } => "no vessel",
+        Refusal::Count { .. } => "count",
         Refusal::Empty => "empty",
         Refusal::AboveCeiling { .. } => "above ceiling",
     }
@@ -69,6 +70,7 @@ fn every_refusal_and_verdict_stands_in_the_glossary() {
         Refusal::ReliefAboveElastic { layer },
         Refusal::BeyondTravel { layer },
         Refusal::NoVessel { layer },
+        Refusal::Count { field: Field::Travel, found: 1, wanted: 2 },
         Refusal::Empty,
         Refusal::AboveCeiling { force: x, ceiling: x },
     ];

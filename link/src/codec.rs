@@ -4,7 +4,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Bytes of the longest frame, its delimiter included.
-pub const MAX_FRAME: usize = 768;
+pub const MAX_FRAME: usize = 1024;
 /// CRC-32 as in Ethernet.
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 const CRC_BYTES: usize = 4;

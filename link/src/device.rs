@@ -181,6 +181,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 limits: output.limits,
                 angle: output.angle,
                 vessel: output.vessel as u8,
+                lateral: output.lateral,
             });
         }
         self.timing_due |= tick.is_multiple_of(TIMING_TICKS);
@@ -418,6 +419,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             if has(output.transitions.exit) {
                 self.event(tick, EventKind::Exit { layer });
             }
+        }
+        if output.transitions.barrier {
+            self.event(tick, EventKind::Barrier);
         }
         if output.transitions.flashback
             && let Some(layer) = (0..8).find(|&layer| self.plan.tissue(layer) == Some(Tissue::Vessel))

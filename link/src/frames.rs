@@ -111,6 +111,8 @@ pub struct Pose {
     pub angle: Milliradians,
     /// [`control_core::event::VesselState`] as a number.
     pub vessel: u8,
+    /// The force across the needle that would hold its direction; this device cannot give it.
+    pub lateral: Newtons,
 }
 
 /// Something happened.
@@ -148,6 +150,8 @@ pub enum EventKind {
     Flashback { layer: u8 },
     /// A vessel's far wall has given way: the needle has gone through.
     FarWall { layer: u8 },
+    /// The needle has been turned further from its direction of entry than the tissue around it lets it.
+    Barrier,
 }
 
 /// Why a configuration was not saved.

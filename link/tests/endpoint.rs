@@ -222,10 +222,10 @@ fn a_configuration_is_known_by_its_hash() {
 #[test]
 fn what_fits_the_longest_frame_is_encoded_and_a_byte_more_is_not() {
     let bytes = |length: usize| heapless::Vec::<u8, MAX_FRAME>::from_iter((0..length).map(|_| 1));
-    // 768 bytes: the delimiter, four of COBS, four of CRC, and two that say how many follow.
+    // 1,024 bytes: the delimiter, five of COBS, four of CRC, and two that say how many follow.
     let mut out = [0; MAX_FRAME];
-    assert_eq!(codec::encode(&bytes(MAX_FRAME - 11), &mut out), Ok(MAX_FRAME));
-    assert_eq!(codec::encode(&bytes(MAX_FRAME - 10), &mut out), Err(TooLong));
+    assert_eq!(codec::encode(&bytes(MAX_FRAME - 12), &mut out), Ok(MAX_FRAME));
+    assert_eq!(codec::encode(&bytes(MAX_FRAME - 11), &mut out), Err(TooLong));
 }
 
 /// A needle straight into the skin: lengths along it are depths.

@@ -20,7 +20,7 @@ pub mod library;
 pub mod plant;
 #[path = "../../host-sim/src/procedure.rs"]
 pub mod procedure;
-#[path = "../../host-sim/src/profile.rs"]
+#[path = "../../host-sim/src/profile/mod.rs"]
 pub mod profile;
 #[path = "../../host-sim/src/session.rs"]
 pub mod session;

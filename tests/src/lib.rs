@@ -6,6 +6,7 @@
 
 pub mod board;
 pub mod browser;
+pub mod laws;
 pub mod needle;
 pub mod pc;
 pub mod rig;

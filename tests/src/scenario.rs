@@ -27,6 +27,23 @@ pub fn venepuncture(start: Nanos) -> impl PlantSide {
     ]))
 }
 
+/// The same as far in as the deepest layer of [`crate::laws`], with a rest on the way, in nine seconds.
+#[must_use]
+pub fn deep(start: Nanos) -> impl PlantSide {
+    let mm = |depth: i64| depth * COUNTS_PER_MM;
+    let at = |tenths: u64| start + tenths * SECOND / 10;
+    plant::by_hand(plant::path(vec![
+        (start, 0),
+        (at(5), mm(-2)),
+        (at(8), mm(-2)),
+        (at(30), mm(22)),
+        (at(40), mm(22)),
+        (at(52), mm(38)),
+        (at(58), mm(38)),
+        (at(88), mm(-3)),
+    ]))
+}
+
 /// The board with the flash image on it, wired as it is meant to be.
 ///
 /// # Panics

@@ -6,8 +6,10 @@ use control_core::units::{Counts, Milliradians};
 use control_core::{Config, Controller};
 use link::Command;
 use link::frames::EventKind;
+use tests::board::plant::PlantSide;
+use tests::laws;
 use tests::pc::Pc;
-use tests::scenario::{board, venepuncture};
+use tests::scenario::{board, deep, venepuncture};
 
 /// A tick as the pins show it: the counter the firmware read, and the code it wrote before it read
 /// the counter again.
@@ -19,9 +21,39 @@ struct PinTick {
 
 #[test]
 fn the_board_writes_the_codes_that_control_core_computes() {
-    let mut board = board(venepuncture(1_000_000_000));
+    let (states, punctures) = follows(None, venepuncture(1_000_000_000));
+    for state in [State::Approach, State::Elastic, State::Friction, State::Withdrawal] {
+        assert!(states[state as usize] > 500, "{state:?} was hardly reached: {states:?}");
+    }
+    // The emulated board is tilted by 30°: the vein is 9.6 mm along the needle.
+    assert_eq!(punctures, 2, "the skin and the vein");
+}
+
+#[test]
+fn so_it_does_with_the_law_of_seed_002() {
+    let (states, punctures) = follows(Some(laws::shoulder()), deep(1_000_000_000));
+    for state in [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal] {
+        assert!(states[state as usize] > 200, "{state:?} was hardly reached: {states:?}");
+    }
+    assert_eq!(punctures, 2, "the skin and the bursa");
+}
+
+#[test]
+fn so_it_does_with_the_table_of_seed_000() {
+    let (states, _) = follows(Some(laws::phantom()), deep(1_000_000_000));
+    for state in [State::Approach, State::Friction, State::Withdrawal] {
+        assert!(states[state as usize] > 500, "{state:?} was hardly reached: {states:?}");
+    }
+}
+
+/// Runs the board and the control core beside each other; how many ticks each state counted, and how many walls gave way.
+fn follows(config: Option<Config>, hand: impl PlantSide + 'static) -> ([u32; 8], usize) {
+    let mut board = board(hand);
     let mut pc = Pc::new();
     pc.connect(&mut board);
+    if let Some(config) = &config {
+        pc.configure(&mut board, config);
+    }
     board.run_until(1_000_000_000);
     pc.listen(&mut board);
     pc.must(&mut board, Command::Start);
@@ -61,7 +93,7 @@ fn the_board_writes_the_codes_that_control_core_computes() {
         let sample = tick.checked_sub(first).and_then(|place| pc.heard.samples.get(place as usize));
         sample.map_or(0, |&(_, sample)| sample.tilt_mrad)
     };
-    let mut controller = Controller::new(Config::default().plan().expect("the default may run"));
+    let mut controller = Controller::new(config.unwrap_or_default().plan().expect("it may run"));
     let mut states = [0_u32; 8];
     for (tick, pins) in (0_u64..).zip(&ticks) {
         if tick == started {
@@ -79,12 +111,8 @@ fn the_board_writes_the_codes_that_control_core_computes() {
             assert_eq!((streamed_tick, sample), (tick, output.sample), "the sample that was streamed");
         }
     }
-    for state in [State::Approach, State::Elastic, State::Friction, State::Withdrawal] {
-        assert!(states[state as usize] > 500, "{state:?} was hardly reached: {states:?}");
-    }
     let punctures = pc.heard.events.iter().filter(|event| matches!(event.kind, EventKind::Puncture { .. }));
-    // The emulated board is tilted by 30°: the vein is 9.6 mm along the needle.
-    assert_eq!(punctures.count(), 2, "the skin and the vein");
     println!("| codes equal to control-core's | {} ticks |", ticks.len());
     println!("by state {states:?}; {:?}", pc.counts());
+    (states, punctures.count())
 }

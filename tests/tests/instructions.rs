@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use control_core::Config;
 use control_core::config::{
-    DacWidth, FrictionLaw, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall,
+    DacWidth, FrictionLaw, Law, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall,
 };
 use control_core::event::State;
 use control_core::excitation::{Excitation, MAX_LINES, Servo, Signal};
@@ -16,6 +16,7 @@ use fixed::types::{I8F24, I16F16};
 use link::Command;
 use tests::board::plant::{self, PlantSide};
 use tests::board::{Board, MILLISECOND, Nanos};
+use tests::laws;
 use tests::pc::Pc;
 use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 
@@ -27,6 +28,8 @@ const LONGEST: u32 = 850;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_020;
 const EXCITING: u32 = 890;
+/// What a tick of the laws of seeds 002 and 000 may take.
+const OTHER_LAWS: u32 = 1_260;
 const WORKING: [State; 5] =
     [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal];
 /// When the hand begins to move.
@@ -139,7 +142,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
     (0..8_u8).map(move |choice| {
         let is = |bit: u8| choice & 1 << bit != 0;
         let mut config = Config::default();
-        config.patient.friction = if is(0) { paper } else { cone };
+        config.patient.law = Law::Jog(if is(0) { paper } else { cone });
         config.patient.layers = walls(apart).into_iter().collect();
         config.device.speed = if is(1) { SpeedMethod::EdgeTiming } else { SpeedMethod::Window };
         config.device.damping = Damping(I8F24::from_num(0.0002));
@@ -204,6 +207,38 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
     let longest = profile.longest("heaviest");
     // More than is wanted, 840.
     assert!(longest <= HEAVIEST, "a tick of {longest} instructions");
+}
+
+/// In through all layers, with a rest on the way, and out, in as many layers as there may be and in fewer.
+#[test]
+fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
+    type Make = fn(usize) -> Config;
+    for (name, make, puncture) in [("sparte", laws::sparte as Make, true), ("xr", laws::xr as Make, false)] {
+        let mut profile = Profile::default();
+        for count in 1..=MAX_LAYERS {
+            let deepest = COUNTS_PER_MM * (6 * count as i64 + 2);
+            let ms = 14.0 * count as f64;
+            let moves = [
+                (0.0, 0),
+                (50.0, -2 * COUNTS_PER_MM),
+                (60.0, -2 * COUNTS_PER_MM),
+                (160.0 + ms, deepest / 2),
+                (200.0 + ms, deepest / 2),
+                (300.0 + 2.0 * ms, deepest),
+                (340.0 + 2.0 * ms, deepest),
+                (460.0 + 6.0 * ms, -2 * COUNTS_PER_MM),
+            ];
+            let hand = plant::by_hand(plant::eased(path(moves)));
+            let end = BEGIN + (480.0 + 6.0 * ms) as u64 * MILLISECOND;
+            profile.add(make(count), Command::Start, hand, end, |_, _| ());
+        }
+        for state in WORKING.into_iter().filter(|state| puncture || *state != State::Puncture) {
+            assert!(profile.by_state.contains_key(&(state as u8)), "{name}: {state:?} was not reached");
+        }
+        let longest = profile.longest(name);
+        println!("tick_instructions_longest_{name}={longest}");
+        assert!(longest <= OTHER_LAWS, "{name}: a tick of {longest} instructions");
+    }
 }
 
 /// Every signal, as much of it as there may be and its legs as short as they may be, while the motor turns to and fro.

@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex};
 
 use control_core::Config;
-use control_core::config::{FrictionLaw, Layer, Parabola, SPRING_BACK, Tissue, Wall};
+use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::{Fault, Limits};
 use control_core::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
@@ -49,7 +49,7 @@ fn stiff_wall() -> Config {
         friction: FrictionPerMillimetre(q(0.0)),
     };
     let mut config = Config::default();
-    config.patient.friction = FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) };
+    config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) });
     config.patient.layers = [layer].into_iter().collect();
     config.device.limits.stiffness = Stiffness(q(7.0));
     config

@@ -1,14 +1,13 @@
 //! From the layers of a patient to the anatomy and the forces that the tick runs.
 
-use super::{Refusal, friction_slope, largest_force, milli, plan_friction, within};
-use crate::anatomy::{self, Anatomy, SMALLEST_ANGLE};
-use crate::config::{Config, Layer, MAX_LAYERS, Parabola, Tissue, Vessel, Wall};
-use crate::jog;
-use crate::math::{reciprocal, scaled, sine};
-use crate::plan::Field;
-use crate::tissue::{Forces, Rub};
-use crate::units::{Millimetres, Newtons};
-use fixed::types::{I2F30, I8F24, I16F16, U32F32};
+use super::stiffest;
+use crate::anatomy::{self, Anatomy};
+use crate::config::{self, Config, Layer, MAX_LAYERS, Tissue, Vessel, Wall};
+use crate::law::Met;
+use crate::refusal::{Field, Refusal, milli, within};
+use crate::units::Millimetres;
+use crate::wall::Parabola;
+use fixed::types::{I16F16, U32F32};
 use heapless::Vec;
 
 /// A force that appears at contact all at once is felt as a hit and rings: at most 0.05 N.
@@ -16,33 +15,21 @@ const LARGEST_CONTACT_STEP: I16F16 = I16F16::from_bits(3_277);
 /// A vessel that the needle would see less of is passed beside: 0.2 mm.
 const LEAST_LUMEN: I16F16 = I16F16::from_bits(13_107);
 
-/// A layer as the needle meets it.
-#[derive(Clone, Copy)]
-struct Met {
-    number: u8,
-    layer: Layer,
+/// What the needle meets: its layers, and how it comes to the vessel.
+pub(super) struct Meeting {
+    pub(super) layers: Vec<Met, MAX_LAYERS>,
+    vessel: Option<anatomy::Vessel>,
 }
 
-/// Checks the layers of `config` and prepares them.
-pub(super) fn plan(config: &Config) -> Result<(Anatomy, Forces), Refusal> {
-    check_layers(config)?;
-    let (met, vessel) = met(config)?;
-    check_forces(config, &met)?;
-    let mut anatomy =
-        Anatomy { vessel, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
-    let mut forces = Forces {
+/// Prepares what has been checked.
+pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
+    let mut anatomy = Anatomy {
+        vessel: met.vessel,
+        skin_tilt: config.device.skin_tilt.0,
+        layers: Vec::new(),
         walls: Vec::new(),
-        rubs: Vec::new(),
-        walls_that_close: 0,
-        friction: plan_friction(&config.patient.friction),
     };
-    let mut above: Option<(&Layer, I16F16)> = None;
-    for (index, Met { number, layer }) in met.iter().enumerate() {
-        let rub_above = above.map_or(I16F16::ZERO, |(last, rub)| {
-            let thickness = layer.depth.0.saturating_sub(last.depth.0);
-            rub.saturating_add(thickness.saturating_mul(last.friction.0))
-        });
-        above = Some((layer, rub_above));
+    for (index, Met { number, layer }) in met.layers.iter().enumerate() {
         // All vectors hold MAX_LAYERS: no push can fail.
         let _ = anatomy.layers.push(anatomy::Layer {
             number: *number,
@@ -50,9 +37,6 @@ pub(super) fn plan(config: &Config) -> Result<(Anatomy, Forces), Refusal> {
             walls_above: anatomy.walls.len(),
             has_wall: layer.wall.is_some(),
         });
-        let _ = forces
-            .rubs
-            .push(Rub { per_mm: I2F30::saturating_from_num(layer.friction.0), above: Newtons(rub_above) });
         if let Some(wall) = &layer.wall {
             let relief = wall.relief.vertex.0.saturating_sub(wall.puncture_travel.0);
             let left = wall.spring_back.saturating_mul(wall.puncture_travel.0);
@@ -62,11 +46,9 @@ pub(super) fn plan(config: &Config) -> Result<(Anatomy, Forces), Refusal> {
                 relieved: wall.relief.vertex.0,
                 indented_per_mm: left.saturating_div(relief),
             });
-            let _ = forces.walls.push(jog::Wall::new(wall));
         }
     }
-    forces.walls_that_close = forces.walls.len().min(1);
-    Ok((anatomy, forces))
+    anatomy
 }
 
 fn check_layers(config: &Config) -> Result<(), Refusal> {
@@ -119,19 +101,23 @@ fn vessel_walls(config: &Config) -> Result<Option<(usize, Option<usize>)>, Refus
 
 /// The layers that the needle meets: without a vessel that it passes beside, and with one as high as it is where the needle
 /// goes through.
-fn met(config: &Config) -> Result<(Vec<Met, MAX_LAYERS>, Option<anatomy::Vessel>), Refusal> {
+pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
+    check_layers(config)?;
     let layers = &config.patient.layers;
     let mut met: Vec<Met, MAX_LAYERS> =
         (0..).zip(layers).map(|(number, layer)| Met { number, layer: *layer }).collect();
-    let Some((near, far)) = vessel_walls(config)? else { return Ok((met, None)) };
+    let Some((near, far)) = vessel_walls(config)? else { return Ok(Meeting { layers: met, vessel: None }) };
     let through = anatomy::Vessel::Met { near, far };
-    let (Some(shape), Some(far)) = (config.patient.vessel, far) else { return Ok((met, Some(through))) };
+    let (Some(shape), Some(far)) = (config.patient.vessel, far) else {
+        return Ok(Meeting { layers: met, vessel: Some(through) });
+    };
     let depth = |index: usize| layers.get(index).map_or(I16F16::ZERO, |layer| layer.depth.0);
     let height = depth(far).saturating_sub(depth(near));
     let lumen = height.saturating_mul(chord(&shape)?);
     if lumen < LEAST_LUMEN {
         met.retain(|met| !anatomy::is_vessel_wall(met.layer.tissue));
-        return Ok((met, Some(anatomy::Vessel::Beside { depth: Millimetres(depth(near)) })));
+        let vessel = Some(anatomy::Vessel::Beside { depth: Millimetres(depth(near)) });
+        return Ok(Meeting { layers: met, vessel });
     }
     let lower = (height - lumen) / 2;
     for (index, sign) in [(near, I16F16::ONE), (far, I16F16::NEG_ONE)] {
@@ -139,7 +125,7 @@ fn met(config: &Config) -> Result<(Vec<Met, MAX_LAYERS>, Option<anatomy::Vessel>
             met.layer.depth.0 = met.layer.depth.0.saturating_add(lower.saturating_mul(sign));
         }
     }
-    Ok((met, Some(through)))
+    Ok(Meeting { layers: met, vessel: Some(through) })
 }
 
 /// How much of its height a needle sees that passes beside the axis, √(1 − (2·offset/width)²).
@@ -160,22 +146,22 @@ fn check_wall(wall: &Wall, layer: u8, config: &Config) -> Result<(), Refusal> {
         check_parabola(parabola)?;
     }
     within(Field::PunctureTravel, wall.puncture_travel.0, milli(50), milli(30_000))?;
-    within(Field::UnloadStiffness, wall.unload.0, milli(50), config.device.limits.stiffness.0)?;
+    within(Field::UnloadStiffness, wall.unload.0, milli(50), stiffest(config))?;
     within(Field::SpringBack, wall.spring_back, I16F16::ZERO, I16F16::ONE)?;
     if wall.elastic.vertex.0 > I16F16::ZERO || wall.relief.vertex.0 <= wall.puncture_travel.0 {
         return Err(Refusal::WrongWay { layer });
     }
-    let limit = config.device.limits.stiffness.0;
+    let limit = stiffest(config);
     let slope = wall.puncture_travel.0.saturating_sub(wall.elastic.vertex.0).saturating_mul_int(2);
     let slope = slope.saturating_div(wall.elastic.compliance.0);
     // Inside tissue the needle feels the wall and the hold of friction together.
-    let hold = friction_slope(&config.patient.friction);
+    let hold = config.patient.law.hold();
     let slope =
         if layer > 0 { slope.saturating_add(hold) } else { slope }.max(wall.unload.0.saturating_add(hold));
     if slope > limit {
         return Err(Refusal::TooStiff { layer, slope, limit });
     }
-    let (elastic, relief) = (jog::Parabola::new(&wall.elastic), jog::Parabola::new(&wall.relief));
+    let (elastic, relief) = (Parabola::new(&wall.elastic), Parabola::new(&wall.relief));
     let step = elastic.force(Millimetres::default()).0;
     if step.unsigned_abs() > LARGEST_CONTACT_STEP.unsigned_abs() {
         return Err(Refusal::ContactStep { layer, force: step });
@@ -186,49 +172,8 @@ fn check_wall(wall: &Wall, layer: u8, config: &Config) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn check_parabola(parabola: &Parabola) -> Result<(), Refusal> {
+fn check_parabola(parabola: &config::Parabola) -> Result<(), Refusal> {
     within(Field::Compliance, parabola.compliance.0, milli(50), milli(1_000_000))?;
     within(Field::PunctureTravel, parabola.vertex.0, milli(-30_000), milli(100_000))?;
     within(Field::BaseForce, parabola.base.0, milli(-20_000), milli(20_000))
-}
-
-/// At whatever angle: each wall with the friction up to it, and friction at the end of the travel. The flatter the needle,
-/// the longer its way through each layer, and the force is largest where the next layer is just out of reach.
-fn check_forces(config: &Config, met: &[Met]) -> Result<(), Refusal> {
-    let travel = config.device.limits.travel.0;
-    let flattest = reciprocal(sine(SMALLEST_ANGLE));
-    let just_reached = met.iter().map(|met| reaching(travel, met.layer.depth.0).min(flattest));
-    for stretch in just_reached.chain([I8F24::ONE, flattest]) {
-        check_forces_at(config, met, stretch)?;
-    }
-    Ok(())
-}
-
-/// The stretch at which `depth` lies at `travel` along the needle, no less than 1.
-fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
-    let wide = (i64::from(travel.to_bits()) << 24) / i64::from(depth.to_bits().max(1));
-    I8F24::saturating_from_num(fixed::types::I40F24::from_bits(wide)).max(I8F24::ONE)
-}
-
-/// The same with layers met at `stretch` times their depth.
-fn check_forces_at(config: &Config, met: &[Met], stretch: I8F24) -> Result<(), Refusal> {
-    let (travel, limit) = (config.device.limits.travel.0, largest_force(config));
-    let along = |depth: I16F16| I16F16::from_bits(scaled(depth.to_bits(), stretch.to_bits(), 24));
-    let (mut friction, mut at, mut per_mm, mut deepest) = (I16F16::ZERO, I16F16::ZERO, I16F16::ZERO, 0);
-    for Met { number, layer } in met {
-        let top = along(layer.depth.0);
-        if top > travel {
-            break;
-        }
-        friction = friction.saturating_add(top.saturating_sub(at).saturating_mul(per_mm));
-        (at, per_mm, deepest) = (top, layer.friction.0, *number);
-        let peak =
-            layer.wall.as_ref().map(|wall| jog::Parabola::new(&wall.elastic).force(wall.puncture_travel));
-        let force = friction.saturating_add(peak.unwrap_or_default().0);
-        if force > limit {
-            return Err(Refusal::TooStrong { layer: *number, force, limit });
-        }
-    }
-    let force = friction.saturating_add(travel.saturating_sub(at).saturating_mul(per_mm));
-    if force > limit { Err(Refusal::TooStrong { layer: deepest, force, limit }) } else { Ok(()) }
 }

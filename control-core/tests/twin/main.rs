@@ -4,7 +4,7 @@
 mod model;
 
 use control_core::config::{
-    Config, DacWidth, Device, FrictionLaw, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SafetyConfig,
+    Config, DacWidth, Device, FrictionLaw, Law, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SafetyConfig,
     SpeedMethod, Tissue, Wall,
 };
 use control_core::event::{Fault, State};
@@ -145,10 +145,9 @@ fn valid_config() -> impl Strategy<Value = (Config, Plan)> {
                     ..device
                 },
                 patient: Patient {
-                    largest_force: None,
-                    friction,
+                    law: Law::Jog(friction),
                     layers: layers.into_iter().collect(),
-                    vessel: None,
+                    ..Patient::default()
                 },
             })
         });

@@ -1,7 +1,7 @@
 //! The floating-point twin of the whole tick, written from the equations (seed 001 and the force laws of the design), not
 //! from the fixed-point code. It takes the configuration's own quantised values as exact.
 
-use control_core::config::{Config, FrictionLaw, Parabola, SpeedMethod};
+use control_core::config::{Config, FrictionLaw, Law, Parabola, SpeedMethod};
 use control_core::event::Transitions;
 use control_core::units::Milliradians;
 
@@ -232,7 +232,8 @@ impl Twin {
             self.anchor = depth;
             return 0.0;
         }
-        match self.config.patient.friction {
+        let Law::Jog(friction) = self.config.patient.law else { panic!("the jog law's twin") };
+        match friction {
             FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => {
                 let follow = 1.0 - (-0.1 / f64::from(anchor_ms)).exp();
                 self.anchor += (depth - self.anchor) * follow;

@@ -13,7 +13,7 @@ use host_sim::driver::Driver;
 use host_sim::failure::Failure;
 use host_sim::pace::Pace;
 use host_sim::procedure::Procedure;
-use host_sim::profile::Profile;
+use host_sim::profile::{Model, Profile};
 use host_sim::recording::messages::Setup;
 use host_sim::recording::write::Recorder;
 use host_sim::session::{self, Session, Source};
@@ -32,24 +32,27 @@ use std::sync::atomic::AtomicBool;
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim run --profile firm-skin
+  host-sim run --model sparte
   host-sim run --device /dev/ttyACM0 --record session.mcap
   host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Run {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// What the scripted hand does: venepuncture, slow, or a TOML file like those in host-sim/procedures
-    #[arg(long, default_value = "venepuncture", value_name = "NAME|FILE")]
-    procedure: String,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, or a TOML file like those in host-sim/profiles
-    #[arg(long, default_value = "adult", value_name = "NAME|FILE")]
-    profile: String,
+    /// What the scripted hand does: venepuncture, slow, shoulder-straight, insertion-5mms-60deg …, or a TOML file like those in
+    /// host-sim/procedures; without it, what the patient's file says
+    #[arg(long, value_name = "NAME|FILE")]
+    procedure: Option<String>,
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, shoulder, phantom, or a TOML file like those in
+    /// host-sim/profiles; without it, adult, or the one that is made for --model
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
     /// How the device is built: a TOML file as commissioning writes it; without it, a real device keeps what it has
     #[arg(long, value_name = "FILE")]
     device_config: Option<PathBuf>,
-    /// The force model
-    #[arg(long, value_enum, default_value_t = Model::Jog)]
-    model: Model,
+    /// The law of force; the patient's must be the same
+    #[arg(long, value_enum)]
+    model: Option<ModelName>,
     /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the patient's
     #[arg(long, value_name = "DEG")]
     angle: Option<f64>,
@@ -78,13 +81,23 @@ pub(crate) struct Run {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Model {
-    /// The jog effect and friction cone of the venepuncture device.
+enum ModelName {
+    /// The jog effect and friction cone of the venepuncture device, seed 001.
     Jog,
-    /// Not built yet: cutting and LuGre friction of the joint injection simulator.
+    /// Tracking walls and LuGre friction of the joint injection simulator, seed 002.
     Sparte,
-    /// Not built yet: the fitted force table of the layered-tissue simulator.
+    /// The fitted force table of the layered-tissue simulator, seed 000.
     Xr,
+}
+
+impl From<ModelName> for Model {
+    fn from(name: ModelName) -> Self {
+        match name {
+            ModelName::Jog => Model::Jog,
+            ModelName::Sparte => Model::Sparte,
+            ModelName::Xr => Model::Xr,
+        }
+    }
 }
 
 impl Run {
@@ -97,12 +110,13 @@ impl Run {
             part.device.commissioned = true;
         }
         let device = part.as_ref().map_or_else(Device::default, |part| part.device);
-        let profile = Profile::find_for(&self.profile, &device)?;
+        let profile = self.find_profile(&device)?;
         let profile = match self.angle {
             Some(degrees) => profile.at_angle(degrees)?,
             None => profile,
         };
-        let procedure = Procedure::find(&self.procedure, &profile)?;
+        let wanted = self.procedure.clone().unwrap_or_else(|| profile.procedure.clone());
+        let procedure = Procedure::find(&wanted, &profile)?;
         let mut serial = if is_virtual { None } else { Some(SerialPort::find(&self.device)?) };
 
         let source = if is_virtual { Source::Virtual } else { Source::Serial { path: self.device.clone() } };
@@ -120,7 +134,7 @@ impl Run {
             procedure: shown_procedure,
             device_toml: part.as_ref().map(|part| part.source.text.clone()),
         };
-        let hand = is_virtual.then(|| self.procedure.clone());
+        let hand = is_virtual.then(|| wanted.clone());
         let bedside = Bedside::new(profile.clone(), source, hand, setup.clone());
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
@@ -156,20 +170,28 @@ impl Run {
         Ok(())
     }
 
+    /// The patient that was asked for, or the one that is made for the law that was.
+    fn find_profile(&self, device: &Device) -> Result<Profile, Failure> {
+        let model = self.model.map(Model::from);
+        let usual = model.unwrap_or(Model::Jog).patient();
+        let profile = Profile::find_for(self.profile.as_deref().unwrap_or(usual), device)?;
+        let its = profile.model();
+        match model.filter(|model| *model != its) {
+            None => Ok(profile),
+            Some(model) => Err(Failure::input(format_args!(
+                "{}: law.model is {} and --model asks for {}; leave --model out, or choose a patient with that law, such as {}",
+                profile.source.origin,
+                its.name(),
+                model.name(),
+                model.patient()
+            ))),
+        }
+    }
+
     /// What clap cannot check.
     fn check(&self) -> Result<Option<f64>, Failure> {
         self.streams.check()?;
         self.class.check()?;
-        let not_yet = |name: &str| {
-            Err(Failure::input(format_args!(
-                "--model {name} is not built yet: only the jog effect and the friction cone are; use --model jog"
-            )))
-        };
-        match self.model {
-            Model::Jog => {}
-            Model::Sparte => return not_yet("sparte"),
-            Model::Xr => return not_yet("xr"),
-        }
         if self.angle.is_some() && self.device != "virtual" {
             return Err(Failure::input(
                 "--angle is for the virtual device: a real needle is turned by a hand",

@@ -27,6 +27,11 @@ impl Curve {
         }
     }
 
+    /// Place of the last knot.
+    pub fn end(&self) -> f64 {
+        self.first + self.values.len().saturating_sub(1) as f64 * self.step
+    }
+
     /// At each knot the value of the straight line that fits the points within a step of it best, nearer ones counting more (local linear
     /// regression with a triangular kernel, Fan and Gijbels 1996): a fall touches no knot but the nearest, where least squares over all knots
     /// at once would ring. Knots that no point is near lie on a straight line between their neighbours, at the ends level with them.

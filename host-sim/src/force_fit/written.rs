@@ -1,7 +1,8 @@
 //! A fitted table as TOML, for the `[force_table]` of a profile.
 
 use super::Fit;
-use super::table::Origin;
+use super::table::{Cell, Origin};
+use control_core::config::MAX_DEPTHS;
 use std::fmt::Write as _;
 
 /// The table, and above it what it rests on.
@@ -21,17 +22,25 @@ pub fn toml(fit: &Fit) -> String {
         let how = if origin == Origin::Separable { "separable" } else { "the nearest cell" };
         let _ = writeln!(out, "# No data at {speed:.2} mm/s and {angle:.1} degrees: {how}.");
     }
-    let knots = table.cells.iter().flatten().next().map(|cell| &cell.force);
+    let deepest = table.cells.iter().flatten().map(|cell| cell.force.end()).fold(0.0, f64::max);
+    // The control law has room for so many depths and takes no pull for a push.
+    let step = deepest / (MAX_DEPTHS - 1) as f64;
+    let row =
+        |cell: &Cell| (0..MAX_DEPTHS).map(|k| cell.force.at(k as f64 * step).max(0.0)).collect::<Vec<_>>();
     let numbers = |values: &[f64], decimals: usize| {
         values.iter().map(|v| format!("{v:.decimals$}")).collect::<Vec<_>>().join(", ")
     };
     let _ = writeln!(out, "[force_table]");
-    let _ = writeln!(out, "depth_step_mm = {:.5}", knots.map_or(0.0, |k| k.step));
+    let _ = writeln!(out, "depth_step_mm = {:.5}", step);
     let _ = writeln!(out, "speeds_mm_s = [{}]", numbers(&table.speeds_mm_s, 3));
     let _ = writeln!(out, "angles_deg = [{}]", numbers(&table.angles_deg, 2));
+    let cells = table.cells.iter().flatten();
+    let measured =
+        cells.clone().map(|cell| (cell.origin == Origin::Measured).to_string()).collect::<Vec<_>>();
+    let _ = writeln!(out, "measured = [{}]", measured.join(", "));
     out.push_str("# A line for every speed and angle, the angles of a speed together; the values are at 0, 1, 2 … steps of depth.\nforce_n = [\n");
-    for cell in table.cells.iter().flatten() {
-        let _ = writeln!(out, "  [{}],", numbers(&cell.force.values, 4));
+    for cell in cells {
+        let _ = writeln!(out, "  [{}],", numbers(&row(cell), 4));
     }
     out.push_str("]\n");
     out

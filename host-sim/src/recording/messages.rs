@@ -104,6 +104,9 @@ pub struct Pose {
     /// Where the tip was as seen from the vessel, by its number.
     #[serde(default)]
     pub vessel: u8,
+    /// Force across the needle that would have held its direction.
+    #[serde(default)]
+    pub lateral_n: f64,
 }
 
 /// Totals of the link since the session began.
@@ -251,6 +254,7 @@ impl From<&frames::Pose> for Pose {
             limits: pose.limits.0,
             angle_mrad: pose.angle.0,
             vessel: pose.vessel,
+            lateral_n: pose.lateral.0.to_num(),
         }
     }
 }
@@ -268,6 +272,7 @@ impl Pose {
             limits: Limits(self.limits),
             angle: Milliradians(self.angle_mrad),
             vessel: self.vessel,
+            lateral: Newtons(held(self.lateral_n)),
         }
     }
 }

@@ -64,6 +64,12 @@ impl Trace {
         ((seconds * f64::from(TICK_HZ)) as usize).min(self.len().saturating_sub(1))
     }
 
+    /// Index at which the tip comes within 0.5 mm of the deepest place: before it rests there.
+    pub(super) fn nearly_deepest(&self) -> usize {
+        let depth = self.depth_at(self.deepest()) - 0.5;
+        (0..self.len()).find(|index| self.depth_at(*index) >= depth).unwrap_or(0)
+    }
+
     /// Index of the deepest place.
     pub(super) fn deepest(&self) -> usize {
         (0..self.len()).max_by_key(|index| self.stretch.samples[*index].count).unwrap_or(0)

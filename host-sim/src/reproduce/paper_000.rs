@@ -33,7 +33,7 @@ impl Cut {
 }
 
 pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
-    let profile = Profile::find("adult")?;
+    let profile = Profile::find("phantom")?;
     let mut cuts = Vec::new();
     for (speed, angle) in SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a))) {
         let procedure = Procedure::find(&format!("insertion-{speed}mms-{angle}deg"), &profile)?;
@@ -47,8 +47,8 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
          without numbers in the text. Its curves count here as shape only.",
     );
     sheet.paragraph(
-        "Run on the adult's antecubital vein with the jog law of seed 001, whose force does not depend on speed: the table's law is not in the \
-         control core yet. Protocol, layers, vessel test and the fit of a table are those of the paper.",
+        "Run on the patient phantom with the law xr, a table over depth, speed and angle. The table's forces are assumptions of ours, as the \
+         patient's file says: the paper prints none. Protocol, layers, vessel test and the fit of a table are those of the paper.",
     );
     sheet.heading("Numbers");
     let mut rows = rows(&profile, &cuts);

@@ -11,7 +11,7 @@ use crate::session::{Source, tissue_name};
 use crate::sheet::chart::{Chart, Curve};
 use crate::sheet::section::{Section, Way};
 use crate::sheet::{Sheet, decimal};
-use control_core::config::Tissue;
+use control_core::config::{Law, Tissue};
 use std::path::Path;
 
 /// Cutting forces that the paper prints, N.
@@ -31,12 +31,7 @@ const INJECTIONS: [(&str, &str); 2] = [
 ];
 
 pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
-    let profile = Profile::find("shoulder").map_err(|_| {
-        Failure::failed(
-            "paper 002 cannot be reproduced yet: its cutting forces need the law sparte and the patient shoulder, which this program does not \
-             have; ask for --paper 000 or 001",
-        )
-    })?;
+    let profile = Profile::find("shoulder")?;
     let traces = INJECTIONS
         .iter()
         .map(|(name, _)| {
@@ -49,6 +44,12 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         "The paper prints one force for each layer and the largest force of its device. Its figures of the two injections have no numbers in \
          the text; here both are run, on the same layers.",
     );
+    sheet.paragraph(&format!(
+        "The motor is weaker than the paper's device: all forces are given to the hand at {} of the law's, as the patient's file declares. The numbers \
+         below are the law's: what the hand felt over that share, and for cutting less the {} N of friction along the shaft.",
+        decimal(scale(&profile), 2),
+        decimal(friction_n(&profile), 2),
+    ));
     sheet.heading("Numbers");
     numbers(&mut sheet, &rows(&profile, &traces));
     sheet.heading("Fig. 5 and 6: both injections");
@@ -77,6 +78,21 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     Ok(sheet)
 }
 
+/// The share of the law's forces that the hand is given.
+fn scale(profile: &Profile) -> f64 {
+    profile.config.patient.scale.to_num()
+}
+
+/// Friction along the shaft at the injections' 6 mm/s, N: past the Stribeck speed no more than sliding.
+fn friction_n(profile: &Profile) -> f64 {
+    match &profile.config.patient.law {
+        Law::Sparte(law) => {
+            law.friction.sliding.0.to_num::<f64>() + 6.0 * law.friction.viscous.0.to_num::<f64>()
+        }
+        Law::Jog(_) | Law::Xr(_) => 0.0,
+    }
+}
+
 fn number(profile: &Profile, tissue: Tissue) -> Option<u8> {
     profile.config.patient.layers.iter().position(|l| l.tissue == tissue).map(|at| at as u8)
 }
@@ -94,14 +110,19 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
         rows.push(row(
             &format!("cutting force, {name} (way in of both injections)"),
             &said,
-            each(&|t| plateau_in(t, layer)),
+            each(&|t| plateau_in(t, layer).map(|n| n / scale(profile) - friction_n(profile))),
             Whose::Papers,
         ));
     }
     for (tissue, _) in CUTTING {
         let Some(layer) = number(profile, tissue) else { continue };
         let what = format!("force on the way out, {} (both injections)", tissue_name(tissue));
-        rows.push(row(&what, "opposite direction", each(&|t| plateau_out(t, layer)), Whose::NoneGiven));
+        rows.push(row(
+            &what,
+            "opposite direction",
+            each(&|t| plateau_out(t, layer).map(|n| n / scale(profile))),
+            Whose::NoneGiven,
+        ));
     }
     let largest = profile.plan.largest_force().0.to_num::<f64>();
     rows.push(row(
@@ -113,11 +134,13 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
     rows
 }
 
-/// Mean force between the contact with a layer on the last way in and with the next one, its first third left out; N.
+/// Mean force in the last third of the time between the contact with a layer on the last way in and with the next one, N. In the
+/// innermost it ends before the needle rests, where cutting gives way to sliding.
 fn plateau_in(trace: &Trace, layer: u8) -> Option<f64> {
     let deepest = trace.deepest();
     let begin = trace.last_event(deepest, is_contact_with(layer))?;
-    let end = trace.event(begin, is_contact_with(layer + 1)).unwrap_or(deepest).min(deepest);
+    let end =
+        trace.event(begin, is_contact_with(layer + 1)).unwrap_or_else(|| trace.nearly_deepest()).min(deepest);
     trace.mean_n(begin + (end - begin) * 2 / 3..end)
 }
 

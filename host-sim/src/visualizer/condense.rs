@@ -114,6 +114,7 @@ impl Condenser {
             tilt_rad: f64::from(pose.tilt.0) / 1000.0,
             angle_rad: f64::from(pose.angle.0) / 1000.0,
             vessel: vessel_name(pose.vessel),
+            lateral_n: fine(pose.lateral.0.to_num()),
             state: state_name(pose.state),
             limits: pose.limits.0,
         }
@@ -132,6 +133,7 @@ impl Condenser {
             EventKind::NotSaved { cause } => ("not_saved", None, Some(cause.to_string()), None),
             EventKind::Flashback { layer } => ("flashback", Some(layer), None, None),
             EventKind::FarWall { layer } => ("far_wall", Some(layer), None, None),
+            EventKind::Barrier => ("barrier", None, None, None),
         };
         messages::Event {
             t_s: self.seconds(event.tick),
@@ -245,6 +247,7 @@ mod tests {
             limits: Limits::default(),
             angle: Milliradians(0),
             vessel: 0,
+            lateral: Newtons::default(),
         }
     }
 

@@ -80,6 +80,8 @@ pub struct Pose {
     pub angle_rad: f64,
     /// Where the tip is as seen from the vessel: `outside`, `touching`, `in_lumen`, `through`, `beside` or `unknown`.
     pub vessel: &'static str,
+    /// The force across the needle that would hold its direction, in N; no motor gives it.
+    pub lateral_n: f64,
     /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault` or `unknown`.
     pub state: &'static str,
     /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity.
@@ -109,7 +111,7 @@ impl Range {
 pub struct Event {
     /// When, in s.
     pub t_s: f64,
-    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`, `flashback`, `far_wall` or `other`.
+    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`, `flashback`, `far_wall`, `barrier` or `other`.
     pub kind: &'static str,
     /// The layer it is about, outermost 0.
     pub layer: Option<u8>,

@@ -1,10 +1,11 @@
 //! The jog effect of a wall (seed 001, eq. 1): it resists along a rising parabola, gives way, and relieves along a
 //! falling one that is felt only while the tip cuts on.
 
-use crate::config;
 use crate::math::{product, scaled, upper_half};
+use crate::tissue::{self, MAX_LAYERS};
 use crate::units::{Millimetres, Newtons};
 use fixed::types::{I9F23, I16F16};
+use heapless::Vec;
 
 /// A parabola ready for the tick. `(x − n)²/a` is computed as `((x − n)/√a)²`: two multiplications, and precise for a
 /// soft wall and a hard one alike.
@@ -18,7 +19,7 @@ pub(crate) struct Parabola {
 
 impl Parabola {
     /// `config.compliance` is at least 0.05 mm²/N; [`crate::plan`] has seen to it.
-    pub(crate) fn new(config: &config::Parabola) -> Self {
+    pub(crate) fn new(config: &tissue::Parabola) -> Self {
         let compliance = u64::from(config.compliance.0.to_bits().unsigned_abs().max(3_277));
         // a is a·2^16 here, so 2^62/a is (1/a)·2^46, whose root is Q23.
         let root = ((1_u64 << 62) / compliance).isqrt();
@@ -79,7 +80,7 @@ impl Cut {
 
 impl Wall {
     /// As [`crate::plan`] has checked it.
-    pub(crate) fn new(config: &config::Wall) -> Self {
+    pub(crate) fn new(config: &tissue::Wall) -> Self {
         Self {
             elastic: Parabola::new(&config.elastic),
             relief: Parabola::new(&config.relief),
@@ -109,4 +110,9 @@ impl Wall {
         let unloaded = I16F16::from_bits(upper_half(drawn_back_q20, self.unload_q28));
         Newtons(cut.force.0.saturating_sub(unloaded).max(I16F16::ZERO))
     }
+}
+
+/// Those of `layers` that have one, outermost first.
+pub(crate) fn all<'a>(layers: impl Iterator<Item = &'a tissue::Layer>) -> Vec<Wall, MAX_LAYERS> {
+    layers.filter_map(|layer| layer.wall.as_ref()).map(Wall::new).collect()
 }

@@ -69,6 +69,15 @@ pub enum Refusal {
         /// The layer that is out of place.
         layer: u8,
     },
+    /// There are more or fewer of something than there must be.
+    Count {
+        /// What.
+        field: Field,
+        /// How many there are.
+        found: u16,
+        /// How many there must be.
+        wanted: u16,
+    },
     /// There is no layer.
     Empty,
     /// The patient asks for more than the device's torque ceiling gives.
@@ -120,6 +129,23 @@ pub enum Field {
     DacZero,
     LargestForce,
     SpringBack,
+    Scale,
+    TrackingStiffness,
+    RelaxMs,
+    BristleStiffness,
+    BristleDamping,
+    ViscousFriction,
+    SlidingFriction,
+    StickingFriction,
+    StribeckSpeed,
+    LateralForce,
+    LargestAngle,
+    CuttingForce,
+    Withdrawal,
+    TableDepth,
+    TableSpeed,
+    TableAngle,
+    TableForce,
     VesselWidth,
     VesselOffset,
 }
@@ -170,7 +196,29 @@ impl fmt::Display for Refusal {
                 f,
                 "layer {layer} is no vessel's: let one vessel and then its far wall follow one another, and no other"
             ),
+            Refusal::Count { field, found, wanted } => {
+                write!(f, "there are {found} values of {field:?}; there must be {wanted}")
+            }
             Refusal::Empty => f.write_str("there is no layer; add one"),
         }
     }
+}
+
+/// Refuses what lies outside its range.
+pub(crate) fn within(field: Field, value: I16F16, low: I16F16, high: I16F16) -> Result<(), Refusal> {
+    if value < low || value > high { Err(Refusal::OutOfRange { field, value, low, high }) } else { Ok(()) }
+}
+
+/// As many of something as there must be.
+pub(crate) fn count(field: Field, found: usize, wanted: usize) -> Result<(), Refusal> {
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(Refusal::Count { field, found: found as u16, wanted: wanted as u16 })
+    }
+}
+
+/// Q16 of thousandths, for ranges.
+pub(crate) const fn milli(thousandths: i64) -> I16F16 {
+    I16F16::from_bits((thousandths * 65_536 / 1000) as i32)
 }

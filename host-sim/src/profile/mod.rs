@@ -2,21 +2,29 @@
 //! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
 //! refuses is refused here too.
 
+mod law;
+mod person;
+
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::session::{Scene, SceneLayer, SceneVessel, Source, tissue_name};
-use control_core::config::{self, Config, FrictionLaw, Tissue};
+use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan, plan};
 use fixed::types::I16F16;
 use serde::Deserialize;
 
+pub use law::Model;
+pub use person::{Difficulty, Person, Sex, Site};
+
 /// The profiles that come with the program.
-pub const BUILT_IN: [(&str, &str); 4] = [
-    ("adult", include_str!("../profiles/adult.toml")),
-    ("thin-elderly", include_str!("../profiles/thin-elderly.toml")),
-    ("high-body-mass", include_str!("../profiles/high-body-mass.toml")),
-    ("firm-skin", include_str!("../profiles/firm-skin.toml")),
+pub const BUILT_IN: [(&str, &str); 6] = [
+    ("adult", include_str!("../../profiles/adult.toml")),
+    ("thin-elderly", include_str!("../../profiles/thin-elderly.toml")),
+    ("high-body-mass", include_str!("../../profiles/high-body-mass.toml")),
+    ("firm-skin", include_str!("../../profiles/firm-skin.toml")),
+    ("shoulder", include_str!("../../profiles/shoulder.toml")),
+    ("phantom", include_str!("../../profiles/phantom.toml")),
 ];
 
 /// A profile that may run.
@@ -30,6 +38,10 @@ pub struct Profile {
     pub config: Config,
     /// The same, checked.
     pub plan: Plan,
+    /// Whom it stands for.
+    pub person: Person,
+    /// What a scripted hand does in it unless it is asked to do something else.
+    pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
     /// The text that it came from, for recordings.
@@ -60,18 +72,26 @@ impl Profile {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
         check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
-        let config = Config { device: *device, patient: file.patient().map_err(refuse)? };
+        file.patient.check().map_err(refuse)?;
+        let config = Config { device: *device, patient: file.config().map_err(refuse)? };
         let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
         let spared =
             (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
         Ok(Self {
             spared: spared.collect(),
+            procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
+            person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),
             config,
             plan,
             source,
         })
+    }
+
+    /// Its law of force.
+    pub fn model(&self) -> Model {
+        Model::of(&self.config.patient.law)
     }
 
     /// What a picture needs to know.
@@ -182,7 +202,14 @@ struct File {
     entry_deg: f64,
     /// In N; without it, as much as the device gives.
     largest_force_n: Option<f64>,
-    friction: Option<Friction>,
+    /// Share of the law's forces that is given to the hand, where the motor is too weak for them.
+    force_scale: Option<f64>,
+    procedure: Option<String>,
+    #[serde(default)]
+    patient: Person,
+    law: Option<law::Table>,
+    friction: Option<law::Friction>,
+    force_table: Option<law::Forces>,
     layer: Vec<Layer>,
     vessel: Option<Vessel>,
 }
@@ -196,13 +223,6 @@ struct Vessel {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields, tag = "law", rename_all = "kebab-case")]
-enum Friction {
-    Paper { level_length_mm: f64, level_cap: f64, anchor_ms: u16, stiffness_n_per_mm: f64, limit_n: f64 },
-    Cone { stiffness_n_per_mm: f64 },
-}
-
-#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
@@ -210,7 +230,10 @@ struct Layer {
     spare: Option<bool>,
     depth_mm: f64,
     wall: Option<Wall>,
-    friction_n_per_mm: f64,
+    /// Of the jog law.
+    friction_n_per_mm: Option<f64>,
+    /// Of the law of seed 002.
+    cutting: Option<law::Cut>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -269,7 +292,7 @@ pub(crate) fn fix(key: &str, value: f64) -> Result<I16F16, String> {
 }
 
 impl File {
-    fn patient(&self) -> Result<Patient, String> {
+    fn config(&self) -> Result<Patient, String> {
         let mut patient = Patient::default();
         patient.layers.clear();
         for layer in &self.layer {
@@ -287,29 +310,17 @@ impl File {
                 offset: Millimetres(fix("offset_mm", vessel.offset_mm)?),
             }),
         };
-        if let Some(friction) = &self.friction {
-            patient.friction = friction.law()?;
+        if let Some(scale) = self.force_scale {
+            patient.scale = fix("force_scale", scale)?;
         }
+        patient.law = law::law(
+            self.law.as_ref(),
+            self.friction.as_ref(),
+            self.force_table.as_ref(),
+            &self.layer,
+            &patient.law,
+        )?;
         Ok(patient)
-    }
-}
-
-impl Friction {
-    fn law(&self) -> Result<FrictionLaw, String> {
-        Ok(match *self {
-            Friction::Paper { level_length_mm, level_cap, anchor_ms, stiffness_n_per_mm, limit_n } => {
-                FrictionLaw::Paper {
-                    level_length: Millimetres(fix("level_length_mm", level_length_mm)?),
-                    level_cap: fix("level_cap", level_cap)?,
-                    anchor_ms,
-                    stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?),
-                    limit: Newtons(fix("limit_n", limit_n)?),
-                }
-            }
-            Friction::Cone { stiffness_n_per_mm } => {
-                FrictionLaw::Cone { stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?) }
-            }
-        })
     }
 }
 
@@ -335,7 +346,10 @@ impl Layer {
             tissue: self.tissue.into(),
             depth: Millimetres(fix("depth_mm", self.depth_mm)?),
             wall: wall.transpose()?,
-            friction: FrictionPerMillimetre(fix("friction_n_per_mm", self.friction_n_per_mm)?),
+            friction: FrictionPerMillimetre(fix(
+                "friction_n_per_mm",
+                self.friction_n_per_mm.unwrap_or_default(),
+            )?),
         })
     }
 }
@@ -401,6 +415,51 @@ mod tests {
         ] {
             let said = Profile::parse(text(wrong)).expect_err(hint).to_string();
             assert!(said.contains(hint) && said.contains("test.toml") && !said.contains('\n'), "{said}");
+        }
+    }
+
+    #[test]
+    fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
+        for model in [Model::Jog, Model::Sparte, Model::Xr] {
+            assert_eq!(Profile::find(model.patient()).expect("it is built in").model(), model);
+        }
+        let shoulder = Profile::find("shoulder").expect("it is built in");
+        assert_eq!(
+            (shoulder.procedure.as_str(), shoulder.person.site),
+            ("shoulder-straight", Some(Site::Shoulder))
+        );
+        let file = |name: &str| BUILT_IN.iter().find(|(known, _)| *known == name).expect("it is built in").1;
+        let (shoulder, phantom) = (file("shoulder"), file("phantom"));
+        for (wrong, hint) in [
+            (shoulder.replace("model = \"sparte\"", "model = \"magic\""), "magic"),
+            (shoulder.replace("relax_ms = 300 ", "relax_ms = 9 "), "RelaxMs is 9"),
+            (shoulder.replace("relax_ms = 300 ", "relaxation = 300 "), "relaxation"),
+            (shoulder.replace("force_scale = 0.65", "force_scale = 1.0"), "N/mm"),
+            (shoulder.replace("inwards_n = 4.0", "inwards_n = 40.0"), "layer 5 asks for 40.4"),
+            (shoulder.replace("cutting = { inwards_n = 4.0, outwards_n = 1.2 }", ""), "cutting is missing"),
+            (shoulder.replace("depth_mm = 29.0", "depth_mm = -29.0"), "LayerDepth is -29"),
+            (shoulder.replace("depth_mm = 29.0", "depth_mm = 23.0"), "does not begin below"),
+            (shoulder.replace("sliding_n = 0.3", "sliding_n = nan"), "sliding_n is NaN"),
+            (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190"),
+            (shoulder.replace("site = \"shoulder\"", "site = \"elbow\""), "elbow"),
+            (shoulder.replace("[patient]", "[patient]\nage_years = 130"), "patient.age_years is 130"),
+            (shoulder.replace("[patient]", "[patient]\nheight_cm = nan"), "patient.height_cm is NaN"),
+            (format!("{shoulder}friction_n_per_mm = 0.02\n"), "friction_n_per_mm is the law jog's"),
+            (phantom.replace("[force_table]", "[forces]"), "forces"),
+            (phantom.replace("speeds_mm_s = [1.0, 3.0, 5.0]", "speeds_mm_s = [1.0, 3.0]"), "need 6 rows"),
+            (phantom.replace("speeds_mm_s = [1.0,", "speeds_mm_s = [0.5, 1.0,"), "at most 3"),
+            (phantom.replace("measured = [false,", "measured = ["), "measured has 8 values"),
+            (phantom.replace("withdrawal = 0.4 ", "withdrawal = 1.4 "), "Withdrawal is 1.4"),
+            (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = 0.01"), "TableDepth is 0.01"),
+            (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = inf"), "depth_step_mm is inf"),
+            (phantom.replace("[0.000,", "[nan,"), "force_n holds NaN"),
+            (BUILT_IN[0].1.replacen("friction_n_per_mm = 0.02\n", "", 1), "friction_n_per_mm is missing"),
+        ] {
+            let said = Profile::parse(text(wrong)).expect_err(hint).to_string();
+            assert!(
+                said.contains(hint) && said.contains("test.toml") && !said.contains('\n'),
+                "{hint}: {said}"
+            );
         }
     }
 

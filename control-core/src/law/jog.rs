@@ -1,0 +1,268 @@
+//! The law of seed 001: the jog effect of each wall and the friction between them.
+
+use super::{Ground, Met, Response, WITHDRAWAL_SPEED, follow_share};
+use crate::anatomy::{Insertion, SMALLEST_ANGLE};
+use crate::event::State;
+use crate::friction;
+use crate::math::{reciprocal, scaled, sine, times};
+use crate::proxy::Anchor;
+use crate::refusal::{Field, Refusal, milli, within};
+use crate::tissue::{Layer, MAX_LAYERS};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Stiffness};
+use crate::wall::{self, Cut};
+use fixed::types::{I2F30, I8F24, I16F16};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// The law of friction inside tissue (seed 001, eq. 2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FrictionLaw {
+    /// Equation 2 as printed. It lets go of a resting needle within a second.
+    Paper {
+        /// S_f1: depth in tissue over which the friction level grows by e.
+        level_length: Millimetres,
+        /// Largest friction level L_f, 1–32.
+        level_cap: I16F16,
+        /// Time constant τ of the anchor, 5–1,000 ms: `S_f2 = 1 − e^{−T/τ}`.
+        anchor_ms: u16,
+        /// K_f: force for each mm between needle and anchor at level 1.
+        stiffness: Stiffness,
+        /// T_f_max = −T_f_min.
+        limit: Newtons,
+    },
+    /// A clamped proxy: holds a resting needle, slips at the friction limit.
+    Cone {
+        /// Stiffness of the hold below the limit.
+        stiffness: Stiffness,
+    },
+}
+
+/// The friction of one layer ready for the tick.
+#[derive(Clone, Copy, Debug)]
+struct Rub {
+    per_mm: I2F30,
+    /// Friction limit that the layers above have added up to with the needle straight in.
+    above: Newtons,
+}
+
+/// The forces of the tissue ready for the tick, in the order of the [`crate::anatomy::Anatomy`] that [`crate::plan`] has
+/// made with them.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// Of each wall.
+    walls: Vec<wall::Wall, MAX_LAYERS>,
+    /// Of each layer.
+    rubs: Vec<Rub, MAX_LAYERS>,
+    /// The needle is held by friction once the outermost wall has given way: 1, or 0 where there is none.
+    walls_that_close: usize,
+    friction: friction::Law,
+}
+
+impl FrictionLaw {
+    /// The steepest slope of friction.
+    pub(crate) fn hold(&self) -> I16F16 {
+        match *self {
+            FrictionLaw::Paper { stiffness, level_cap, .. } => stiffness.0.saturating_mul(level_cap),
+            FrictionLaw::Cone { stiffness } => stiffness.0,
+        }
+    }
+}
+
+impl Plan {
+    /// Checks the law of friction and all the walls with it, at whatever angle they are met.
+    pub(crate) fn new(friction: &FrictionLaw, ground: &Ground) -> Result<Self, Refusal> {
+        check_friction(friction, ground)?;
+        check_along(ground)?;
+        let mut rubs = Vec::new();
+        let mut above: Option<(&Layer, I16F16)> = None;
+        for Met { layer, .. } in ground.layers {
+            let rub_above = above.map_or(I16F16::ZERO, |(last, rub)| {
+                let thickness = layer.depth.0.saturating_sub(last.depth.0);
+                rub.saturating_add(thickness.saturating_mul(last.friction.0))
+            });
+            above = Some((layer, rub_above));
+            let per_mm = I2F30::saturating_from_num(layer.friction.0);
+            // It holds MAX_LAYERS: the push cannot fail.
+            let _ = rubs.push(Rub { per_mm, above: Newtons(rub_above) });
+        }
+        let walls = wall::all(ground.layers.iter().map(|met| &met.layer));
+        Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: plan_friction(friction) })
+    }
+}
+
+/// What the needle has done to the tissue so far, beyond where it is.
+#[derive(Clone, Debug)]
+pub(crate) struct Memory {
+    /// Of each wall that has given way.
+    cuts: [Cut; MAX_LAYERS],
+    /// How many of them count.
+    given: usize,
+    anchor: Anchor,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self { cuts: [Cut::NONE; MAX_LAYERS], given: 0, anchor: Anchor::default() }
+    }
+}
+
+/// What the walls do, all together.
+#[derive(Clone, Copy, Debug, Default)]
+struct Walls {
+    force: I16F16,
+    pressing: bool,
+    /// Negative while any still falls along its relief parabola: the bits of [`Cut::past_vertex`] of all.
+    past_vertex: I16F16,
+}
+
+impl Memory {
+    /// One tick with the tip at `depth` along the needle, where `met` says what it has met.
+    pub(crate) fn tick(
+        &mut self,
+        _: &FrictionLaw,
+        forces: &Plan,
+        met: &Insertion,
+        depth: Millimetres,
+        speed: MillimetresPerSecond,
+    ) -> Response {
+        self.heal(met.given());
+        let walls = self.walls(forces, met, depth);
+        let friction = self.friction(forces, met, depth);
+        let state = match friction {
+            Some(_) if speed.0 < -WITHDRAWAL_SPEED => State::Withdrawal,
+            _ if walls.pressing => State::Elastic,
+            Some(_) if walls.past_vertex < I16F16::ZERO => State::Puncture,
+            Some(_) => State::Friction,
+            None => State::Approach,
+        };
+        let force = walls.force.saturating_add(friction.unwrap_or_default().0);
+        Response { force: Newtons(force), state, ..Response::NONE }
+    }
+
+    /// Walls that the tip has left are whole again. It leaves one a tick.
+    fn heal(&mut self, given: usize) {
+        if given < self.given
+            && let Some(cut) = self.cuts.get_mut(given)
+        {
+            *cut = Cut::NONE;
+        }
+        self.given = given;
+    }
+
+    /// The relief of every wall that has given way, and the rise of the next one.
+    fn walls(&mut self, forces: &Plan, met: &Insertion, depth: Millimetres) -> Walls {
+        let mut sum = Walls::default();
+        let Some(given) = forces.walls.get(..met.given()) else { return sum };
+        for (index, (wall, cut)) in given.iter().zip(&mut self.cuts).enumerate() {
+            sum.force = sum.force.saturating_add(wall.relief_force(cut, met.travel(index, depth)).0);
+            sum.past_vertex |= cut.past_vertex;
+        }
+        if let Some(next) = forces.walls.get(met.given())
+            && met.presses()
+        {
+            let travel = met.travel(met.given(), depth);
+            if travel >= I16F16::ZERO {
+                sum.force = sum.force.saturating_add(next.elastic_force(travel).0);
+                sum.pressing = true;
+            }
+        }
+        sum
+    }
+
+    /// The friction along the needle, where the tip is inside.
+    fn friction(&mut self, forces: &Plan, met: &Insertion, depth: Millimetres) -> Option<Newtons> {
+        let entry = met.top(0);
+        if met.given() < forces.walls_that_close || depth.0 < entry {
+            self.anchor.release(depth);
+            return None;
+        }
+        let inserted = Millimetres(depth.0.saturating_sub(entry));
+        Some(forces.friction.tick(&mut self.anchor, depth, inserted, || limit(forces, met, depth)))
+    }
+}
+
+/// The friction limit that the layers make at `depth`.
+fn limit(forces: &Plan, met: &Insertion, depth: Millimetres) -> Newtons {
+    let index = met.innermost(depth);
+    let Some(rub) = forces.rubs.get(index) else { return Newtons::default() };
+    let inside = depth.0.saturating_sub(met.top(index));
+    Newtons(times(inside, rub.per_mm).saturating_add(stretched(rub.above.0, met.path_per_depth())))
+}
+
+/// What layers that are passed at an angle add up to, where it is known to fit: it is below the motor's force.
+fn stretched(straight: I16F16, path_per_depth: I8F24) -> I16F16 {
+    I16F16::from_bits(scaled(straight.to_bits(), path_per_depth.to_bits(), 24))
+}
+
+fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
+    let layer = ground.configured as u8;
+    let limit = ground.stiffest;
+    match *law {
+        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit: force } => {
+            within(Field::LevelLength, level_length.0, milli(1_000), milli(1_000_000))?;
+            within(Field::LevelCap, level_cap, milli(1_000), milli(32_000))?;
+            within(Field::AnchorMs, I16F16::from_num(anchor_ms.min(30_000)), milli(5_000), milli(1_000_000))?;
+            within(Field::FrictionStiffness, stiffness.0, milli(1), limit)?;
+            within(Field::FrictionLimit, force.0, milli(1), ground.largest)?;
+            let slope = law.hold();
+            if slope > limit { Err(Refusal::TooStiff { layer, slope, limit }) } else { Ok(()) }
+        }
+        FrictionLaw::Cone { stiffness } => within(Field::FrictionStiffness, stiffness.0, milli(50), limit),
+    }
+}
+
+fn plan_friction(law: &FrictionLaw) -> friction::Law {
+    match *law {
+        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => friction::Law::Paper {
+            per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
+            level_cap,
+            follow: follow_share(anchor_ms),
+            stiffness,
+            limit,
+        },
+        FrictionLaw::Cone { stiffness } => {
+            friction::Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
+        }
+    }
+}
+
+/// At whatever angle: each wall with the friction up to it, and friction at the end of the travel. The flatter the needle,
+/// the longer its way through each layer, and the force is largest where the next layer is just out of reach.
+fn check_along(ground: &Ground) -> Result<(), Refusal> {
+    let travel = ground.travel;
+    let flattest = reciprocal(sine(SMALLEST_ANGLE));
+    let just_reached = ground.layers.iter().map(|met| reaching(travel, met.layer.depth.0).min(flattest));
+    for stretch in just_reached.chain([I8F24::ONE, flattest]) {
+        check_at(ground, stretch)?;
+    }
+    Ok(())
+}
+
+/// The stretch at which `depth` lies at `travel` along the needle, no less than 1.
+fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
+    let wide = (i64::from(travel.to_bits()) << 24) / i64::from(depth.to_bits().max(1));
+    I8F24::saturating_from_num(fixed::types::I40F24::from_bits(wide)).max(I8F24::ONE)
+}
+
+/// The same with layers met at `stretch` times their depth.
+fn check_at(ground: &Ground, stretch: I8F24) -> Result<(), Refusal> {
+    let (travel, limit) = (ground.travel, ground.largest);
+    let along = |depth: I16F16| I16F16::from_bits(scaled(depth.to_bits(), stretch.to_bits(), 24));
+    let (mut friction, mut at, mut per_mm, mut deepest) = (I16F16::ZERO, I16F16::ZERO, I16F16::ZERO, 0);
+    for Met { number, layer } in ground.layers {
+        let top = along(layer.depth.0);
+        if top > travel {
+            break;
+        }
+        friction = friction.saturating_add(top.saturating_sub(at).saturating_mul(per_mm));
+        (at, per_mm, deepest) = (top, layer.friction.0, *number);
+        let peak =
+            layer.wall.as_ref().map(|wall| wall::Parabola::new(&wall.elastic).force(wall.puncture_travel));
+        let force = friction.saturating_add(peak.unwrap_or_default().0);
+        if force > limit {
+            return Err(Refusal::TooStrong { layer: *number, force, limit });
+        }
+    }
+    let force = friction.saturating_add(travel.saturating_sub(at).saturating_mul(per_mm));
+    if force > limit { Err(Refusal::TooStrong { layer: deepest, force, limit }) } else { Ok(()) }
+}

@@ -1,0 +1,160 @@
+//! The laws of force: what the needle feels of the anatomy that it has met. Each is a file with what a person configures,
+//! what of it may run (`Plan`), what the tick remembers (`Memory`) and the tick itself; a fourth is one more file and one more
+//! line at the end of this one. A law knows no device: [`Ground`] says what it may ask for.
+
+use crate::anatomy::Insertion;
+use crate::event::State;
+use crate::math::scaled;
+use crate::refusal::Refusal;
+use crate::tissue::Layer;
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
+use fixed::types::{I2F30, I16F16};
+use serde::{Deserialize, Serialize};
+
+/// Slower than this the needle rests; faster outwards it is being withdrawn. 1 mm/s.
+const WITHDRAWAL_SPEED: I16F16 = I16F16::from_bits(1 << 16);
+
+/// A layer as the needle meets it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Met {
+    /// Its number in the configuration.
+    pub(crate) number: u8,
+    pub(crate) layer: Layer,
+}
+
+/// Where a law is to act, and how much it may ask for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ground<'a> {
+    /// Outermost first; without those of a vessel that the needle passes beside.
+    pub(crate) layers: &'a [Met],
+    /// How many layers are configured.
+    pub(crate) configured: usize,
+    /// Largest depth along the needle, mm.
+    pub(crate) travel: I16F16,
+    /// Largest force, N.
+    pub(crate) largest: I16F16,
+    /// Largest slope, N/mm.
+    pub(crate) stiffest: I16F16,
+}
+
+/// What a law makes of where the tip is and how it moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Response {
+    pub(crate) force: Newtons,
+    pub(crate) state: State,
+    /// Across the needle: computed and told, for this device cannot push sideways.
+    pub(crate) lateral: Newtons,
+    /// The needle has just been turned further than tissue lets it.
+    pub(crate) barrier: bool,
+    /// Nothing was measured here: the force is an estimate.
+    pub(crate) estimated: bool,
+}
+
+impl Response {
+    /// Of no tissue.
+    pub(crate) const NONE: Self = Self {
+        force: Newtons(I16F16::ZERO),
+        state: State::Approach,
+        lateral: Newtons(I16F16::ZERO),
+        barrier: false,
+        estimated: false,
+    };
+}
+
+/// `1 − e^{−T/τ}` for T of one tick and τ in ms: with T/τ ≤ 0.02 three terms of the series leave less than 1e-8.
+fn follow_share(tau_ms: u16) -> I2F30 {
+    let y = I2F30::ONE / i32::from(tau_ms.max(1)) / 10;
+    let y2 = y.saturating_mul(y);
+    y - y2 / 2 + y2.saturating_mul(y) / 6
+}
+
+/// A stiffness of `slope` N/mm makes `force` N over this many mm, given `1/slope`.
+fn reach(force: I16F16, inverse_slope: I16F16) -> I16F16 {
+    I16F16::from_bits(scaled(force.to_bits(), inverse_slope.to_bits(), 16))
+}
+
+macro_rules! laws {
+    ($($(#[$about:meta])+ $name:ident($config:ident) => $module:ident),+ $(,)?) => {
+        $(mod $module;)+
+        $(pub use $module::$config;)+
+
+        /// The law of force, with what is its own.
+        #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[expect(clippy::large_enum_variant, reason = "nothing allocates here")]
+        pub enum Law { $($(#[$about])+ $name($config)),+ }
+
+        /// The law that is in force.
+        #[derive(Clone, Debug)]
+        pub(crate) enum Plan { $($name($module::Plan)),+ }
+
+        /// What it remembers.
+        #[derive(Clone, Debug)]
+        pub(crate) enum Memory { $($name($module::Memory)),+ }
+
+        impl Law {
+            /// The steepest slope with which it holds a needle inside tissue, beside its walls, in N/mm.
+            pub(crate) fn hold(&self) -> I16F16 {
+                match self { $(Law::$name(config) => config.hold()),+ }
+            }
+        }
+
+        impl Plan {
+            /// Checks `law` and prepares it for the tick.
+            pub(crate) fn new(law: &Law, ground: &Ground) -> Result<Self, Refusal> {
+                match law { $(Law::$name(config) => $module::Plan::new(config, ground).map(Self::$name)),+ }
+            }
+
+            /// Of a needle that has never been in this tissue.
+            pub(crate) fn memory(&self) -> Memory {
+                match self { $(Plan::$name(_) => Memory::$name($module::Memory::default())),+ }
+            }
+        }
+
+        impl Memory {
+            /// One tick of `law`, of which `plan` was made, with the tip at `depth` along the needle, where `met` says what it
+            /// has met.
+            pub(crate) fn tick(
+                &mut self,
+                law: &Law,
+                plan: &Plan,
+                met: &Insertion,
+                depth: Millimetres,
+                speed: MillimetresPerSecond,
+            ) -> Response {
+                match (self, plan, law) {
+                    $((Memory::$name(memory), Plan::$name(plan), Law::$name(config)) => {
+                        memory.tick(config, plan, met, depth, speed)
+                    })+
+                    // A memory is made by its plan, and a plan by its law.
+                    _ => Response::NONE,
+                }
+            }
+        }
+    };
+}
+
+laws! {
+    /// Seed 001: the jog effect of each wall, and friction in each layer.
+    Jog(FrictionLaw) => jog,
+    /// Seed 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of the direction.
+    Sparte(Sparte) => sparte,
+    /// Seed 000: a table over depth, speed and angle.
+    Xr(ForceTable) => xr,
+}
+
+pub use sparte::{Cutting, Fixture, Lugre};
+pub use xr::{MAX_ANGLES, MAX_DEPTHS, MAX_SPEEDS};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_anchor_follows_by_its_share_of_a_tick() {
+        for tau_ms in [5_u16, 60, 1_000, 10_000] {
+            let exact = -(-0.1 / f64::from(tau_ms)).exp_m1();
+            let share = follow_share(tau_ms).to_num::<f64>();
+            assert!((share - exact).abs() < 1.2e-8, "{tau_ms} ms: {share} for {exact}");
+        }
+    }
+}

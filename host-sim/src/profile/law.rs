@@ -1,0 +1,286 @@
+//! The `[law]` of a profile and what it needs elsewhere in the file: which law of force counts, with its own numbers. Numbers
+//! are only taken over here; whether they may run is the control law's to say.
+
+use super::{Layer, fix};
+use control_core::config::{
+    Cutting, Fixture, ForceTable, FrictionLaw, Law, Lugre, MAX_ANGLES, MAX_DEPTHS, MAX_SPEEDS, Sparte,
+};
+use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
+use fixed::types::I8F24;
+use serde::Deserialize;
+
+/// The law of force, by the name that `--model` has for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// The jog effect and friction cone of the venepuncture device (seed 001).
+    Jog,
+    /// Tracking walls and LuGre friction of the joint injection simulator (seed 002).
+    Sparte,
+    /// The fitted force table of the layered-tissue simulator (seed 000).
+    Xr,
+}
+
+impl Model {
+    /// As `--model` and `law.model` call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Model::Jog => "jog",
+            Model::Sparte => "sparte",
+            Model::Xr => "xr",
+        }
+    }
+
+    /// The built-in patient whose law it is.
+    pub fn patient(self) -> &'static str {
+        match self {
+            Model::Jog => "adult",
+            Model::Sparte => "shoulder",
+            Model::Xr => "phantom",
+        }
+    }
+
+    /// The one that `law` is.
+    pub fn of(law: &Law) -> Self {
+        match law {
+            Law::Jog(_) => Model::Jog,
+            Law::Sparte(_) => Model::Sparte,
+            Law::Xr(_) => Model::Xr,
+        }
+    }
+}
+
+/// `[law]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, tag = "model", rename_all = "kebab-case")]
+pub(super) enum Table {
+    /// Its friction stands in `[friction]`.
+    Jog {},
+    /// The polynomials of its walls and the forces of cutting stand in the layers.
+    Sparte { tracking_n_per_mm: f64, relax_ms: u16, friction: Bristles, fixture: Direction },
+    /// Its table stands in `[force_table]`, as `fit-force` writes it.
+    Xr { stiffness_n_per_mm: f64, withdrawal: f64 },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Bristles {
+    stiffness_n_per_mm: f64,
+    damping_n_s_per_mm: f64,
+    viscous_n_s_per_mm: f64,
+    sliding_n: f64,
+    sticking_n: f64,
+    stribeck_mm_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Direction {
+    lateral_n_per_deg: f64,
+    largest_deg: f64,
+}
+
+/// `[force_table]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Forces {
+    depth_step_mm: f64,
+    speeds_mm_s: Vec<f64>,
+    angles_deg: Vec<f64>,
+    /// Of each speed and angle, whether anybody measured it; the angles of a speed together.
+    measured: Vec<bool>,
+    /// As many rows, a force for each depth.
+    force_n: Vec<Vec<f64>>,
+}
+
+/// `[friction]`, of the jog law.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, tag = "law", rename_all = "kebab-case")]
+pub(super) enum Friction {
+    Paper { level_length_mm: f64, level_cap: f64, anchor_ms: u16, stiffness_n_per_mm: f64, limit_n: f64 },
+    Cone { stiffness_n_per_mm: f64 },
+}
+
+/// `cutting` of a layer.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Cut {
+    inwards_n: f64,
+    outwards_n: f64,
+}
+
+/// The law that a file's parts make, or in a sentence which key is missing or too many. Without a `[friction]`, the jog law
+/// keeps `usual`.
+pub(super) fn law(
+    table: Option<&Table>,
+    friction: Option<&Friction>,
+    forces: Option<&Forces>,
+    layers: &[Layer],
+    usual: &Law,
+) -> Result<Law, String> {
+    let law = match table {
+        None | Some(Table::Jog {}) => match friction {
+            Some(friction) => Law::Jog(friction.law()?),
+            None => usual.clone(),
+        },
+        Some(Table::Sparte { tracking_n_per_mm, relax_ms, friction, fixture }) => Law::Sparte(Sparte {
+            tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
+            relax_ms: *relax_ms,
+            cutting: cutting(layers)?.into_iter().collect(),
+            friction: friction.lugre()?,
+            fixture: fixture.fixture()?,
+        }),
+        Some(Table::Xr { stiffness_n_per_mm, withdrawal }) => {
+            let forces = forces
+                .ok_or("[force_table] is missing; law.model xr needs the table that fit-force writes")?;
+            Law::Xr(forces.table(*stiffness_n_per_mm, *withdrawal)?)
+        }
+    };
+    let (model, name) = (Model::of(&law), Model::of(&law).name());
+    let foreign = |key: &str, owner: Model| {
+        Err(format!(
+            "{key} is the law {}'s and law.model is {name}; remove it or change law.model",
+            owner.name()
+        ))
+    };
+    if friction.is_some() && model != Model::Jog {
+        return foreign("[friction]", Model::Jog);
+    }
+    if forces.is_some() && model != Model::Xr {
+        return foreign("[force_table]", Model::Xr);
+    }
+    if layers.iter().any(|layer| layer.cutting.is_some()) && model != Model::Sparte {
+        return foreign("cutting", Model::Sparte);
+    }
+    let rubs = |layer: &Layer| layer.friction_n_per_mm.is_some();
+    match model {
+        Model::Jog if !layers.iter().all(rubs) => {
+            Err("friction_n_per_mm is missing in a layer; law.model jog needs it in each".into())
+        }
+        Model::Sparte | Model::Xr if layers.iter().any(rubs) => foreign("friction_n_per_mm", Model::Jog),
+        _ => Ok(law),
+    }
+}
+
+/// Of each layer, of which there are not too many.
+fn cutting(layers: &[Layer]) -> Result<Vec<Cutting>, String> {
+    layers
+        .iter()
+        .map(|layer| {
+            let cut = layer.cutting.as_ref();
+            let cut = cut.ok_or(
+                "cutting is missing in a layer; law.model sparte needs { inwards_n, outwards_n } in each",
+            )?;
+            Ok(Cutting {
+                inwards: Newtons(fix("inwards_n", cut.inwards_n)?),
+                outwards: Newtons(fix("outwards_n", cut.outwards_n)?),
+            })
+        })
+        .collect()
+}
+
+impl Bristles {
+    fn lugre(&self) -> Result<Lugre, String> {
+        Ok(Lugre {
+            stiffness: Stiffness(fix("stiffness_n_per_mm", self.stiffness_n_per_mm)?),
+            damping: damping("damping_n_s_per_mm", self.damping_n_s_per_mm)?,
+            viscous: damping("viscous_n_s_per_mm", self.viscous_n_s_per_mm)?,
+            sliding: Newtons(fix("sliding_n", self.sliding_n)?),
+            sticking: Newtons(fix("sticking_n", self.sticking_n)?),
+            speed: MillimetresPerSecond(fix("stribeck_mm_s", self.stribeck_mm_s)?),
+        })
+    }
+}
+
+fn damping(key: &str, value: f64) -> Result<Damping, String> {
+    I8F24::checked_from_num(value)
+        .map(Damping)
+        .ok_or_else(|| format!("{key} is {value}; it must be a number between -128 and 128"))
+}
+
+impl Direction {
+    fn fixture(&self) -> Result<Fixture, String> {
+        Ok(Fixture {
+            per_mrad: Newtons(fix("lateral_n_per_deg", self.lateral_n_per_deg * 1f64.to_degrees() * 1e-3)?),
+            largest: mrad("largest_deg", self.largest_deg)?,
+        })
+    }
+}
+
+fn mrad(key: &str, degrees: f64) -> Result<Milliradians, String> {
+    if (0.0..=180.0).contains(&degrees) {
+        Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
+    } else {
+        Err(format!("{key} is {degrees}; it must lie from 0 to 180"))
+    }
+}
+
+impl Forces {
+    fn table(&self, stiffness: f64, withdrawal: f64) -> Result<ForceTable, String> {
+        let speeds = self.speeds_mm_s.iter().map(|v| fix("speeds_mm_s", *v).map(MillimetresPerSecond));
+        let speeds = speeds.collect::<Result<Vec<_>, _>>()?;
+        let angles = self.angles_deg.iter().map(|a| mrad("angles_deg", *a)).collect::<Result<Vec<_>, _>>()?;
+        let (cells, depths) = (speeds.len() * angles.len(), self.force_n.first().map_or(0, Vec::len));
+        for (key, found, most) in [
+            ("speeds_mm_s", speeds.len(), MAX_SPEEDS),
+            ("angles_deg", angles.len(), MAX_ANGLES),
+            ("a row of force_n", depths, MAX_DEPTHS),
+        ] {
+            if found > most {
+                return Err(format!("{key} has {found} values; at most {most} are possible"));
+            }
+        }
+        if self.force_n.len() != cells || self.force_n.iter().any(|row| row.len() != depths) {
+            return Err(format!(
+                "force_n is not a table; {} speeds and {} angles need {cells} rows of as many values each",
+                speeds.len(),
+                angles.len()
+            ));
+        }
+        if self.measured.len() != cells {
+            return Err(format!(
+                "measured has {} values; there must be {cells}, one for each speed and angle",
+                self.measured.len()
+            ));
+        }
+        let mut forces = Vec::new();
+        for depth in 0..depths {
+            for row in &self.force_n {
+                let millinewtons = (row[depth] * 1e3).round();
+                if !(0.0..=f64::from(i16::MAX)).contains(&millinewtons) {
+                    return Err(format!("force_n holds {}; a force must lie from 0 to 32.767", row[depth]));
+                }
+                forces.push(millinewtons as i16);
+            }
+        }
+        let bits = self.measured.iter().enumerate().filter(|(_, is)| **is);
+        Ok(ForceTable {
+            depth_step: Millimetres(fix("depth_step_mm", self.depth_step_mm)?),
+            measured: bits.fold(0, |bits, (cell, _)| bits | 1_u16.checked_shl(cell as u32).unwrap_or(0)),
+            stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness)?),
+            withdrawal: fix("withdrawal", withdrawal)?,
+            // None has more than there is room for.
+            forces: forces.into_iter().collect(),
+            speeds: speeds.into_iter().collect(),
+            angles: angles.into_iter().collect(),
+        })
+    }
+}
+
+impl Friction {
+    fn law(&self) -> Result<FrictionLaw, String> {
+        Ok(match *self {
+            Friction::Paper { level_length_mm, level_cap, anchor_ms, stiffness_n_per_mm, limit_n } => {
+                FrictionLaw::Paper {
+                    level_length: Millimetres(fix("level_length_mm", level_length_mm)?),
+                    level_cap: fix("level_cap", level_cap)?,
+                    anchor_ms,
+                    stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?),
+                    limit: Newtons(fix("limit_n", limit_n)?),
+                }
+            }
+            Friction::Cone { stiffness_n_per_mm } => {
+                FrictionLaw::Cone { stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?) }
+            }
+        })
+    }
+}
