@@ -189,6 +189,9 @@ fn in_words(one: &Insertion) -> Vec<String> {
     if one.redirections > 0 {
         words.push(format!("The needle was redirected {}.", times(one.redirections)));
     }
+    if one.barriers > 0 {
+        words.push(format!("It was turned further than the tissue allows {}.", times(one.barriers)));
+    }
     if let Some(error) = one.angle_largest_error_deg.filter(|e| e.abs() > 10.0) {
         let which = if error > 0.0 { "steep" } else { "flat" };
         words.push(format!("It was too {which} by up to {}°.", decimal(error.abs(), 0)));
@@ -207,7 +210,7 @@ fn times(count: u32) -> String {
 /// A figure of the table: its words, its value, its decimals.
 type Figure = (&'static str, fn(&Insertion) -> Option<f64>, usize);
 
-const FIGURES: [Figure; 17] = [
+const FIGURES: [Figure; 19] = [
     ("time in tissue, s", |i| Some(i.time_s), 2),
     ("time in the lumen, s", |i| Some(i.in_lumen_s), 2),
     ("path of the tip, mm", |i| Some(i.path_mm), 1),
@@ -224,6 +227,8 @@ const FIGURES: [Figure; 17] = [
     ("angle at the first puncture, °", |i| i.angle_deg, 1),
     ("angle error along the way, ° rms", |i| i.angle_rms_error_deg, 1),
     ("largest angle error, °", |i| i.angle_largest_error_deg, 1),
+    ("turned beyond the largest angle, times", |i| Some(f64::from(i.barriers)), 0),
+    ("largest lateral force, N", |i| i.largest_lateral_n, 2),
     ("smoothness", |i| i.smoothness, 2),
 ];
 
@@ -288,11 +293,14 @@ mod tests {
             through_far_wall: true,
             spared_hits: 2,
             redirections: 3,
+            barriers: 1,
             angle_largest_error_deg: Some(-14.2),
             ..good
         };
         let said = in_words(&bad).join(" ");
-        for words in ["far wall", "touched twice", "redirected 3 times", "too flat by up to 14°"] {
+        for words in
+            ["far wall", "touched twice", "redirected 3 times", "tissue allows once", "too flat by up to 14°"]
+        {
             assert!(said.contains(words), "{said}");
         }
         assert_eq!(in_words(&Insertion::default()), ["The vessel was not met."]);

@@ -114,7 +114,7 @@ fn print_total(all: &[Insertion]) {
     let count = all.len().max(1) as f64;
     let mean = |value: fn(&Insertion) -> f64| all.iter().map(value).sum::<f64>() / count;
     say!(
-        "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={} mean_in_lumen_s={:.2} through_far_wall={} redirections={} spared_hits={}",
+        "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={} mean_in_lumen_s={:.2} through_far_wall={} redirections={} barriers={} spared_hits={}",
         all.len(),
         mean(|one| one.time_s),
         mean(|one| one.path_mm),
@@ -124,6 +124,7 @@ fn print_total(all: &[Insertion]) {
         mean(|one| one.in_lumen_s),
         all.iter().filter(|one| one.through_far_wall).count(),
         all.iter().map(|one| one.redirections).sum::<u32>(),
+        all.iter().map(|one| one.barriers).sum::<u32>(),
         all.iter().map(|one| one.spared_hits).sum::<u32>()
     );
 }

@@ -10,7 +10,7 @@ use crate::profile::Profile;
 use crate::recording::export::{Stretch, stretches};
 use crate::recording::read::Recording;
 use control_core::TICK_HZ;
-use control_core::config::Tissue;
+use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
 use gesture::{Gesture, Place};
 use link::frames::{Event, EventKind};
@@ -55,6 +55,10 @@ pub struct Insertion {
     pub through_far_wall: bool,
     /// How often something that was to be spared was touched.
     pub spared_hits: u32,
+    /// How often the needle was turned beyond the largest angle that the patient's fixture allows.
+    pub barriers: u32,
+    /// Largest force across the needle that would have held its direction of entry, N; none where the patient has no fixture.
+    pub largest_lateral_n: Option<f64>,
     /// How often the needle was pushed in: once, and again whenever it was after having been drawn back by 2 mm.
     pub passes: u32,
     /// Those of them that went in another direction, by 3° or more.
@@ -162,6 +166,7 @@ pub struct Judge {
     entry_rad: f64,
     skin_tilt_rad: f64,
     targets: Targets,
+    fixture: Option<Fixture>,
     zero_tick: u64,
 }
 
@@ -178,8 +183,20 @@ impl Judge {
                 far_wall: number(Tissue::FarWall),
                 spared: profile.spared.clone(),
             },
+            fixture: match &profile.config.patient.law {
+                Law::Sparte(law) => Some(law.fixture),
+                Law::Jog(_) | Law::Xr(_) => None,
+            },
             zero_tick,
         }
+    }
+
+    /// Largest lateral force over `samples`, of which the first lies at the entry, N.
+    fn lateral_n(&self, samples: &[Sample]) -> Option<f64> {
+        let (fixture, entry) = (self.fixture?, samples.first()?);
+        let off = |sample: &Sample| (i32::from(sample.tilt_mrad) - i32::from(entry.tilt_mrad)).abs();
+        let most = samples.iter().map(off).max()?.min(i32::from(fixture.largest.0));
+        Some(f64::from(most) * fixture.per_mrad.0.to_num::<f64>())
     }
 
     /// The figures of one insertion.
@@ -192,7 +209,8 @@ impl Judge {
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
         let passage = vessel::passage(&span.stretch.events, (begin, end), &self.targets);
-        let first = given().next().and_then(|e| span.stretch.samples.get(span.at(e.tick)));
+        let inside = given().next().map_or(&[][..], |e| &span.stretch.samples[span.at(e.tick)..span.at(end)]);
+        let first = inside.first();
         let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.skin_tilt_rad);
         let wanted_rad = self.entry_rad;
         let along = gesture.angle_error(wanted_rad);
@@ -213,6 +231,8 @@ impl Judge {
             flashbacks: passage.flashbacks,
             through_far_wall: passage.through_far_wall,
             spared_hits: passage.spared_hits,
+            barriers: span.events().filter(|e| e.kind == EventKind::Barrier).count() as u32,
+            largest_lateral_n: self.lateral_n(inside),
             passes: passes.passes,
             redirections: passes.redirections,
             angle_deg: angle_rad.map(f64::to_degrees),
