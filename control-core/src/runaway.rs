@@ -36,6 +36,8 @@ const DOUBTFUL_TURNS: u32 = 3;
 const HOLD_TICKS: u32 = 100;
 /// Turns in that time that a needle which coasts may still make.
 const COASTING_TURNS: u32 = 1;
+/// Looks in a row at which a needle must go as if it were driven: a knock of 40 mm/s is one.
+const DRIVEN_LOOKS: u32 = 2;
 /// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
 const LEAST_COUNTS: i32 = 5;
 
@@ -96,6 +98,8 @@ pub(crate) struct Watch {
     next: usize,
     /// Counts that the last span has more than the one before it.
     gained: i32,
+    /// Looks in a row at which the needle went as its motor would drive it the wrong way.
+    driven_looks: u32,
     turns: u32,
     /// Looks until a turn is forgotten.
     forget: u32,
@@ -172,15 +176,24 @@ impl Watch {
         let middle = self.count(SPAN_LOOKS);
         let speed = self.count(0).wrapping_sub(middle);
         self.gained = speed.wrapping_sub(middle.wrapping_sub(self.count(2 * SPAN_LOOKS)));
+        if !self.still_gains() {
+            self.gained = 0;
+        }
         (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)
     }
 
-    /// The torque that [`Self::gained`] would come from: the second difference of three places weighs what happened between
-    /// them as a triangle. The latest torque alone is a quarter of a period late where a needle swings on a stiff wall.
+    /// Whether the last 3.2 ms go on with what the spans gained. A motor that drives goes on; a knock is over.
+    fn still_gains(&self) -> bool {
+        let middle = self.count(2);
+        let latest = self.count(0).wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(self.count(4)));
+        latest.signum() == self.gained.signum()
+    }
+
+    /// The torque that [`Self::gained`] would come from: that of the middle of its spans. The latest one is a quarter of a period
+    /// late where a needle swings on a stiff wall.
     fn mean_torque(&self) -> I16F16 {
-        let weighed = [(1, 1), (2, 2), (3, 3), (4, 2), (5, 1)]
-            .map(|(looks, weight)| (self.torque(looks).to_bits() >> 4) * weight);
-        I16F16::from_bits(weighed.iter().sum::<i32>() / 9 * 16)
+        let [early, middle, late] = [4, 3, 2].map(|looks| self.torque(looks).to_bits());
+        I16F16::from_bits((early >> 2) + (middle >> 1) + (late >> 2))
     }
 
     /// Against the motor.
@@ -193,7 +206,9 @@ impl Watch {
         let against = if torque.is_negative() { gained } else { gained.wrapping_neg() };
         // A wall that has just given way: three quarters.
         let has_fallen = last < before - (before >> 2);
-        (!has_fallen && bounds.is_driven(against, strength)).then_some(Fault::WrongWay)
+        let is_driven = !has_fallen && bounds.is_driven(against, strength);
+        self.driven_looks = if is_driven { self.driven_looks.saturating_add(1) } else { 0 };
+        (self.driven_looks >= DRIVEN_LOOKS).then_some(Fault::WrongWay)
     }
 
     /// The look's last part: to and fro.
@@ -302,6 +317,21 @@ mod tests {
             // Counted from where it begins.
             let at = move |time: f64| (depth(time) - depth(0.0), -56.0 * depth(time).max(0.0));
             assert_eq!(found(at, 0.2), None, "{amplitude} mm, {phase} rad");
+        }
+    }
+
+    /// A light tap on a needle that is pressed with 0.4 N: 30 mm/s at once, at any place between two looks and two counts, which a hand of
+    /// 30 g then loses in 20 ms.
+    #[test]
+    fn a_tap_is_left_alone() {
+        for (late, place) in
+            (0..8).flat_map(|late| (0..8).map(move |place| (f64::from(late), f64::from(place))))
+        {
+            let at = move |time: f64| {
+                let since = (time - 0.02 - late * 1e-4).max(0.0);
+                (place * 0.002 + 0.6 * (1.0 - (-since / 0.02).exp()), -4.0)
+            };
+            assert_eq!(found(at, 0.1), None, "{late} {place}");
         }
     }
 
