@@ -71,6 +71,29 @@ fn a_needle_that_goes_through_and_one_that_is_turned_are_told() {
 }
 
 #[test]
+fn a_turned_needle_is_scored_by_the_patients_fixture() {
+    let turned = |degrees: &str| {
+        let file = folder(&format!("fixture-{degrees}")).join("turned.toml");
+        let text_of = format!(
+            "format = 1\nname = \"turned\"\nstart_mm = -2.0\n[hand]\nstiffness_n_per_mm = 5.0\ndamping_n_s_per_mm = 0.02\n\
+             tremor_mm = 0.0\nseed = 1\n[[step]]\nname = \"wait\"\nseconds = 0.5\n[[step]]\nname = \"in\"\nto_mm = 15.0\nseconds = 2.0\n\
+             [[step]]\nname = \"turn\"\nseconds = 1.0\nturned_deg = {degrees}\n[[step]]\nname = \"out\"\nto_mm = -2.0\nseconds = 2.0\nturned_deg = 0.0\n"
+        );
+        std::fs::write(&file, text_of).expect("written");
+        let arguments = ["--seconds", "6", "--profile", "shoulder", "--procedure", text(&file)];
+        let (_, insertions) = scored(&format!("fixture-score-{degrees}"), &arguments);
+        (insertions[0]["barriers"].clone(), insertions[0]["largest_lateral_n"].as_f64().expect("a number"))
+    };
+    // 0.2 N for each degree, up to 10°.
+    let (barriers, lateral_n) = turned("5.0");
+    assert!(barriers == 0 && (lateral_n - 1.0).abs() < 0.03, "{barriers} {lateral_n}");
+    let (barriers, lateral_n) = turned("12.0");
+    assert!(barriers == 1 && (lateral_n - 2.0).abs() < 0.03, "{barriers} {lateral_n}");
+    let (_, adult) = scored("fixture-none", &["--seconds", "6"]);
+    assert_eq!((&adult[0]["barriers"], &adult[0]["largest_lateral_n"]), (&Value::from(0), &Value::Null));
+}
+
+#[test]
 fn patients_are_listed_with_their_layers() {
     let all = run_well(&["profiles"]);
     for words in [
@@ -78,6 +101,9 @@ fn patients_are_listed_with_their_layers() {
         "thin-elderly",
         "high-body-mass",
         "firm-skin",
+        "dorsal-hand",
+        "shoulder",
+        "phantom",
         "vessel, 3.0 × 4.5 mm",
         "gives way at 1.00 N",
     ] {

@@ -43,7 +43,7 @@ pub(crate) struct Run {
     /// host-sim/procedures; without it, what the patient's file says
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, shoulder, phantom, or a TOML file like those in
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom, or a TOML file like those in
     /// host-sim/profiles; without it, adult, or the one that is made for --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,

@@ -15,14 +15,16 @@ use fixed::types::I16F16;
 use serde::Deserialize;
 
 pub use law::Model;
+use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
 
 /// The profiles that come with the program.
-pub const BUILT_IN: [(&str, &str); 6] = [
+pub const BUILT_IN: [(&str, &str); 7] = [
     ("adult", include_str!("../../profiles/adult.toml")),
     ("thin-elderly", include_str!("../../profiles/thin-elderly.toml")),
     ("high-body-mass", include_str!("../../profiles/high-body-mass.toml")),
     ("firm-skin", include_str!("../../profiles/firm-skin.toml")),
+    ("dorsal-hand", include_str!("../../profiles/dorsal-hand.toml")),
     ("shoulder", include_str!("../../profiles/shoulder.toml")),
     ("phantom", include_str!("../../profiles/phantom.toml")),
 ];
@@ -229,6 +231,8 @@ struct Layer {
     /// Whether the needle is to spare it; without it, what seed 002 has trainees avoid: tendon and cartilage.
     spare: Option<bool>,
     depth_mm: f64,
+    /// What makes it as thick as it is; what lies below moves with it.
+    thickness: Option<Thickness>,
     wall: Option<Wall>,
     /// Of the jog law.
     friction_n_per_mm: Option<f64>,
@@ -295,8 +299,8 @@ impl File {
     fn config(&self) -> Result<Patient, String> {
         let mut patient = Patient::default();
         patient.layers.clear();
-        for layer in &self.layer {
-            patient.layers.push(layer.config()?).map_err(|_| {
+        for (layer, depth_mm) in self.layer.iter().zip(person::depths_mm(&self.layer, &self.patient)?) {
+            patient.layers.push(layer.config(depth_mm)?).map_err(|_| {
                 format!("there are {} layers; at most {} are possible", self.layer.len(), config::MAX_LAYERS)
             })?;
         }
@@ -329,7 +333,7 @@ impl Layer {
         self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
     }
 
-    fn config(&self) -> Result<config::Layer, String> {
+    fn config(&self, depth_mm: f64) -> Result<config::Layer, String> {
         let wall = self.wall.as_ref().map(|wall| {
             Ok::<_, String>(config::Wall {
                 elastic: wall.elastic.config()?,
@@ -344,7 +348,7 @@ impl Layer {
         });
         Ok(config::Layer {
             tissue: self.tissue.into(),
-            depth: Millimetres(fix("depth_mm", self.depth_mm)?),
+            depth: Millimetres(fix("depth_mm", depth_mm)?),
             wall: wall.transpose()?,
             friction: FrictionPerMillimetre(fix(
                 "friction_n_per_mm",
@@ -437,14 +441,17 @@ mod tests {
             (shoulder.replace("force_scale = 0.65", "force_scale = 1.0"), "N/mm"),
             (shoulder.replace("inwards_n = 4.0", "inwards_n = 40.0"), "layer 5 asks for 40.4"),
             (shoulder.replace("cutting = { inwards_n = 4.0, outwards_n = 1.2 }", ""), "cutting is missing"),
-            (shoulder.replace("depth_mm = 29.0", "depth_mm = -29.0"), "LayerDepth is -29"),
+            (shoulder.replace("depth_mm = 29.0", "depth_mm = -29.0"), "depth_mm of layer 5 is -29"),
             (shoulder.replace("depth_mm = 29.0", "depth_mm = 23.0"), "does not begin below"),
             (shoulder.replace("sliding_n = 0.3", "sliding_n = nan"), "sliding_n is NaN"),
             (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190"),
             (shoulder.replace("site = \"shoulder\"", "site = \"elbow\""), "elbow"),
-            (shoulder.replace("[patient]", "[patient]\nage_years = 130"), "patient.age_years is 130"),
-            (shoulder.replace("[patient]", "[patient]\nheight_cm = nan"), "patient.height_cm is NaN"),
+            (shoulder.replace("age_years = 52", "age_years = 130"), "patient.age_years is 130"),
+            (shoulder.replace("height_cm = 176.0", "height_cm = nan"), "patient.height_cm is NaN"),
             (format!("{shoulder}friction_n_per_mm = 0.02\n"), "friction_n_per_mm is the law jog's"),
+            (shoulder.replace("sex = \"male\"\n", ""), "thickness by-body-mass needs patient.sex"),
+            (shoulder.replace("thickness", "thick"), "thick"),
+            (format!("{shoulder}thickness = \"by-body-mass\"\n"), "none below it"),
             (phantom.replace("[force_table]", "[forces]"), "forces"),
             (phantom.replace("speeds_mm_s = [1.0, 3.0, 5.0]", "speeds_mm_s = [1.0, 3.0]"), "need 6 rows"),
             (phantom.replace("speeds_mm_s = [1.0,", "speeds_mm_s = [0.5, 1.0,"), "at most 3"),

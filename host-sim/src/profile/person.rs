@@ -1,5 +1,6 @@
 //! The `[patient]` of a profile: whom it stands for. The control law knows none of it; people, `profiles` and recordings do.
 
+use super::Layer;
 use serde::Deserialize;
 
 /// Each where it is known.
@@ -58,7 +59,53 @@ pub enum Difficulty {
     Hard,
 }
 
+/// What makes a layer as thick as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Thickness {
+    /// The superficial fat of the posterior arm by ultrasound, for each class of body mass index and sex. Cotofana et al. 2020,
+    /// J Drugs Dermatol 19(1):36.
+    ByBodyMass,
+}
+
+impl Thickness {
+    /// Of this patient, mm; refused where the patient's file does not say enough.
+    pub(super) fn of_mm(self, person: &Person) -> Result<f64, String> {
+        let Self::ByBodyMass = self;
+        let missing = || "thickness by-body-mass needs patient.sex, weight_kg and height_cm".to_owned();
+        let (sex, index) = (person.sex.ok_or_else(missing)?, person.body_mass_index().ok_or_else(missing)?);
+        // Below 25 kg/m², to 30, above.
+        let by_class = match sex {
+            Sex::Male => [3.70, 4.39, 5.09],
+            Sex::Female => [3.54, 4.34, 5.21],
+        };
+        Ok(by_class[usize::from(index >= 25.0) + usize::from(index >= 30.0)])
+    }
+}
+
+/// Where each layer begins, mm: as its key says, unless one above it is as thick as the patient makes it.
+pub(super) fn depths_mm(layers: &[Layer], person: &Person) -> Result<Vec<f64>, String> {
+    let (mut depths_mm, mut moved_mm) = (Vec::new(), 0.0);
+    for (number, layer) in layers.iter().enumerate() {
+        if layer.depth_mm < 0.0 {
+            return Err(format!("depth_mm of layer {number} is {}; it must be 0 or more", layer.depth_mm));
+        }
+        depths_mm.push(layer.depth_mm + moved_mm);
+        if let Some(thickness) = layer.thickness {
+            let below = layers.get(number + 1);
+            let below = below.ok_or_else(|| format!("layer {number} has a thickness and none below it"))?;
+            moved_mm += thickness.of_mm(person)? - (below.depth_mm - layer.depth_mm);
+        }
+    }
+    Ok(depths_mm)
+}
+
 impl Person {
+    /// In kg/m², where weight and height are known.
+    fn body_mass_index(&self) -> Option<f64> {
+        Some(self.weight_kg? / (self.height_cm? * 1e-2).powi(2))
+    }
+
     /// Refuses what no person is, by key and range.
     pub(super) fn check(&self) -> Result<(), String> {
         for (key, value, low, high) in [
@@ -76,5 +123,26 @@ impl Person {
             }
             _ => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fat_follows_from_weight_height_and_sex() {
+        let person = |sex, weight_kg| Person {
+            sex: Some(sex),
+            weight_kg: Some(weight_kg),
+            height_cm: Some(200.0),
+            ..Person::default()
+        };
+        let fat_mm =
+            |sex, weight_kg| Thickness::ByBodyMass.of_mm(&person(sex, weight_kg)).expect("all is known");
+        assert_eq!([99.0, 100.0, 119.0, 121.0].map(|kg| fat_mm(Sex::Male, kg)), [3.70, 4.39, 4.39, 5.09]);
+        assert_eq!([80.0, 110.0, 160.0].map(|kg| fat_mm(Sex::Female, kg)), [3.54, 4.34, 5.21]);
+        let unknown = Person { height_cm: None, ..person(Sex::Male, 80.0) };
+        assert!(Thickness::ByBodyMass.of_mm(&unknown).expect_err("no height").contains("height_cm"));
     }
 }

@@ -93,13 +93,14 @@ fn seed_002_need_1_any_insertion_point() {
     // The point is chosen by zeroing the device there, in the direction that the needle then has.
     let shoulder = profile("shoulder");
     let bursa = number(&shoulder, Tissue::Bursa);
+    let bursa_mm: f64 = shoulder.config.patient.layers[usize::from(bursa)].depth.0.to_num();
     for angle_deg in [40.0, 60.0, 85.0_f64] {
         let mut bench = Bench::new(&shoulder, angle_deg, 4.0);
         let sine = angle_deg.to_radians().sin();
-        bench.go(21.0 / sine, 10.0);
+        bench.go((bursa_mm + 1.0) / sine, 10.0);
         let depth_mm = bench.contact_mm(bursa) * sine;
         assert!(
-            (depth_mm - 20.0).abs() < 0.1,
+            (depth_mm - bursa_mm).abs() < 0.1,
             "the bursa lies at {depth_mm} mm when entered at {angle_deg}°"
         );
         assert_eq!(bench.events[0], Event::Contact(0, bench.contact_mm(0)));
