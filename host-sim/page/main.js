@@ -31,7 +31,7 @@ let tissue = new Tissue(scene);
 let linkStatus = null;
 /** What is drawn; the latest of everything. */
 const view = {
-  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, vessel: "outside", state: "idle",
+  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, lateral: 0, vessel: "outside", state: "idle",
   hand: 0, person: false, canDrag: false, seconds: 0,
 };
 /** How often a recording that is played had jumped when this was drawn. */
@@ -77,6 +77,7 @@ const receive = {
     view.torque = pose.torque_mnm;
     view.tilt = pose.tilt_rad;
     view.angle = pose.angle_rad;
+    view.lateral = pose.lateral_n;
     view.vessel = pose.vessel;
     view.state = pose.state;
     panel.limits(pose.limits, performance.now());

@@ -6,6 +6,7 @@ const LIMITS = [
   [4, "Fading in"],
   [8, "Motor warm"],
   [16, "Added damping"],
+  [32, "Force estimated"],
 ];
 /** A limit in force for a millisecond stays lit so long, or the lamp would flicker. */
 const LAMP_MS = 600;
@@ -70,6 +71,7 @@ export class Panel {
     const parts = [`Profile ${scene.profile}`, scene.procedure, source].filter(Boolean);
     write(byId("subtitle"), parts.join(" · "));
     byId("subtitle").title = parts.join(" · ");
+    byId("lateral-row").hidden = true;
   }
 
   device(device) {
@@ -93,6 +95,9 @@ export class Panel {
     write(byId("speed"), known ? number(view.speed, 1) : "–");
     write(byId("torque"), known ? number(view.torque, 1) : "–");
     write(byId("tilt"), known ? number((view.angle * 180) / Math.PI, 0) : "–");
+    // Of the one law that has such a force, once the needle was turned in its tissue.
+    if (known && view.lateral) byId("lateral-row").hidden = false;
+    write(byId("lateral"), known ? number(view.lateral, 2) : "–");
     write(byId("peak"), known ? number(view.peak, 2) : "–");
     this.lamps.forEach((lamp, i) => {
       const tone = condition === "live" && nowMs - this.lit[i] < LAMP_MS ? "warn" : "off";

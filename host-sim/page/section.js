@@ -72,7 +72,7 @@ export class Section {
     this.axis.y = Math.sin(this.axis.angle);
     const vessel = tissue.vessel?.far_mm ?? 0;
     const deepest = Math.max(vessel, tissue.layers.at(-1)?.depth_mm ?? 0, 5);
-    const below = Math.max(deepest + 1.5, view.depth * this.axis.y + 1.5);
+    const below = Math.max(deepest + Math.max(1.5, 0.15 * deepest), view.depth * this.axis.y + 1.5);
     const beyond = Math.max(0, view.depth * this.axis.x + 1.5);
     const wanted = Math.min(
       width / (width < NARROW.width ? NARROW.mm : WIDE_MM), ((1 - AIR_SHARE) * height) / below, ((1 - ENTRY_SHARE) * width) / beyond, 46);
@@ -187,7 +187,9 @@ export class Section {
     const { width } = this.surface;
     // On a phone the layers' names need the right edge.
     const end = width < NARROW.width ? width - NAMES_WIDE : width;
-    for (let mm = 5; mm <= reach; mm += 5) {
+    // Where five millimetres are narrower than their label, every second one has it.
+    const labelled = 5 * this.scale < 48 ? 10 : 5;
+    for (let mm = labelled; mm <= reach; mm += labelled) {
       if (this.x(mm * this.axis.x) < end) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
     }
     g.restore();

@@ -84,7 +84,7 @@ pub struct Pose {
     pub lateral_n: f64,
     /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault` or `unknown`.
     pub state: &'static str,
-    /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity.
+    /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity, 32 estimated.
     pub limits: u8,
 }
 
