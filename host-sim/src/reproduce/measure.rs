@@ -1,8 +1,10 @@
 //! What is read off a recording of a procedure: force over time and depth, what it was before and after a wall gave way.
 
 use crate::failure::Failure;
+use crate::profile::Profile;
 use crate::recording::export::{Stretch, stretches};
 use crate::recording::read::Recording;
+use crate::score::{Judge, spans};
 use control_core::TICK_HZ;
 use link::frames::EventKind;
 use std::ops::Range;
@@ -68,6 +70,12 @@ impl Trace {
     pub(super) fn nearly_deepest(&self) -> usize {
         let depth = self.depth_at(self.deepest()) - 0.5;
         (0..self.len()).find(|index| self.depth_at(*index) >= depth).unwrap_or(0)
+    }
+
+    /// Largest force across the needle that would have held its direction, N; none without a fixture.
+    pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
+        let judge = Judge::new(profile, self.stretch.first_tick);
+        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
     }
 
     /// Index of the deepest place.

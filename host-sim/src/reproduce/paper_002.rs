@@ -116,7 +116,9 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
     }
     for (tissue, _) in CUTTING {
         let Some(layer) = number(profile, tissue) else { continue };
-        let what = format!("force on the way out, {} (both injections)", tissue_name(tissue));
+        // The innermost is left before its cutting force has turned round.
+        let turning = if tissue == Tissue::Cartilage { ", turning round" } else { "" };
+        let what = format!("force on the way out, {}{turning} (both injections)", tissue_name(tissue));
         rows.push(row(
             &what,
             "opposite direction",
@@ -124,6 +126,12 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
             Whose::NoneGiven,
         ));
     }
+    rows.push(row(
+        "largest clamping force, across the needle (both injections)",
+        "drawn in Fig. 5",
+        each(&|t| t.largest_lateral_n(profile)),
+        Whose::NoneGiven,
+    ));
     let largest = profile.plan.largest_force().0.to_num::<f64>();
     rows.push(row(
         "largest force of the device",
