@@ -62,6 +62,7 @@ export class BodyView {
     }
     byId("body-note").textContent = "";
     this.limb.build(this.picture, this.scene);
+    this.ultrasound.build(this.picture);
   }
 
   happen(event) {

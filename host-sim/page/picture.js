@@ -13,7 +13,7 @@ export const SLICES = 64;
 export const ALONG_MM = [-9.1, 26];
 export const HALF_WIDTH_MM = 10.4;
 export const LIMB_RADIUS_MM = 42;
-export const IMAGE_MM = { width: 24, depth: 16 };
+export const IMAGE_WIDTH_MM = 24;
 
 export class Picture {
   /** Fetches and starts it; fails where the browser cannot. */
@@ -71,6 +71,9 @@ export class Picture {
       return { kind: this.core.surface_kind(i), layer: this.core.surface_layer(i), triangles };
     });
   }
+
+  /** How deep the ultrasound image reaches in this anatomy, mm. */
+  get imageDepth() { return this.core.image_depth(); }
 
   /** An ultrasound image: brightness, line after line. */
   image(probe, seconds, gain) {

@@ -1,6 +1,6 @@
 // The limb in three dimensions, cut along the needle's plane: WebGL 2. What it draws comes from picture.js; it moves nothing.
 
-import { ALONG_MM, HALF_WIDTH_MM, IMAGE_MM, KINDS, LIMB_RADIUS_MM, SLICES } from "./picture.js";
+import { ALONG_MM, HALF_WIDTH_MM, IMAGE_WIDTH_MM, KINDS, LIMB_RADIUS_MM, SLICES } from "./picture.js";
 
 const MOST_PIXELS_PER_POINT = 2;
 const NEEDLE = { radius: 0.41, length: 34, bevel: 2.1, hub: 1.7, hubLength: 7 };
@@ -229,15 +229,15 @@ export class Tissue3d {
     const sag = LIMB_RADIUS_MM - Math.sqrt(Math.max(0, LIMB_RADIUS_MM ** 2 - probe.across ** 2));
     const place = (u, v, n) => [0, 1, 2].map((i) => [probe.along, probe.across, sag][i] + u * lateral[i] + v * axial[i] + n * side[i]);
     const model = (at, a, b, d) => [...a, 0, ...b, 0, ...d, 0, ...at, 1];
-    const wide = lateral.map((x) => x * IMAGE_MM.width);
-    const deep = axial.map((x) => x * IMAGE_MM.depth);
+    const wide = lateral.map((x) => x * IMAGE_WIDTH_MM);
+    const deep = axial.map((x) => x * probe.depth);
     // In the needle's plane it would lie in the section.
     const { gl } = this;
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(-4, -8);
-    this.mesh(this.static.square, { colour: [...colour, 0.14], normal: side, model: model(place(-IMAGE_MM.width / 2, 0, 0), wide, side, deep) });
+    this.mesh(this.static.square, { colour: [...colour, 0.14], normal: side, model: model(place(-IMAGE_WIDTH_MM / 2, 0, 0), wide, side, deep) });
     gl.disable(gl.POLYGON_OFFSET_FILL);
-    const box = [lateral.map((x) => x * (IMAGE_MM.width + 1)), side.map((x) => x * 4), axial.map((x) => -x * 5)];
+    const box = [lateral.map((x) => x * (IMAGE_WIDTH_MM + 1)), side.map((x) => x * 4), axial.map((x) => -x * 5)];
     this.mesh(this.static.box, { colour: [...colour, 0.3], shine: 0.2, model: model(place(0, -0.1, 0), ...box) });
   }
 

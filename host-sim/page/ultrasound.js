@@ -1,6 +1,6 @@
 // The ultrasound image beside the limb, and the probe that a person moves over the skin.
 
-import { IMAGE_MM, LINES, SAMPLES } from "./picture.js";
+import { IMAGE_WIDTH_MM, LINES, SAMPLES } from "./picture.js";
 import { surface } from "./canvas.js";
 
 /** How far the probe may be moved, mm and rad. */
@@ -15,7 +15,7 @@ export class Ultrasound {
   constructor(canvas, colours) {
     this.surface = surface(canvas);
     this.colours = colours;
-    this.probe = { ...ALONG_VIEW };
+    this.probe = { ...ALONG_VIEW, depth: 16 };
     this.since = Infinity;
     this.image = document.createElement("canvas");
     this.image.width = SAMPLES;
@@ -37,7 +37,7 @@ export class Ultrasound {
     });
     canvas.addEventListener("pointermove", (event) => {
       if (last?.pointerId !== event.pointerId) return;
-      const mm = IMAGE_MM.width / this.shown.width;
+      const mm = IMAGE_WIDTH_MM / this.shown.width;
       const [dx, dy] = [event.clientX - last.clientX, event.clientY - last.clientY];
       if (event.shiftKey) this.move("azimuth", dx * 0.006);
       else {
@@ -66,6 +66,11 @@ export class Ultrasound {
     });
   }
 
+  /** Another anatomy: the image reaches as deep as that asks for. */
+  build(picture) {
+    this.probe.depth = picture.imageDepth;
+  }
+
   move(name, by) {
     const [low, high] = REACH[name];
     this.probe[name] = Math.min(high, Math.max(low, this.probe[name] + by));
@@ -92,8 +97,8 @@ export class Ultrasound {
     const { context: g, width, height } = this.surface;
     g.fillStyle = "#000";
     g.fillRect(0, 0, width, height);
-    const scale = Math.min((width - 44) / IMAGE_MM.width, (height - 34) / IMAGE_MM.depth);
-    this.shown = { width: IMAGE_MM.width * scale, height: IMAGE_MM.depth * scale };
+    const scale = Math.min((width - 44) / IMAGE_WIDTH_MM, (height - 34) / this.probe.depth);
+    this.shown = { width: IMAGE_WIDTH_MM * scale, height: this.probe.depth * scale };
     const left = (width - this.shown.width + 30) / 2;
     const top = 10;
     g.save();
@@ -112,12 +117,12 @@ export class Ultrasound {
     g.textAlign = "right";
     g.textBaseline = "middle";
     g.beginPath();
-    for (let mm = 0; mm <= IMAGE_MM.depth; mm++) {
+    for (let mm = 0; mm <= this.probe.depth; mm++) {
       g.moveTo(left - 4, top + mm * scale);
       g.lineTo(left - (mm % 5 ? 7 : 11), top + mm * scale);
     }
     g.stroke();
-    for (let mm = 0; mm <= IMAGE_MM.depth; mm += 5) g.fillText(`${mm}`, left - 14, top + mm * scale);
+    for (let mm = 0; mm <= this.probe.depth; mm += 5) g.fillText(`${mm}`, left - 14, top + mm * scale);
   }
 
   words_(g, left, top) {

@@ -131,6 +131,12 @@ pub extern "C" fn probe(along_mm: f32, across_mm: f32, azimuth: f32, lean: f32) 
     with(|picture| picture.hold_probe(along_mm, across_mm, azimuth, lean));
 }
 
+/// How deep the ultrasound image reaches, mm: as deep as the anatomy asks for.
+#[unsafe(no_mangle)]
+pub extern "C" fn image_depth() -> f32 {
+    with(|picture| picture.image_depth_mm())
+}
+
 /// Makes an ultrasound image, the last one being `seconds` ago: brightness, 256 lines of 1,024 samples.
 #[unsafe(no_mangle)]
 pub extern "C" fn image(seconds: f32, gain_db: f32) -> usize {

@@ -17,8 +17,11 @@ const THINNEST_MM: f32 = 0.3;
 pub const SLICES: usize = 64;
 /// Outer radius of a 21-gauge needle, mm.
 const NEEDLE_RADIUS_MM: f32 = 0.41;
-/// Width and depth of the ultrasound image, mm.
-const IMAGE_MM: [f32; 2] = [24.0, 16.0];
+/// Width of the ultrasound image, mm.
+const IMAGE_WIDTH_MM: f32 = 24.0;
+/// Its depth at the least and at the most, and how far it reaches below the innermost layer's top, mm.
+const IMAGE_DEPTH_MM: [f32; 2] = [16.0, 40.0];
+const IMAGE_BELOW_MM: f32 = 4.0;
 
 /// What the page is to draw a surface as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +76,13 @@ struct Given {
     is_far: bool,
 }
 
+/// Deep enough for the innermost layer, focused in the middle.
+fn probe_for(given: &[Given]) -> Probe {
+    let innermost = given.iter().map(|layer| layer.depth_mm).fold(0.0, f32::max);
+    let depth_mm = (innermost + IMAGE_BELOW_MM).clamp(IMAGE_DEPTH_MM[0], IMAGE_DEPTH_MM[1]);
+    Probe { width_mm: IMAGE_WIDTH_MM, depth_mm, focus_mm: depth_mm / 2.0, ..Probe::default() }
+}
+
 impl Picture {
     /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
@@ -110,7 +120,7 @@ impl Picture {
             limb_radius_mm: radius,
             lumen: [[0.0; 2]; SLICES],
             imager: Imager::default(),
-            probe: Probe { width_mm: IMAGE_MM[0], depth_mm: IMAGE_MM[1], ..Probe::default() },
+            probe: probe_for(&given),
             score: InPlaneScore::default(),
             shaft: Shaft {
                 tip_mm: [0.0; 3],
@@ -121,6 +131,11 @@ impl Picture {
         };
         picture.cut_vessel();
         Ok(picture)
+    }
+
+    /// How deep the ultrasound image reaches, mm.
+    pub fn image_depth_mm(&self) -> f32 {
+        self.probe.depth_mm
     }
 
     /// The device says that the wall of a layer of the scene gave way, or that the needle has left it.
@@ -346,6 +361,18 @@ mod tests {
         4.0, 0.0, 0.0, 3.0, 0.02, 2.0, 2.0, -1.0, 0.02, 7.0, 4.8, 1.41, 0.02, 8.0, 7.8, 1.41, 0.02, 4.46,
         0.0, 0.52,
     ];
+
+    #[test]
+    fn the_image_is_as_deep_as_the_anatomy() {
+        let depth_mm = |numbers: &[f32]| Picture::new(numbers).expect("it can be built").image_depth_mm();
+        assert_eq!(depth_mm(&ADULT), 16.0);
+        // Skin, muscle to 20 mm, bursa.
+        let deep = [3.0, 0.0, 0.0, 1.2, 0.0, 2.0, 6.0, -1.0, 0.0, 4.0, 20.0, -1.0, 0.0, f32::NAN, 0.0, 0.8];
+        assert_eq!(depth_mm(&deep), 24.0);
+        // Deeper than any that is drawn.
+        let beyond = [1.0, 0.0, 90.0, 1.2, 0.0, f32::NAN, 0.0, 0.8];
+        assert!(Picture::new(&beyond).map_or(40.0, |picture| picture.image_depth_mm()) <= 40.0);
+    }
 
     #[test]
     fn the_picture_follows_the_device_s_punctures_and_shows_the_needle_in_its_plane() {
