@@ -1,4 +1,4 @@
-//! The live streams against clients by hand; `host-sim/tests/clients` holds the independent ones from package registries.
+//! The live streams against clients by hand; `tests/clients` holds the independent ones from package registries.
 
 use control_core::units::{Millimetres, Milliradians};
 use fixed::types::I16F16;

@@ -30,6 +30,7 @@ The project's chores.
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask class             a class over Zenoh: its tests, and thirty devices measured; builds for minutes
+  cargo xtask foxglove          Foxglove's live stream read by Foxglove's own client; builds for minutes
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
         "class" => no_more(rest).and_then(|()| test::class()),
+        "foxglove" => no_more(rest).and_then(|()| test::foxglove()),
         "board-test" => no_more(rest).and_then(|()| board_test::run()),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),

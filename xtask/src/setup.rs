@@ -72,6 +72,28 @@ pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Failure> {
     Ok(interpreter)
 }
 
+/// Packages for node in `target/node`, exactly these (`name@version`) and what they need; the folder for `NODE_PATH`.
+pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Failure> {
+    node()?;
+    let folder = shell::target().join("node");
+    let modules = folder.join("node_modules");
+    let is_there = |package: &&str| {
+        let (name, version) = package.rsplit_once('@').unwrap_or((*package, ""));
+        fs::read_to_string(modules.join(name).join("package.json"))
+            .is_ok_and(|text| text.contains(&format!("\"version\": \"{version}\"")))
+    };
+    if !packages.iter().all(is_there) {
+        if !shell::is_on_path("npm") {
+            install(&["npm"], "the test of other programs' clients")?;
+        }
+        // Not the scripts that packages bring: none of these needs one.
+        let mut npm = Command::new("npm");
+        npm.args(["install", "--no-save", "--ignore-scripts", "--no-audit", "--no-fund", "--prefix"]);
+        shell::run(npm.arg(&folder).args(packages))?;
+    }
+    Ok(modules)
+}
+
 /// What runs WebAssembly without a browser.
 pub(crate) fn node() -> Result<(), Failure> {
     if shell::is_on_path("node") {

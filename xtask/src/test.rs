@@ -49,9 +49,10 @@ const STEPS: [Step; 13] = [
 ];
 
 /// What this does not run, and why.
-const NEVER_HERE: [(&str, &str); 2] = [
+const NEVER_HERE: [(&str, &str); 3] = [
     ("hardware", "flashing and running on a real STM32F4DISCOVERY: needs the board and a person beside it"),
     ("class", "devices and instructor over Zenoh, which builds for minutes: run `cargo xtask class`"),
+    ("foxglove", "Foxglove's live stream, whose build takes minutes: run `cargo xtask foxglove`"),
 ];
 
 /// When the whole run has to be over.
@@ -210,7 +211,6 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
 
 /// Libraries of other people, each at the version that the check was written against.
 const CLIENTS: [&str; 4] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0"];
-
 fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let python = setup::python(&CLIENTS)?;
     clock.run(cargo().args(["build", "--release", "--quiet", "-p", "host-sim", ANY_RUST]))?;
@@ -271,6 +271,20 @@ pub(crate) fn class() -> Result<(), Failure> {
     // One after the other: what is measured must not share the machine.
     test.args(["--", "--include-ignored", "--nocapture", "--test-threads", "1"]);
     clock.run(&mut test)
+}
+
+/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the version that the check was
+/// written against.
+const FOXGLOVE_CLIENT: [&str; 3] = ["@foxglove/ws-protocol@0.8.0", "ws@8.23.0", "protobufjs@8.8.1"];
+
+/// Foxglove's live stream read by Foxglove's own client; needs a build of its own.
+pub(crate) fn foxglove() -> Result<(), Failure> {
+    let clock = Clock(Instant::now() + LIMIT);
+    let modules = setup::node_packages(&FOXGLOVE_CLIENT)?;
+    clock.run(cargo().args(["build", "--release", "-p", "host-sim", "--features", "foxglove", ANY_RUST]))?;
+    let mut node = Command::new("node");
+    node.env("NODE_PATH", modules).arg(shell::top().join("tests/clients/foxglove.cjs"));
+    clock.run(node.arg(shell::target().join("release/host-sim")))
 }
 
 /// Nextest where it is installed, else cargo's own.
