@@ -1,6 +1,7 @@
 //! What a person configures, in physical units. It travels over the link and is kept in flash; it says nothing about
 //! whether it is safe: only [`crate::plan::Plan::new`] does.
 
+use crate::compensation::Compensation;
 use crate::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians, Newtons,
     Stiffness,
@@ -59,6 +60,8 @@ pub struct Device {
     pub damping: Damping,
     /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
     pub passivity_damping: Damping,
+    /// What of its own forces the device takes away from the hand.
+    pub compensation: Compensation,
     /// What stands above was found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
     pub commissioned: bool,
 }
@@ -166,6 +169,7 @@ impl Default for Device {
             damping: Damping::default(),
             // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
+            compensation: Compensation::NONE,
             commissioned: true,
         }
     }

@@ -2,6 +2,8 @@
 //! nothing else.
 
 use crate::anatomy::{self, Insertion};
+use crate::compensation::Gains;
+use crate::compensation::feedforward::{Feedforward, Here};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
 use crate::kinematics::{SpeedEstimator, moved};
@@ -94,6 +96,11 @@ pub enum Order {
     Trip(Fault),
     /// Play an excitation from where the motor is; only while torque is off. It has passed [`Excitation::check`].
     Excite(Excitation),
+    /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
+    /// [`crate::compensation::check::check`].
+    Compensate(Gains),
+    /// The rotor's angle, from which waves are counted, is nought at this many counts past the zero; `None`: it is not known.
+    Index(Option<Counts>),
 }
 
 /// The control law with its memory.
@@ -109,6 +116,7 @@ pub struct Controller {
     insertion: Insertion,
     memory: Memory,
     observer: Observer,
+    feedforward: Feedforward,
     winding: Winding,
     limiter: Limiter,
     silent_ticks: u32,
@@ -144,6 +152,8 @@ impl Controller {
     pub fn warm(plan: Plan, heat: u32) -> Self {
         let mut winding = Winding::with_heat(heat);
         winding.allow(&plan.thermal, plan.torque_limits.torque);
+        let mut feedforward = Feedforward::default();
+        feedforward.set_gains(plan.device().compensation.gains);
         Self {
             speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
             insertion: Insertion::new(&plan.anatomy),
@@ -154,6 +164,7 @@ impl Controller {
             origin: Counts(0),
             previous: None,
             observer: Observer::default(),
+            feedforward,
             winding,
             limiter: Limiter::default(),
             silent_ticks: 0,
@@ -179,13 +190,13 @@ impl Controller {
         match order {
             Order::Start if !self.mode.is_powered() => {
                 self.insertion.begin();
-                self.power_up(Mode::Running);
+                self.power_up(Mode::Running, true);
             }
             Order::Excite(excitation) if !self.mode.is_powered() => {
                 let depth = self.plan.scale.depth(self.latest_count());
                 self.player = Some(Player::new(&excitation, depth));
                 self.withdraw();
-                self.power_up(Mode::Exciting);
+                self.power_up(Mode::Exciting, excitation.compensated);
             }
             Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
             Order::Zero if !self.mode.is_powered() => {
@@ -196,12 +207,22 @@ impl Controller {
             Order::Heartbeat => self.heartbeat(),
             Order::Configure(plan) if !self.mode.is_powered() => {
                 self.speed = SpeedEstimator::new(plan.config.device.speed, self.latest_count());
+                self.feedforward.configure(self.plan.device(), plan.device());
                 self.plan = plan;
                 self.withdraw();
                 self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque);
             }
             Order::Trip(fault) => self.trip(fault),
-            Order::Start | Order::Stop | Order::Zero | Order::Configure(_) | Order::Excite(_) => {}
+            Order::Compensate(gains) => self.feedforward.set_gains(gains),
+            Order::Index(index) if !self.mode.is_powered() => {
+                self.feedforward.set_index(index.map(|count| self.origin.0.wrapping_add(count.0)));
+            }
+            Order::Start
+            | Order::Stop
+            | Order::Zero
+            | Order::Configure(_)
+            | Order::Excite(_)
+            | Order::Index(_) => {}
         }
     }
 
@@ -216,8 +237,10 @@ impl Controller {
         self.memory = self.plan.law.memory();
     }
 
-    fn power_up(&mut self, mode: Mode) {
+    fn power_up(&mut self, mode: Mode, is_compensated: bool) {
         self.limiter.restart();
+        let count = self.previous.unwrap_or_default().0;
+        self.feedforward.restart(&self.plan.compensation, count, is_compensated);
         self.observer = Observer::new(self.plan.scale.depth(self.latest_count()));
         self.silent_ticks = 0;
         self.frozen_ticks = 0;
@@ -236,6 +259,11 @@ impl Controller {
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
             Some((wanted, limits)) => {
                 let limits = if tissue.estimated { limits.with(Limits::ESTIMATED) } else { limits };
+                let (wanted, limits) = if self.feedforward.is_on() {
+                    self.compensated(wanted, limits, speed, input.tilt)
+                } else {
+                    (wanted, limits)
+                };
                 self.limit(wanted, limits)
             }
             None => (MillinewtonMetres::default(), Limits::default()),
@@ -399,7 +427,8 @@ impl Controller {
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
                 // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
                 let torque = I16F16::from_bits(-scaled(given.0.to_bits(), self.plan.lever.to_bits(), 16));
-                Some((MillinewtonMetres(self.runaway.steady(torque, self.limiter.given().0)), limits))
+                let before = self.limiter.given().0 - self.feedforward.fed();
+                Some((MillinewtonMetres(self.runaway.steady(torque, before)), limits))
             }
             Mode::Exciting => {
                 let torque = self.player.as_mut().and_then(|player| player.tick(radius, depth, speed));
@@ -410,6 +439,22 @@ impl Controller {
             }
             Mode::Idle | Mode::Faulted => None,
         }
+    }
+
+    /// `wanted` and `limits` with what is fed forward beside the law or the excitation.
+    #[inline(always)]
+    fn compensated(
+        &mut self,
+        MillinewtonMetres(wanted): MillinewtonMetres,
+        limits: Limits,
+        speed: MillimetresPerSecond,
+        tilt: Milliradians,
+    ) -> (MillinewtonMetres, Limits) {
+        let count = self.previous.unwrap_or_default().0;
+        let here = Here { count, speed, tilt, turn: self.turn };
+        let found = &self.plan.config.device.compensation;
+        let (torque, is_held) = self.feedforward.tick(found, &self.plan.compensation, here, wanted);
+        (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {

@@ -5,9 +5,10 @@
 //! follow: it plays the same [`Reference`].
 
 use crate::TICK_HZ;
-use crate::math::{multiply, scaled, times, upper_half};
+use crate::math::{multiply, scaled, times};
 use crate::plan::Plan;
 use crate::refusal::{Field, Refusal, within};
+use crate::sine::sine;
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
 use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;
@@ -30,6 +31,8 @@ pub struct Excitation {
     pub servo: Servo,
     /// Largest distance from where it began, 1–1,000 mm along the roller; beyond it is a fault.
     pub travel: Millimetres,
+    /// With what the device feeds forward: shows what is left of the mechanism. Without, the mechanism as it is.
+    pub compensated: bool,
 }
 
 /// A soft position servo: `F = K·(r − x) + D·(ṙ − ẋ)`.
@@ -342,50 +345,6 @@ fn multisine<'a>(lines: impl Iterator<Item = &'a mut Line>, torque: I16F16) -> I
     })
 }
 
-/// Sine of a phase of which 2^32 is a turn; error below 1e-4. Straight lines between 256 points: twelve sines are to fit a
-/// tick.
-fn sine(phase: u32) -> I2F30 {
-    let place = (phase >> 24) as usize;
-    let point = |place: usize| SINE_Q30.get(place).copied().unwrap_or_default();
-    let (from, to) = (point(place), point(place + 1));
-    // The rest of the phase in Q31, and a way of which the last bit is free.
-    let way = upper_half((to - from) << 1, (phase << 8 >> 1).cast_signed());
-    I2F30::from_bits(from + way)
-}
-
-/// A turn of the sine and its first point again.
-static SINE_Q30: [i32; 257] = sine_table();
-
-#[expect(clippy::indexing_slicing, reason = "evaluated by the compiler")]
-const fn sine_table() -> [i32; 257] {
-    const HALF_PI_Q30: i64 = 1_686_629_713;
-    const QUARTER: i64 = 64;
-    let mut table = [0; 257];
-    let mut place = 0;
-    while place < 257 {
-        // From −1 to 1 quarter turns; beyond a quarter the sine runs back.
-        let turn = (place as i64 + 2 * QUARTER) % (4 * QUARTER) - 2 * QUARTER;
-        let folded = if turn > QUARTER {
-            2 * QUARTER - turn
-        } else if turn < -QUARTER {
-            -2 * QUARTER - turn
-        } else {
-            turn
-        };
-        let x = HALF_PI_Q30 * folded / QUARTER;
-        // x·(1 − x²/(2·3)·(1 − x²/(4·5)·(…))), to x¹³.
-        let square = (x * x) >> 30;
-        let (mut sum, mut n) = (1_i64 << 30, 12);
-        while n > 0 {
-            sum = (1 << 30) - ((square * sum) >> 30) / (n * (n + 1));
-            n -= 2;
-        }
-        table[place] = ((x * sum) >> 30) as i32;
-        place += 1;
-    }
-    table
-}
-
 /// Plays an excitation against the motor: the reference, the servo and the end.
 #[derive(Clone, Debug)]
 pub(crate) struct Player {
@@ -435,16 +394,6 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    #[test]
-    fn the_sine_follows_its_twin() {
-        for step in 0..4096_u32 {
-            let phase = step << 20;
-            let exact = (f64::from(step) / 4096.0 * core::f64::consts::TAU).sin();
-            let got = sine(phase).to_num::<f64>();
-            assert!((got - exact).abs() < 1e-4, "{step}: {got} for {exact}");
-        }
-    }
-
     fn staircase() -> Signal {
         Signal::SpeedStaircase {
             slowest: MillimetresPerSecond(I16F16::from_num(2)),
@@ -479,7 +428,8 @@ mod tests {
         let plan = Config::default().plan().unwrap();
         let servo = Servo { stiffness: Stiffness(I16F16::from_num(0.1)), damping: Damping::default() };
         let travel = Millimetres(I16F16::from_num(100));
-        let sound = Excitation { signal: staircase(), duration_ms: 10_000, servo, travel };
+        let sound =
+            Excitation { signal: staircase(), duration_ms: 10_000, servo, travel, compensated: false };
         assert_eq!(sound.check(&plan), Ok(()));
         let short = Excitation { travel: Millimetres(I16F16::from_num(50)), ..sound.clone() };
         assert!(matches!(short.check(&plan), Err(Refusal::OutOfRange { field: Field::Travel, .. })));

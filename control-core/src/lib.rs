@@ -1,7 +1,8 @@
 //! What the device computes ten thousand times a second: encoder count in, DAC code out.
 //!
 //! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → `law` (the
-//! force law) → torque → [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together and holds the
+//! force law) → torque, with what [`compensation`] feeds forward beside it → [`safety`] (limit, fade-in, slew) → DAC code.
+//! [`controller::Controller`] strings them together and holds the
 //! operating mode; [`config`] is what a person writes and [`plan`] what may run, or the reason why not.
 //!
 //! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board and the simulator run
@@ -17,6 +18,7 @@
 )]
 
 pub mod anatomy;
+pub mod compensation;
 pub mod config;
 pub mod controller;
 pub mod event;
@@ -32,6 +34,7 @@ mod proxy;
 mod refusal;
 mod runaway;
 pub mod safety;
+mod sine;
 mod thermal;
 mod tissue;
 pub mod units;

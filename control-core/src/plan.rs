@@ -5,6 +5,7 @@ mod layers;
 
 use crate::TICK_HZ;
 use crate::anatomy::Anatomy;
+use crate::compensation::{check, feedforward};
 use crate::config::{Config, Device, Patient, Tissue};
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
 use crate::law;
@@ -41,6 +42,7 @@ pub struct Plan {
     pub(crate) bounce_damping: BounceDamping,
     pub(crate) runaway: runaway::Bounds,
     pub(crate) damping: I2F30,
+    pub(crate) compensation: feedforward::Ready,
     pub(crate) dac: DacScale,
     /// −1 where the encoder counts down on the way in.
     pub(crate) encoder_sign: i32,
@@ -79,7 +81,8 @@ impl Plan {
                 slew_per_tick: config.device.limits.slew_per_tick.0,
                 fade_per_tick: I2F30::ONE / fade_ticks,
             },
-            frozen_torque: config.device.limits.torque.0.unsigned_abs() / FROZEN_TORQUE_SHARE,
+            frozen_torque: config.device.limits.torque.0.unsigned_abs() / FROZEN_TORQUE_SHARE
+                + check::at_rest(device),
             thermal: ThermalLimits::new(
                 config.device.limits.continuous_torque,
                 config.device.limits.winding_time_s,
@@ -91,6 +94,7 @@ impl Plan {
             ),
             bounce_damping: BounceDamping::new(config.device.passivity_damping),
             damping: I2F30::saturating_from_num(config.device.damping.0),
+            compensation: check::prepare(device),
             dac: DacScale::new(device),
             encoder_sign: if device.encoder_reversed { -1 } else { 1 },
             travel_counts: counts_reaching(config.device.limits.travel, mm_per_count).unsigned_abs(),
@@ -190,7 +194,8 @@ pub(crate) fn check_device(device: &Device) -> Result<(), Refusal> {
     }
     // 0.02 N·s/mm: at 50 mm/s a newton.
     let passivity = I16F16::saturating_from_num(device.passivity_damping.0);
-    within(Field::PassivityDamping, passivity, I16F16::ZERO, milli(20))
+    within(Field::PassivityDamping, passivity, I16F16::ZERO, milli(20))?;
+    check::check(device, device.compensation.gains)
 }
 
 /// No patient asks for more than the device's torque ceiling.

@@ -87,6 +87,20 @@ pub enum Refusal {
         /// What the ceiling gives at the roller, in N.
         ceiling: I16F16,
     },
+    /// The parts of a compensation ask together for more than its share of the torque ceiling.
+    CompensationTooStrong {
+        /// What they ask for, in mN·m.
+        torque: I16F16,
+        /// What they may ask for, in mN·m.
+        limit: I16F16,
+    },
+    /// With the friction that a compensation leaves, the stiffness that the device allows would ring.
+    CompensationUnstable {
+        /// What the device allows, in N/mm.
+        stiffness: I16F16,
+        /// What is stable, in N/mm.
+        limit: I16F16,
+    },
 }
 
 /// A value of the configuration that has a range.
@@ -148,6 +162,20 @@ pub enum Field {
     TableForce,
     VesselWidth,
     VesselOffset,
+    CompensationVersion,
+    WaveOrder,
+    WaveAmplitude,
+    Ripple,
+    DryFriction,
+    RestSpeed,
+    FullSpeed,
+    Weight,
+    DriveOffset,
+    Deadband,
+    AngleGain,
+    FrictionGain,
+    WeightGain,
+    DriveGain,
 }
 
 impl fmt::Display for Refusal {
@@ -199,6 +227,14 @@ impl fmt::Display for Refusal {
             Refusal::Count { field, found, wanted } => {
                 write!(f, "there are {found} values of {field:?}; there must be {wanted}")
             }
+            Refusal::CompensationTooStrong { torque, limit } => write!(
+                f,
+                "the compensation asks for {torque:.3} mN·m and may ask for {limit:.3} mN·m, a quarter of the torque ceiling; lower its gains"
+            ),
+            Refusal::CompensationUnstable { stiffness, limit } => write!(
+                f,
+                "with this compensation more than {limit:.3} N/mm would ring and the device allows {stiffness:.3} N/mm; lower its gains or the device's stiffness"
+            ),
             Refusal::Empty => f.write_str("there is no layer; add one"),
         }
     }

@@ -118,7 +118,7 @@ fn a_hold_asks_for_nothing() {
 
 fn played(signal: Signal) -> Excitation {
     let servo = Servo { stiffness: Stiffness(q(0.1)), damping: Damping(I8F24::from_num(0.001)) };
-    Excitation { signal, duration_ms: 1_000, servo, travel: Millimetres(q(10.0)) }
+    Excitation { signal, duration_ms: 1_000, servo, travel: Millimetres(q(10.0)), compensated: false }
 }
 
 fn refused(excitation: &Excitation) -> Option<Field> {

@@ -226,6 +226,7 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
         duration_ms: 1_000,
         servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
         travel: Millimetres(I16F16::from_num(20)),
+        compensated: false,
     };
     let mut c = Controller::new(Config::default().plan().expect("sound"));
     c.tick(TickInput { tilt: STRAIGHT, ..TickInput::default() });

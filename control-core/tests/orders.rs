@@ -44,6 +44,7 @@ fn ramps(travel_mm: i32) -> Excitation {
         duration_ms: 1_000,
         servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
         travel: Millimetres(I16F16::from_num(travel_mm)),
+        compensated: false,
     }
 }
 

@@ -4,6 +4,7 @@
 //! an earlier connection is ever played again. Commands are repeated until they are answered; a heartbeat says every 50 ms
 //! that the PC lives.
 
+use control_core::compensation::Gains;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
 use link::codec::MAX_FRAME;
@@ -36,6 +37,10 @@ pub enum Request {
     Device(Box<Device>),
     /// Which device's part is in force.
     ReportDevice,
+    /// Other gains of the compensation.
+    Compensate(Gains),
+    /// At how many counts past the zero the rotor's angle is nought.
+    Index(i32),
 }
 
 /// The PC's side of a conversation.
@@ -137,6 +142,8 @@ impl Driver {
             Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
             Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
             Request::ReportDevice => self.waiting.push_back(Command::ReportDevice),
+            Request::Compensate(gains) => self.waiting.push_back(Command::Compensate(gains)),
+            Request::Index(count) => self.waiting.push_back(Command::Index(Some(count))),
         }
     }
 

@@ -54,6 +54,8 @@ fn called(refusal: Refusal) -> &'static str {
         Refusal::Count { .. } => "count",
         Refusal::Empty => "empty",
         Refusal::AboveCeiling { .. } => "above ceiling",
+        Refusal::CompensationTooStrong { .. } => "compensation too strong",
+        Refusal::CompensationUnstable { .. } => "compensation unstable",
     }
 }
 
@@ -73,6 +75,8 @@ fn every_refusal_and_verdict_stands_in_the_glossary() {
         Refusal::Count { field: Field::Travel, found: 1, wanted: 2 },
         Refusal::Empty,
         Refusal::AboveCeiling { force: x, ceiling: x },
+        Refusal::CompensationTooStrong { torque: x, limit: x },
+        Refusal::CompensationUnstable { stiffness: x, limit: x },
     ];
     let table = rows("Refusals of a configuration");
     assert_eq!(table.len(), 1 + refusals.len());

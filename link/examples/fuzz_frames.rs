@@ -1,6 +1,7 @@
 //! Throws damaged frames at both ends of the link for a while: `cargo run --release -p link --example fuzz_frames --
 //! --seconds 60 [--seed N]`. Nothing may panic, and after any damage the next whole frame must be read.
 
+use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;
 use control_core::{Controller, TickInput};
 use link::codec::{self, MAX_FRAME};
@@ -60,11 +61,13 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 }
 
 fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
-    let command = match random.u8(0..9) {
+    let command = match random.u8(0..11) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
         7 => Command::ReportDevice,
+        8 => Command::Compensate(Gains { angle: Gain(random.u8(..)), ..Gains::OFF }),
+        9 => Command::Index(Some(random.i32(..))),
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::Zero,

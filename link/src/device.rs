@@ -6,9 +6,11 @@ use crate::frames::{
     Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
     PROTOCOL_VERSION, Pose, Rejection, SampleBlock, SaveFailure, Timing,
 };
+use control_core::compensation::check::check;
 use control_core::config::{Device, Tissue};
 use control_core::event::{Fault, Limits};
 use control_core::interlock::{Interlock, Interlocks};
+use control_core::units::Counts;
 use control_core::{Order, Patient, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use heapless::{Deque, HistoryBuf};
@@ -309,6 +311,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             | Command::ConfigureDevice(_)
             | Command::Zero
             | Command::Excite(_)
+            | Command::Index(_)
                 if powered =>
             {
                 Err(Rejection::Powered)
@@ -349,6 +352,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.device_due = true;
                 Ok(())
             }
+            Command::Compensate(gains) => {
+                check(self.plan.device(), gains).map_err(Rejection::Config)?;
+                self.order(Order::Compensate(gains))
+            }
+            Command::Index(index) => self.order(Order::Index(index.map(Counts))),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What is said. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
+use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
@@ -12,7 +13,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -298,4 +299,10 @@ pub enum Command {
     ConfigureDevice(Device),
     /// Tell the device's part of the configuration.
     ReportDevice,
+    /// The gains of the compensation from now on, torque on or off, until the device is configured or restarted; taken whole or
+    /// refused with the reason.
+    Compensate(Gains),
+    /// The rotor's angle is nought at this many counts past the zero, until the device is restarted; `None`: it is not known.
+    /// Only while torque is off.
+    Index(Option<i32>),
 }

@@ -122,6 +122,7 @@ fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
             duration_ms: 100,
             servo,
             travel: Millimetres(I16F16::from_num(100)),
+            compensated: false,
         })
     };
     let ramps = |torque| Signal::BreakawayRamps { torque: MillinewtonMetres(torque), ramp_ms: 50 };

@@ -23,6 +23,7 @@ fn ramps(torque: MillinewtonMetres, stiffness: f64) -> Command {
         duration_ms: 400,
         servo: Servo { stiffness: Stiffness(I16F16::from_num(stiffness)), damping: Damping::default() },
         travel: Millimetres(I16F16::from_num(200)),
+        compensated: false,
     })
 }
 

@@ -37,6 +37,7 @@ fn full_torque_both_ways_reaches_the_pin() {
         duration_ms: 1_000,
         servo,
         travel: Millimetres(I16F16::from_num(50)),
+        compensated: false,
     };
     rig.pc.must(&mut rig.board, Command::Excite(excitation));
     rig.pc.run_ms(&mut rig.board, 1_000);

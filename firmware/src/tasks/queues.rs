@@ -1,5 +1,6 @@
 //! The queues between tasks: one writer and one reader each, no lock.
 
+use control_core::compensation::Gains;
 use control_core::{Order, TickOutput};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -11,7 +12,7 @@ pub const PACKET_BYTES: usize = 64;
 /// Bytes on their way to or from the PC.
 pub type Packet = Vec<u8, PACKET_BYTES>;
 
-/// An order in a byte: what a tick moves without noticing.
+/// An order in a few bytes: what a tick moves without noticing.
 #[derive(Clone, Copy)]
 pub enum SmallOrder {
     /// In the session of this number.
@@ -22,7 +23,9 @@ pub enum SmallOrder {
     Zero,
     /// The PC is alive.
     Heartbeat,
-    /// Take the large one that waits: a plan or an excitation, which are rare and only for a device whose torque is off;
+    /// Other gains of the compensation.
+    Compensate(Gains),
+    /// Take the large one that waits: a plan, an excitation or the rotor's angle, which are rare and only for a device whose torque is off;
     /// in the session of this number.
     Large(u8),
 }

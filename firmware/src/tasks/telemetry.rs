@@ -132,11 +132,12 @@ impl<B: Board> Telemetry<B> {
                 Order::Stop => SmallOrder::Stop,
                 Order::Zero => SmallOrder::Zero,
                 Order::Heartbeat => SmallOrder::Heartbeat,
+                Order::Compensate(gains) => SmallOrder::Compensate(gains),
                 Order::Trip(fault) => {
                     self.shared.trips.raise(fault);
                     continue;
                 }
-                large @ (Order::Configure(_) | Order::Excite(_)) => {
+                large @ (Order::Configure(_) | Order::Excite(_) | Order::Index(_)) => {
                     if !self.ends.orders.ready() || !self.ends.large_orders.ready() {
                         self.held = Some(large);
                         return;
@@ -158,6 +159,7 @@ impl<B: Board> Telemetry<B> {
                     SmallOrder::Stop => Some(Order::Stop),
                     SmallOrder::Zero => Some(Order::Zero),
                     SmallOrder::Heartbeat => Some(Order::Heartbeat),
+                    SmallOrder::Compensate(gains) => Some(Order::Compensate(gains)),
                     // Its room was seen above.
                     SmallOrder::Large(_) => None,
                 };

@@ -116,6 +116,7 @@ impl<B: Board> Tick<B> {
             SmallOrder::Stop => self.controller.order(Order::Stop),
             SmallOrder::Zero => self.controller.order(Order::Zero),
             SmallOrder::Heartbeat => self.controller.heartbeat(),
+            SmallOrder::Compensate(gains) => self.controller.order(Order::Compensate(gains)),
             SmallOrder::Large(session) => match self.ends.large_orders.dequeue() {
                 Some(excite @ Order::Excite(_)) => self.power_up(session, excite),
                 Some(order) => {

@@ -90,6 +90,19 @@ pub fn programmes(rig: &Rig, radius_mm: f64) -> Vec<Programme> {
     ]
 }
 
+/// A soft servo for an inertia in kg·m² on a roller of this radius.
+pub fn servo(inertia: f64, radius_mm: f64) -> Servo {
+    let radius = radius_mm * 1e-3;
+    // Inertia seen along the surface of the roller, kg; N/m and N·s/m are 1,000 of a N/mm and a N·s/mm.
+    let mass = inertia / (radius * radius);
+    let stiffness = mass * SERVO_RAD_PER_S * SERVO_RAD_PER_S * 1e-3;
+    let damping = 2.0 * SERVO_DAMPING_RATIO * mass * SERVO_RAD_PER_S * 1e-3;
+    Servo {
+        stiffness: Stiffness(I16F16::saturating_from_num(stiffness)),
+        damping: Damping(I8F24::saturating_from_num(damping)),
+    }
+}
+
 /// What the amplitudes follow from.
 struct Kit {
     servo: Servo,
@@ -99,23 +112,16 @@ struct Kit {
 
 impl Kit {
     fn new(rig: &Rig, radius_mm: f64) -> Self {
-        let radius = radius_mm * 1e-3;
-        // Inertia seen along the surface of the roller, kg; N/m and N·s/m are 1,000 of a N/mm and a N·s/mm.
-        let mass = rig.model.inertia / (radius * radius);
-        let stiffness = mass * SERVO_RAD_PER_S * SERVO_RAD_PER_S * 1e-3;
-        let damping = 2.0 * SERVO_DAMPING_RATIO * mass * SERVO_RAD_PER_S * 1e-3;
         Self {
-            servo: Servo {
-                stiffness: Stiffness(I16F16::saturating_from_num(stiffness)),
-                damping: Damping(I8F24::saturating_from_num(damping)),
-            },
+            servo: servo(rig.model.inertia, radius_mm),
             dry_mnm: rig.model.coulomb.unwrap_or(4.0e-4).max(1.0e-4) * 1e3,
         }
     }
 
     fn step(&self, signal: Signal, duration_ms: u32) -> Step {
         let travel = Millimetres(I16F16::from_num(TRAVEL_MM));
-        Step { excitation: Excitation { signal, duration_ms, servo: self.servo, travel }, prompt: None }
+        let excitation = Excitation { signal, duration_ms, servo: self.servo, travel, compensated: false };
+        Step { excitation, prompt: None }
     }
 
     fn staircase(&self, slowest: f64, ratio: f64, steps: u8, dwell_ms: u16, rounds: u32) -> Step {

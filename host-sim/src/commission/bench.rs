@@ -134,6 +134,13 @@ impl<'a> Bench<'a> {
         self.not_saved.take().map_or(Ok(()), |why| Err(Failure::failed(why)))
     }
 
+    /// Tells the device where the rotor's angle is nought, in counts past the zero.
+    pub fn index(&mut self, count: i32) -> Result<(), Failure> {
+        self.driver.request(Request::Index(count));
+        let until = self.now + Duration::from_millis(100);
+        self.until("the device did not take the rotor's angle; start it again", |bench| bench.now >= until)
+    }
+
     /// What the hand is asked to do, and samples until `is_done` says so or `longest` is over.
     pub fn watch(
         &mut self,
@@ -153,6 +160,15 @@ impl<'a> Bench<'a> {
 
     /// Plays an excitation to its end or to a fault: the samples during which torque was on.
     pub fn play(&mut self, excitation: &Excitation) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
+        self.play_within(excitation, TO_ANSWER)
+    }
+
+    /// The same where the movement may take up to `longest`.
+    pub fn play_within(
+        &mut self,
+        excitation: &Excitation,
+        longest: Duration,
+    ) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
         self.samples.clear();
         self.fault = None;
         self.driver.request(Request::Excite(excitation.clone()));
@@ -160,7 +176,7 @@ impl<'a> Bench<'a> {
         self.until("the device did not begin to move; start it again", |bench| {
             bench.fault.is_some() || bench.samples.iter().any(is_played)
         })?;
-        self.until("the device did not end its movement; start it again", |bench| {
+        self.until_within(longest, "the device did not end its movement; start it again", |bench| {
             bench.fault.is_some() || bench.samples.last().is_some_and(|sample| !is_played(sample))
         })?;
         let played = self.samples.iter().copied().filter(is_played).collect();
@@ -168,7 +184,16 @@ impl<'a> Bench<'a> {
     }
 
     fn until(&mut self, why_not: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), Failure> {
-        let end = self.now + TO_ANSWER;
+        self.until_within(TO_ANSWER, why_not, is_so)
+    }
+
+    fn until_within(
+        &mut self,
+        longest: Duration,
+        why_not: &str,
+        is_so: impl Fn(&Self) -> bool,
+    ) -> Result<(), Failure> {
+        let end = self.now + longest;
         while !is_so(self) {
             self.exchange()?;
             if let Some(why) = self.driver.refused().or(self.driver.notice()) {

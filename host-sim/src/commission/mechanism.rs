@@ -34,7 +34,13 @@ pub struct VirtualLine {
 impl VirtualLine {
     /// The plant of `rig`, uncommissioned, wired as `wiring`, with a roller of `radius_mm`.
     pub fn new(rig: &Rig, file: &str, wiring: Wiring, radius_mm: f64) -> Result<Self, Failure> {
-        let device = BareDevice::new(rig, file)?.uncommissioned(wiring)?;
+        let line = Self::commissioned(rig, file, radius_mm)?;
+        Ok(Self { device: line.device.uncommissioned(wiring)?, ..line })
+    }
+
+    /// The plant of `rig` on a device that has been commissioned.
+    pub fn commissioned(rig: &Rig, file: &str, radius_mm: f64) -> Result<Self, Failure> {
+        let device = BareDevice::new(rig, file)?;
         Ok(Self { device, radius_mm, act: Act::HandsOff, held: None, tilt: 0.0, sensor: (0.0, 1.0) })
     }
 

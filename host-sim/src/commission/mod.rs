@@ -10,6 +10,7 @@ use crate::device::part;
 use crate::failure::Failure;
 use bench::{Act, Bench, Line, ticks};
 use control_core::Device;
+use control_core::compensation::Compensation;
 use control_core::event::Fault;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
@@ -152,8 +153,8 @@ pub fn commission(
 ) -> Result<Outcome, Failure> {
     let mut bench = Bench::open(line)?;
     let before = bench.device()?;
-    // Whatever it was: until it has passed again it is none.
-    let mut device = Device { commissioned: false, ..before };
+    // Whatever it was: until it has passed again it is none, and what was found of its forces is another device's.
+    let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 
     ask(Step::Turn(wish.turns))?;
@@ -208,6 +209,7 @@ fn pulses(bench: &mut Bench, device: &Device) -> Result<Option<Mechanism>, Failu
         duration_ms: 2 * PULSES * u32::from(PULSE_MS),
         servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
         travel: Millimetres(I16F16::from_num(PULSE_TRAVEL_MM)),
+        compensated: false,
     };
     let (samples, fault) = bench.play(&excitation)?;
     match fault {

@@ -1,5 +1,6 @@
 //! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial port.
 
+pub mod compensated;
 pub mod part;
 pub mod serial;
 pub mod virtual_device;

@@ -2,6 +2,7 @@
 //! key), and as the control law takes it ([`Device`], fixed point). It knows nothing of patients. Every key may be left
 //! out: the built-in device's value stands then.
 
+use super::compensated::Compensated;
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::profile::fix;
@@ -61,6 +62,7 @@ struct File {
     limits: Limits,
     #[serde(default)]
     control: Control,
+    compensation: Option<Compensated>,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -153,6 +155,9 @@ impl File {
         if let Some(value) = control.passivity_damping_n_s_per_mm {
             device.passivity_damping = damping("passivity_damping_n_s_per_mm", value)?;
         }
+        if let Some(compensation) = &self.compensation {
+            device.compensation = compensation.compensation()?;
+        }
         Ok(device)
     }
 
@@ -194,6 +199,7 @@ impl File {
                 damping_n_s_per_mm: Some(device.damping.0.to_num()),
                 passivity_damping_n_s_per_mm: Some(device.passivity_damping.0.to_num()),
             },
+            compensation: device.compensation.is_some().then(|| Compensated::new(&device.compensation)),
         }
     }
 }
@@ -250,6 +256,7 @@ mod tests {
             ..Device::default()
         };
         device.limits.winding_time_s = 30;
+        device.compensation = crate::device::compensated::tests::something();
         device.limits.torque.0 /= 3;
         let text = to_toml("mine", &device).expect("it can be written");
         assert_eq!(parse(&text).expect("sound").device, device);
