@@ -8,6 +8,7 @@ mod bounded_listener;
 pub mod characterise;
 pub mod class;
 pub mod commission;
+pub mod compensate;
 pub mod debrief;
 pub mod device;
 pub mod driver;

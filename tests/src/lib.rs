@@ -7,6 +7,7 @@
 pub mod board;
 pub mod browser;
 pub mod laws;
+pub mod mechanism;
 pub mod needle;
 pub mod pc;
 pub mod rig;

@@ -3,6 +3,7 @@
 mod characterise;
 mod class;
 mod commission;
+mod compensate;
 mod confirm;
 mod diagnose;
 mod export;
@@ -39,6 +40,7 @@ enum Command {
     Profiles(training::Profiles),
     Reproduce(training::Reproduce),
     Commission(commission::Commission),
+    Compensate(compensate::Compensate),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
     Import(import::Import),
@@ -60,6 +62,7 @@ impl Cli {
             Some(Command::Profiles(command)) => command.run(),
             Some(Command::Reproduce(command)) => command.run(),
             Some(Command::Commission(command)) => command.run(),
+            Some(Command::Compensate(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),

@@ -1,0 +1,110 @@
+//! `compensate` on the virtual device, whose mechanism has forces that only the diagnosis has found. Both rigs are those that
+//! the tests on the board use; `docs/compensation.md` has the commands that made them.
+
+use control_core::Device;
+use control_core::compensation::Gain;
+use diagnosis::rig::Rig;
+use fixed::types::I16F16;
+use host_sim::commission::mechanism::VirtualLine;
+use host_sim::compensate::{self, coefficients, page};
+use host_sim::device::part::{self, DevicePart};
+use host_sim::library::Text;
+use std::path::PathBuf;
+
+fn rig(name: &str) -> Rig {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures").join(name);
+    Rig::read(&path).expect("a rig")
+}
+
+fn line(hidden: &Rig) -> VirtualLine {
+    VirtualLine::commissioned(hidden, "hidden.toml", 10.0).expect("a device")
+}
+
+#[test]
+fn what_the_diagnosis_found_is_felt_by_a_quarter_only() {
+    let mut steps = Vec::new();
+    let mut line = line(&rig("hidden.toml"));
+    let outcome = compensate::compensate(&mut line, &rig("hidden-found.toml"), 1.0, |step| {
+        steps.push(step.to_string());
+        Ok(())
+    })
+    .expect("it is compensated");
+    assert_eq!(steps.len(), 3, "each step is said before it is done");
+    let (before, after) = (outcome.before, outcome.after);
+    println!("before {before:?}\nafter {after:?}");
+    assert!(
+        before.all() > 0.08 && after.all() <= before.all() / 4.0,
+        "{} after {} N",
+        after.all(),
+        before.all()
+    );
+    for (tenth, (before, after)) in before.by_tenth.iter().zip(&after.by_tenth).enumerate() {
+        assert!(after <= before, "tenth {tenth}: {after} N after {before} N");
+    }
+    // The device has it, and a file keeps it to the last place.
+    assert_eq!(line.device().plan().device(), &outcome.device);
+    let text = part::to_toml("mine", &outcome.device).expect("it can be written");
+    let read = DevicePart::parse(Text { origin: "device.toml".into(), text }).expect("sound");
+    assert_eq!(read.device, outcome.device);
+    let html = page::html(&outcome);
+    assert!(html.contains("7 times a turn") && !html.contains("http"), "{html}");
+}
+
+#[test]
+fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
+    let found = coefficients::found(&rig("hidden-found.toml"), &Device::default(), 1.0).expect("sound");
+    let near = |got: I16F16, wanted: f64| {
+        let got = got.to_num::<f64>();
+        assert!((got / wanted - 1.0).abs() < 0.02, "{got} for {wanted}");
+    };
+    // As hidden.toml has them, in mN·m.
+    near(found.compensation.inwards.dry.0, 0.6);
+    near(found.compensation.outwards.dry.0, 0.6);
+    near(found.compensation.weight.0, 1.5);
+    near(found.compensation.angle[0].amplitude, 0.3_f64.hypot(0.6));
+    near(found.compensation.angle[1].amplitude, 0.5);
+    assert_eq!((found.compensation.angle[0].order, found.compensation.angle[1].order), (14, 7));
+    // 0.4 in 256ths: gains are shares of what is usual.
+    let half = coefficients::found(&rig("hidden-found.toml"), &Device::default(), 0.5).expect("sound");
+    assert_eq!(half.compensation.gains.friction, Gain(102));
+}
+
+#[test]
+fn what_is_unstable_or_of_another_machine_is_refused_before_anything_moves() {
+    let asked = |rig: &Rig, share: f64| {
+        let mut asked = false;
+        let why = compensate::compensate(&mut line(rig_hidden()), rig, share, |_| {
+            asked = true;
+            Ok(())
+        })
+        .expect_err("it is refused");
+        assert!(!asked, "a step was asked for: {why}");
+        why.to_string()
+    };
+    let mut strong = rig("hidden-found.toml");
+    strong.model.weight = Some(9e-3);
+    assert!(asked(&strong, 1.0).contains("quarter of the torque ceiling"));
+    let mut steep = rig("hidden-found.toml");
+    for value in steep.effects[0].coefficients.values_mut() {
+        *value *= 3.0;
+    }
+    steep.effects[0].shape.insert("order_14".into(), 140.0);
+    assert!(asked(&steep, 1.0).contains("would ring"));
+    let mut other = rig("hidden-found.toml");
+    other.actuator.command_unit = "A".into();
+    assert!(asked(&other, 1.0).contains("not of this device"));
+}
+
+fn rig_hidden() -> &'static Rig {
+    static HIDDEN: std::sync::OnceLock<Rig> = std::sync::OnceLock::new();
+    HIDDEN.get_or_init(|| rig("hidden.toml"))
+}
+
+#[test]
+fn a_mechanism_that_is_not_the_diagnosed_one_is_told_by_its_turn() {
+    let mut other = rig("hidden.toml");
+    other.effects.clear();
+    let why = compensate::compensate(&mut line(&other), &rig("hidden-found.toml"), 1.0, |_| Ok(()));
+    let why = why.expect_err("it has no cogging").to_string();
+    assert!(why.contains("the rotor's angle was not found"), "{why}");
+}
