@@ -6,7 +6,7 @@ const MOST_PIXELS_PER_POINT = 2;
 const NEEDLE = { radius: 0.41, length: 34, bevel: 2.1, hub: 1.7, hubLength: 7 };
 /** The limb beyond what is simulated, mm along. */
 const LIMB_MM = [-60, 80];
-const DEEP_MM = 30;
+const DEEP_MM = 34;
 const AROUND = 20;
 
 const VERTEX = `#version 300 es

@@ -276,7 +276,8 @@ fn configure(
         |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
     let near = depth(|layer| layer.is_vessel);
     let far = depth(|layer| layer.is_far);
-    let bottom = far.or(near.map(|near| near + 3.0)).unwrap_or(6.0) + 8.0;
+    let innermost = given.iter().map(|layer| layer.depth_mm).fold(6.0, f32::max);
+    let bottom = far.or(near.map(|near| near + 3.0)).map_or(innermost + 6.0, |far| far + 8.0);
     let bottom = if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 };
     let mut layers: Vec<Layer> = vec![];
     let mut walls = vec![None; given.len()];
@@ -369,6 +370,11 @@ mod tests {
         // Skin, muscle to 20 mm, bursa.
         let deep = [3.0, 0.0, 0.0, 1.2, 0.0, 2.0, 6.0, -1.0, 0.0, 4.0, 20.0, -1.0, 0.0, f32::NAN, 0.0, 0.8];
         assert_eq!(depth_mm(&deep), 24.0);
+        let sections = |numbers: &[f32]| {
+            let picture = Picture::new(numbers).expect("it can be built");
+            picture.surfaces().iter().filter(|surface| surface.kind == Kind::Section).count()
+        };
+        assert_eq!((sections(&ADULT), sections(&deep)), (2, 3), "every layer is drawn");
         // Deeper than any that is drawn.
         let beyond = [1.0, 0.0, 90.0, 1.2, 0.0, f32::NAN, 0.0, 0.8];
         assert!(Picture::new(&beyond).map_or(40.0, |picture| picture.image_depth_mm()) <= 40.0);
