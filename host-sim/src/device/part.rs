@@ -232,6 +232,8 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use control_core::units::MillimetresPerSecond;
+    use fixed::types::I16F16;
 
     fn parse(text: &str) -> Result<DevicePart, Failure> {
         DevicePart::parse(Text { origin: "device.toml".into(), text: text.into() })
@@ -257,6 +259,8 @@ mod tests {
         };
         device.limits.winding_time_s = 30;
         device.compensation = crate::device::compensated::tests::something();
+        // A count of so coarse an encoder is 2.4 mm/s in a speed window.
+        device.compensation.rest_speed = MillimetresPerSecond(I16F16::from_num(3));
         device.limits.torque.0 /= 3;
         let text = to_toml("mine", &device).expect("it can be written");
         assert_eq!(parse(&text).expect("sound").device, device);
