@@ -5,6 +5,8 @@ use crate::vector::{add, dot, length, scale, sub};
 
 /// Fastest that a particle may move, mm/s: far above what tissue does, below what would leave the picture in one step.
 const FASTEST: f32 = 2_000.0;
+/// Farthest that a particle goes from where it was built, mm: more than any tissue between skin and bone does.
+const FARTHEST_MM: f32 = 18.0;
 /// Colours that a greedy colouring may use; the rest goes unsorted at the end.
 const MOST_COLOURS: usize = 64;
 
@@ -92,6 +94,8 @@ pub struct Pace {
 pub struct Solver {
     points: Vec<Point>,
     before: Vec<Point>,
+    /// Where each particle was built.
+    built: Vec<Point>,
     speeds: Vec<[f32; 4]>,
     distances: Group<Distance>,
     volumes: Group<Volume>,
@@ -105,6 +109,7 @@ impl Solver {
         let count = parts.points.len();
         Self {
             before: parts.points.clone(),
+            built: parts.points.clone(),
             speeds: vec![[0.0; 4]; count],
             points: parts.points,
             distances: Group::new(parts.distances, count),
@@ -139,6 +144,20 @@ impl Solver {
                 hold(&mut self.points, inverse_dt2);
             }
             self.take_speeds(dt, keep);
+            self.bound();
+        }
+    }
+
+    /// Brings back what a needle that jumps has thrown farther than tissue goes.
+    fn bound(&mut self) {
+        for ((point, built), speed) in self.points.iter_mut().zip(&self.built).zip(&mut self.speeds) {
+            let moved = sub(place(point), place(built));
+            let square = dot(moved, moved);
+            if square > FARTHEST_MM * FARTHEST_MM {
+                let back = add(place(built), scale(moved, FARTHEST_MM / square.sqrt()));
+                point[..3].copy_from_slice(&back);
+                *speed = [0.0; 4];
+            }
         }
     }
 
