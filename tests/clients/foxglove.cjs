@@ -149,9 +149,9 @@ async function checkNoOrders(client, told, page) {
   const since = poses.slice(from);
   assert(since.length > 100, `${since.length} poses meanwhile`);
   assert(since.every((pose) => pose.motor_n === 0 && pose.state === "idle"), "the motor moved");
-  // The same from the page does start it, so that the above could have been seen. No `started` to wait for: `/event` holds the
-  // last of the events that come together, and a limit comes with it.
+  // The same from the page does start it, so that the above could have been seen. A limit comes with the start, and both are told.
   page.send(JSON.stringify({ do: "start" }));
+  await wait("the start as an event", () => happened("started") > 0);
   await wait("torque after a start from the page", () => newest().state !== "idle" && newest().motor_n !== 0);
   checkAgainstSchema(told, "/event");
   console.log(`foxglove orders: pass (${told.errors.length + told.refusedCalls.length} refused, ${since.length} poses without torque)`);

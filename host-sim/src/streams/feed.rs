@@ -4,6 +4,7 @@ use crate::session::{Happening, Subscription};
 use crate::visualizer::condense::Condenser;
 use crate::visualizer::messages;
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
@@ -20,8 +21,41 @@ pub struct Snapshot {
     pub connected: bool,
     /// The fault that has latched, in words.
     pub fault: Option<String>,
-    /// Events so far, and the last of them.
-    pub events: (u64, Option<messages::Event>),
+    /// What has happened.
+    pub events: Events,
+}
+
+/// How many events there were since the device came, and the last of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Events {
+    total: u64,
+    last: VecDeque<messages::Event>,
+}
+
+impl Events {
+    /// More than a device tells between two sends of a stream that keeps up.
+    const KEPT: usize = 64;
+
+    fn add(&mut self, event: messages::Event) {
+        self.total += 1;
+        self.last.push_back(event);
+        if self.last.len() > Self::KEPT {
+            self.last.pop_front();
+        }
+    }
+
+    /// How many there were.
+    #[cfg(any(test, feature = "foxglove"))]
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// Those after the first `told`, oldest first; a stream that is far behind misses the oldest of them.
+    #[cfg(any(test, feature = "foxglove"))]
+    pub fn since(&self, told: u64) -> impl Iterator<Item = &messages::Event> {
+        let new = self.total.saturating_sub(told).min(self.last.len() as u64) as usize;
+        self.last.range(self.last.len() - new..)
+    }
 }
 
 /// Where the needle is and what it feels, as it goes out in JSON; units stand in the names.
@@ -79,7 +113,6 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
     loop {
         due.tick().await;
         let batch = subscription.drain();
-        let happened = batch.events.len() as u64;
         let faults = batch.events.iter().filter_map(fault).next_back();
         let connected = batch.link.connected;
         let (_, frame) = condenser.take(batch);
@@ -92,10 +125,7 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
             if let Some(pose) = &frame.pose {
                 snapshot.pose = Some(pose.into());
             }
-            snapshot.events.0 += happened;
-            if let Some(event) = frame.events.into_iter().next_back() {
-                snapshot.events.1 = Some(event);
-            }
+            frame.events.into_iter().for_each(|event| snapshot.events.add(event));
             *snapshot != before
         });
     }
@@ -113,6 +143,19 @@ fn fault(happening: &Happening) -> Option<Option<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn events_of_the_same_look_are_all_told_and_the_oldest_are_lost_first() {
+        let event = |t_s| messages::Event { t_s, ..messages::Event::default() };
+        let mut events = Events::default();
+        (0..3).for_each(|n| events.add(event(f64::from(n))));
+        let since = |events: &Events, told| events.since(told).map(|e| e.t_s).collect::<Vec<_>>();
+        assert_eq!(since(&events, 0), [0.0, 1.0, 2.0]);
+        assert_eq!((since(&events, 2), since(&events, 3).len(), events.total()), (vec![2.0], 0, 3));
+        (3..100).for_each(|n| events.add(event(f64::from(n))));
+        let late = since(&events, 0);
+        assert_eq!((late.len(), late[0], events.total()), (Events::KEPT, 36.0, 100));
+    }
 
     #[test]
     fn the_tip_goes_down_along_the_needle() {

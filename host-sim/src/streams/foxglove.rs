@@ -33,11 +33,9 @@ impl Channels {
         })
     }
 
-    fn send(&self, snapshot: &Snapshot, is_new_event: bool) {
-        if is_new_event
-            && let Some(event) = &snapshot.events.1
-            && let Ok(text) = serde_json::to_vec(event)
-        {
+    /// Sends the events after the first `told`, and the pose.
+    fn send(&self, snapshot: &Snapshot, told: u64) {
+        for text in snapshot.events.since(told).filter_map(|event| serde_json::to_vec(event).ok()) {
             self.event.log(&text);
         }
         let Some(pose) = &snapshot.pose else { return };
@@ -79,8 +77,8 @@ pub(super) async fn serve(
         let mut told = 0;
         while newest.changed().await.is_ok() {
             let snapshot = newest.borrow_and_update().clone();
-            channels.send(&snapshot, snapshot.events.0 != told);
-            told = snapshot.events.0;
+            channels.send(&snapshot, told);
+            told = snapshot.events.total();
         }
     });
     Ok(bound)

@@ -107,7 +107,7 @@ impl Range {
 }
 
 /// Something happened.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Event {
     /// When, in s.
     pub t_s: f64,
