@@ -17,6 +17,27 @@ fn is_root() -> bool {
         .unwrap_or(false)
 }
 
+/// Fails where the disk that cargo builds on has less than `needed_mib` left beside what the target folder holds already. A machine
+/// without `df` passes.
+pub(crate) fn disk(needed_mib: u64) -> Result<(), Failure> {
+    let target = shell::target();
+    let folder = if target.is_dir() { target.clone() } else { shell::top() };
+    let mib = |program: &str, flags: &[&str], row: usize, column: usize| -> Option<u64> {
+        let said =
+            Command::new(program).args(flags).arg(&folder).output().ok().filter(|it| it.status.success())?;
+        String::from_utf8_lossy(&said.stdout).lines().nth(row)?.split_whitespace().nth(column)?.parse().ok()
+    };
+    let Some(free) = mib("df", &["-P", "-m"], 1, 3) else { return Ok(()) };
+    let built = if target.is_dir() { mib("du", &["-s", "-m"], 0, 0).unwrap_or(0) } else { 0 };
+    if free + built >= needed_mib {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "{} has {free} MiB free and the tests write {needed_mib} MiB; free some, or set CARGO_TARGET_DIR to a folder on another disk",
+        folder.display()
+    )))
+}
+
 /// Installs Debian packages, or says the command that does.
 pub(crate) fn install(packages: &[&str], what_for: &str) -> Result<(), Failure> {
     let list = packages.join(" ");

@@ -4,11 +4,16 @@ use crate::setup::{self, TARGET};
 use crate::shell::{self, Failure, cargo};
 use crate::{board_test, firmware, setup::Toolchain, site, wasm};
 use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// A run that takes longer hangs: it should take half an hour at the most, on two slow cores too.
 const LIMIT: Duration = Duration::from_secs(60 * 60);
+/// What a whole run writes into an empty target folder, and room to spare; a linker on a full disk dies of a bus error.
+const NEEDED_MIB: u64 = 7 * 1024;
+/// As much where most is built already.
+const NEEDED_BY_A_STEP_MIB: u64 = 1024;
 const FUZZ_SECONDS: &str = "60";
 /// The emulator asks for a newer Rust than it needs.
 const ANY_RUST: &str = "--ignore-rust-version";
@@ -95,6 +100,7 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
             all.join(" ")
         )));
     }
+    setup::disk(if names.is_empty() { NEEDED_MIB } else { NEEDED_BY_A_STEP_MIB })?;
     let clock = Clock(Instant::now() + LIMIT);
     let mut summary = vec![];
     let (mut passed, mut failed) = (0, 0);
@@ -157,7 +163,8 @@ fn doc(clock: &Clock) -> Result<Ended, Failure> {
 }
 
 fn unit(clock: &Clock) -> Result<Ended, Failure> {
-    passed(clock.run(tests().args(["--workspace", "--exclude", "tests"])))
+    let otherwise = ["--workspace", "--exclude", "tests"].map(String::from);
+    passed(clock.run(&mut tests("not package(tests)", &otherwise)))
 }
 
 /// The image, and the same warnings for it as for everything else.
@@ -196,7 +203,10 @@ fn same_bits(_: &Clock) -> Result<Ended, Failure> {
 fn board(clock: &Clock) -> Result<Ended, Failure> {
     let image = firmware::build()?;
     let names = test_programs()?.into_iter().filter(|name| !is_for_browser(name));
-    passed(clock.run(tests().env("FIRMWARE_ELF", image).args(["-p", "tests", "--lib"]).args(each(names))))
+    let otherwise: Vec<String> =
+        ["-p", "tests", "--lib"].map(String::from).into_iter().chain(each(names)).collect();
+    let filter = format!("package(tests) & not {BROWSER}");
+    passed(clock.run(tests(&filter, &otherwise).env("FIRMWARE_ELF", image)))
 }
 
 fn browser(clock: &Clock) -> Result<Ended, Failure> {
@@ -206,16 +216,17 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
     }
     setup::browser()?;
     site::build()?;
-    passed(clock.run(tests().args(["-p", "tests"]).args(each(names.into_iter()))))
+    let otherwise: Vec<String> =
+        ["-p", "tests"].map(String::from).into_iter().chain(each(names.into_iter())).collect();
+    passed(clock.run(&mut tests(&format!("package(tests) & {BROWSER}"), &otherwise)))
 }
 
 /// Libraries of other people, each at the version that the check was written against.
 const CLIENTS: [&str; 4] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0"];
 fn clients(clock: &Clock) -> Result<Ended, Failure> {
     let python = setup::python(&CLIENTS)?;
-    clock.run(cargo().args(["build", "--release", "--quiet", "-p", "host-sim", ANY_RUST]))?;
     let top = shell::top();
-    let program = shell::target().join("release/host-sim");
+    let program = built(clock, &["--bin", "host-sim"], "host-sim")?;
     clock.run(Command::new(&python).arg(top.join("tests/clients/streams.py")).arg(&program))?;
     clock.run(Command::new(&python).arg(top.join("tests/clients/recording.py")).arg(&program))?;
     setup::mono()?;
@@ -225,38 +236,19 @@ fn clients(clock: &Clock) -> Result<Ended, Failure> {
 
 /// Apart from `unit`: forty packages more.
 fn parquet(clock: &Clock) -> Result<Ended, Failure> {
-    passed(clock.run(tests().args(["-p", "host-sim", "--features", "parquet", "--test", "import"])))
+    let mut import = cargo();
+    import.args(["test", "--release", "--quiet", "--workspace", ANY_RUST]);
+    passed(clock.run(import.args(["--features", "host-sim/parquet", "--test", "import"])))
 }
 
 fn fuzz(clock: &Clock) -> Result<Ended, Failure> {
-    passed(clock.run(cargo().args([
-        "run",
-        "--release",
-        "--quiet",
-        ANY_RUST,
-        "-p",
-        "link",
-        "--example",
-        "fuzz_frames",
-        "--",
-        "--seconds",
-        FUZZ_SECONDS,
-    ])))
+    let program = built(clock, &["--example", "fuzz_frames"], "examples/fuzz_frames")?;
+    passed(clock.run(Command::new(program).args(["--seconds", FUZZ_SECONDS])))
 }
 
 fn prove(clock: &Clock) -> Result<Ended, Failure> {
-    passed(clock.run(cargo().args([
-        "run",
-        "--release",
-        "--quiet",
-        ANY_RUST,
-        "-p",
-        "proof",
-        "--bin",
-        "prove",
-        "--",
-        "--quick",
-    ])))
+    let program = built(clock, &["--bin", "prove"], "prove")?;
+    passed(clock.run(Command::new(program).arg("--quick").current_dir(shell::top())))
 }
 
 /// The tests of a class, which need a build of their own, and the measurement of thirty devices.
@@ -287,16 +279,27 @@ pub(crate) fn foxglove() -> Result<(), Failure> {
     clock.run(node.arg(shell::target().join("release/host-sim")))
 }
 
-/// Nextest where it is installed, else cargo's own.
-fn tests() -> Command {
+/// Nextest's name for the test programs that need a browser; [`is_for_browser`] for cargo's own.
+const BROWSER: &str = "binary(/^(browser|page)/)";
+
+/// The tests that nextest's `filter` selects, or `otherwise` by cargo where there is no nextest. With nextest every step takes the
+/// whole workspace: another selection of packages is another set of features, which compiles the emulator once more.
+fn tests(filter: &str, otherwise: &[String]) -> Command {
     let mut command = cargo();
     if shell::is_on_path("cargo-nextest") {
         command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
+        command.args(["--workspace", "-E", filter]);
     } else {
-        command.args(["test", "--no-fail-fast", "--quiet"]);
+        command.args(["test", "--no-fail-fast", "--quiet"]).args(otherwise);
     }
     command.args(["--release", ANY_RUST]);
     command
+}
+
+/// Builds a program with the features of the whole workspace, as [`tests`] does; where it lies below the build's folder.
+fn built(clock: &Clock, which: &[&str], below: &str) -> Result<PathBuf, Failure> {
+    clock.run(cargo().args(["build", "--release", "--quiet", "--workspace", ANY_RUST]).args(which))?;
+    Ok(shell::target().join("release").join(below))
 }
 
 /// The integration tests in `tests/tests`, by name.
