@@ -18,6 +18,10 @@ const FUZZ_SECONDS: &str = "60";
 /// The emulator asks for a newer Rust than it needs.
 const ANY_RUST: &str = "--ignore-rust-version";
 
+/// One selection of packages wherever it can be: another one is another set of features, and builds most of them once more. `tests`
+/// stays out, whose decoder of the firmware's log gives `serde_json` a feature that reads numbers in tagged messages as maps.
+const CRATES: [&str; 3] = ["--workspace", "--exclude", "tests"];
+
 /// A step: its name, what it shows, and what it does.
 struct Step {
     name: &'static str,
@@ -163,8 +167,7 @@ fn doc(clock: &Clock) -> Result<Ended, Failure> {
 }
 
 fn unit(clock: &Clock) -> Result<Ended, Failure> {
-    let otherwise = ["--workspace", "--exclude", "tests"].map(String::from);
-    passed(clock.run(&mut tests("not package(tests)", &otherwise)))
+    passed(clock.run(tests().args(CRATES)))
 }
 
 /// The image, and the same warnings for it as for everything else.
@@ -203,10 +206,7 @@ fn same_bits(_: &Clock) -> Result<Ended, Failure> {
 fn board(clock: &Clock) -> Result<Ended, Failure> {
     let image = firmware::build()?;
     let names = test_programs()?.into_iter().filter(|name| !is_for_browser(name));
-    let otherwise: Vec<String> =
-        ["-p", "tests", "--lib"].map(String::from).into_iter().chain(each(names)).collect();
-    let filter = format!("package(tests) & not {BROWSER}");
-    passed(clock.run(tests(&filter, &otherwise).env("FIRMWARE_ELF", image)))
+    passed(clock.run(tests().env("FIRMWARE_ELF", image).args(["-p", "tests", "--lib"]).args(each(names))))
 }
 
 fn browser(clock: &Clock) -> Result<Ended, Failure> {
@@ -216,9 +216,7 @@ fn browser(clock: &Clock) -> Result<Ended, Failure> {
     }
     setup::browser()?;
     site::build()?;
-    let otherwise: Vec<String> =
-        ["-p", "tests"].map(String::from).into_iter().chain(each(names.into_iter())).collect();
-    passed(clock.run(&mut tests(&format!("package(tests) & {BROWSER}"), &otherwise)))
+    passed(clock.run(tests().args(["-p", "tests"]).args(each(names.into_iter()))))
 }
 
 /// Libraries of other people, each at the version that the check was written against.
@@ -237,7 +235,7 @@ fn clients(clock: &Clock) -> Result<Ended, Failure> {
 /// Apart from `unit`: forty packages more.
 fn parquet(clock: &Clock) -> Result<Ended, Failure> {
     let mut import = cargo();
-    import.args(["test", "--release", "--quiet", "--workspace", ANY_RUST]);
+    import.args(["test", "--release", "--quiet", ANY_RUST]).args(CRATES);
     passed(clock.run(import.args(["--features", "host-sim/parquet", "--test", "import"])))
 }
 
@@ -279,26 +277,21 @@ pub(crate) fn foxglove() -> Result<(), Failure> {
     clock.run(node.arg(shell::target().join("release/host-sim")))
 }
 
-/// Nextest's name for the test programs that need a browser; [`is_for_browser`] for cargo's own.
-const BROWSER: &str = "binary(/^(browser|page)/)";
-
-/// The tests that nextest's `filter` selects, or `otherwise` by cargo where there is no nextest. With nextest every step takes the
-/// whole workspace: another selection of packages is another set of features, which compiles the emulator once more.
-fn tests(filter: &str, otherwise: &[String]) -> Command {
+/// Nextest where it is installed, else cargo's own.
+fn tests() -> Command {
     let mut command = cargo();
     if shell::is_on_path("cargo-nextest") {
         command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
-        command.args(["--workspace", "-E", filter]);
     } else {
-        command.args(["test", "--no-fail-fast", "--quiet"]).args(otherwise);
+        command.args(["test", "--no-fail-fast", "--quiet"]);
     }
     command.args(["--release", ANY_RUST]);
     command
 }
 
-/// Builds a program with the features of the whole workspace, as [`tests`] does; where it lies below the build's folder.
+/// Builds a program as `unit` does; where it lies below the build's folder.
 fn built(clock: &Clock, which: &[&str], below: &str) -> Result<PathBuf, Failure> {
-    clock.run(cargo().args(["build", "--release", "--quiet", "--workspace", ANY_RUST]).args(which))?;
+    clock.run(cargo().args(["build", "--release", "--quiet", ANY_RUST]).args(CRATES).args(which))?;
     Ok(shell::target().join("release").join(below))
 }
 
