@@ -1,5 +1,7 @@
 // The second view of the picture: limb in three dimensions and ultrasound, started only when somebody looks at it.
 
+import { WebGl } from "./limb_webgl.js";
+import { WebGpu } from "./limb_webgpu.js";
 import { Picture } from "./picture.js";
 import { Tissue3d } from "./tissue3d.js";
 import { Ultrasound } from "./ultrasound.js";
@@ -38,14 +40,37 @@ export class BodyView {
 
   async start() {
     try {
-      this.picture = await Picture.load();
-      this.limb = new Tissue3d(byId("limb"), this.colours);
+      const picture = await Picture.load();
+      await this.openLimb(new URLSearchParams(location.search).get("graphics"));
       this.ultrasound = new Ultrasound(byId("ultrasound"), this.colours);
+      // Last, for there is nothing to draw with before.
+      this.picture = picture;
       if (this.scene) this.build();
     } catch (error) {
-      this.picture = null;
       byId("body-note").textContent = `Not to be drawn here: ${error.message}`;
     }
+  }
+
+  /** WebGPU where there is one, else WebGL 2; `?graphics=webgpu` takes one without a graphics processor, `?graphics=webgl2` none. */
+  async openLimb(wanted) {
+    const canvas = byId("limb");
+    let renderer = null;
+    if (wanted !== "webgl2") {
+      renderer = await WebGpu.open(canvas, wanted === "webgpu").catch((error) => console.warn(`WebGPU: ${error.message}`));
+    }
+    renderer ??= new WebGl(canvas);
+    this.limb = new Tissue3d(canvas, this.colours, renderer);
+    this.stats.graphics = renderer.name;
+    renderer.lost?.then(() => this.replaceLimb());
+  }
+
+  /** WebGPU is gone: a canvas that it has had takes nothing else, so another one comes in its place. */
+  async replaceLimb() {
+    const canvas = byId("limb");
+    this.limb = null;
+    canvas.replaceWith(canvas.cloneNode());
+    await this.openLimb("webgl2");
+    if (this.scene && this.picture?.built) this.limb.build(this.picture, this.scene);
   }
 
   /** Another anatomy. */
@@ -61,7 +86,7 @@ export class BodyView {
       return;
     }
     byId("body-note").textContent = "";
-    this.limb.build(this.picture, this.scene);
+    this.limb?.build(this.picture, this.scene);
     this.ultrasound.build(this.picture);
   }
 
@@ -80,7 +105,7 @@ export class BodyView {
     // A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up.
     this.picture.step(Math.min(Math.max(view.seconds, 1 / 120), 1 / 20), view.depth, angle);
     const stepped = performance.now();
-    this.limb.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
+    this.limb?.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
     const drawn = performance.now();
     this.ultrasound.draw(this.picture, view.seconds);
     this.stats.stepMs = stepped - begin;

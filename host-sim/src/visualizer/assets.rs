@@ -46,6 +46,9 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/body.js", "body.js", SCRIPT),
     asset!("/bytes.js", "bytes.js", SCRIPT),
     asset!("/picture.js", "picture.js", SCRIPT),
+    asset!("/limb_shapes.js", "limb_shapes.js", SCRIPT),
+    asset!("/limb_webgl.js", "limb_webgl.js", SCRIPT),
+    asset!("/limb_webgpu.js", "limb_webgpu.js", SCRIPT),
     asset!("/tissue3d.js", "tissue3d.js", SCRIPT),
     asset!("/ultrasound.js", "ultrasound.js", SCRIPT),
     // A build product: `cargo xtask wasm`.

@@ -18,9 +18,6 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
 const ARGUMENTS: &[&str] = &[
     "--headless",
     "--no-sandbox",
-    "--disable-gpu",
-    // WebGL without a graphics processor.
-    "--enable-unsafe-swiftshader",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -33,6 +30,19 @@ const ARGUMENTS: &[&str] = &[
     "about:blank",
 ];
 
+/// WebGL without a graphics processor.
+const WEBGL: &[&str] = &["--disable-gpu", "--enable-unsafe-swiftshader"];
+/// WebGPU and WebGL without one. The canvas of WebGPU can be read but does not come to the screen.
+const WEBGPU: &[&str] = &[
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+    "--disable-vulkan-surface",
+    "--ignore-gpu-blocklist",
+];
+
 /// A running browser; dropped, it is ended and its profile deleted.
 pub struct Chromium {
     process: Child,
@@ -41,14 +51,24 @@ pub struct Chromium {
 }
 
 impl Chromium {
-    /// Starts it with a fresh profile below `scratch`.
+    /// Starts it with a fresh profile below `scratch`, without WebGPU.
     pub fn start(scratch: &Path) -> Result<Self, Failure> {
+        Self::start_with(scratch, WEBGL)
+    }
+
+    /// The same with WebGPU computed by the processor.
+    pub fn start_with_webgpu(scratch: &Path) -> Result<Self, Failure> {
+        Self::start_with(scratch, WEBGPU)
+    }
+
+    fn start_with(scratch: &Path, graphics: &[&str]) -> Result<Self, Failure> {
         let program = PROGRAMS.iter().find(|path| Path::new(path).exists()).ok_or_else(|| {
             format!("no browser at {}: run `cargo xtask test`, which installs Chromium", PROGRAMS[0])
         })?;
         let profile = scratch.join(format!("chromium-{}", std::process::id()));
         fs::create_dir_all(&profile).map_err(|e| format!("cannot create {}: {e}", profile.display()))?;
         let mut process = Command::new(program)
+            .args(graphics)
             .args(ARGUMENTS)
             .arg(format!("--user-data-dir={}", profile.display()))
             // It keeps some of its state beside the profile otherwise.
