@@ -7,7 +7,7 @@
 //! Folders, each using only those before it: `numerics` (linear algebra, searches, bootstrap), `effects` (the laws), `io`
 //! (rigs, recordings, the report's shape), `simulation` (a rig run forward), `estimation` (blocks, filter, noise, fit),
 //! `selection` (candidates and their shapes), `validation` (held-out recordings) and `report` (what people read).
-//! `tests/layout.rs` holds them to it.
+//! `tests/layout.rs` holds them to it. What admits or rejects a name stands in `thresholds`, which all of them may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
@@ -19,6 +19,7 @@ mod numerics;
 pub mod report;
 mod selection;
 pub mod simulation;
+mod thresholds;
 mod validation;
 
 pub use io::error::InputError;

@@ -5,7 +5,8 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Nominal;
 use crate::io::schema::Verdict;
 use crate::selection::excitation::Excitation;
-use crate::validation::assess::{Assessment, LITTLE_FORCE};
+use crate::thresholds::UNDERSTOOD;
+use crate::validation::assess::Assessment;
 use crate::validation::comparison::Shown;
 use crate::validation::residual_maps::Map;
 use crate::validation::residuals::{above, refit_matters};
@@ -29,7 +30,7 @@ pub(crate) fn misfit(assessment: &Assessment, nominal: &Nominal) -> Option<Strin
     let judged = if refitted { table.refit } else { table.patched };
     let fits_not = judged.holdout > FOREIGN * force.holdout
         && judged.fit > FOREIGN * force.fit
-        && (is_another || table.patched.holdout > LITTLE_FORCE * force.holdout);
+        && (is_another || table.patched.holdout > UNDERSTOOD.0 * force.holdout);
     fits_not.then(|| {
         format!(
             "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is off (seconds, counts, command) or where the axis is moved by something that was not recorded",

@@ -6,6 +6,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Nominal;
 use crate::io::rig::Kind;
 use crate::numerics::linear::correlation;
+use crate::thresholds::{AT_END, BRISTLES};
 use std::f64::consts::TAU;
 
 /// Correlation of tilt and angle from which on they are the same.
@@ -111,12 +112,6 @@ pub(crate) fn is_seen(name: N, nominal: &Nominal) -> bool {
 pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<Movable> {
     effect.name.definition().movable(effect, span)
 }
-
-/// Largest part of the travel over which bristles bend: microns of a slide, tenths of a degree of a turn.
-const BRISTLES: f64 = 0.03;
-
-/// How near, as a part of it, the end of what a value may be is to be at it.
-const AT_END: f64 = 0.05;
 
 /// Whether a drift is at the end of what may be told from something else: what settles at once is how a recording begins,
 /// and what has hardly begun at its end is any slow change.

@@ -11,24 +11,15 @@ use crate::numerics::bootstrap::bootstrap;
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
 use crate::selection::search::{FitContext, FittedModel};
-use crate::validation::evidence::{EffectEvidence, Rival, evaluate_all};
+use crate::thresholds::{BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, MOST_IN_CLASS};
+use crate::validation::evidence::{EffectEvidence, Rival};
+use crate::validation::judge::evaluate_all;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use rayon::prelude::*;
 
 /// How many rivals of each effect are fitted in full.
 const RIVALS: usize = 4;
-/// A rival must be this many standard errors behind, and this far in log-likelihood, not to share a class.
-pub(crate) const BEHIND_Z: f64 = 2.0;
-const BEHIND: f64 = 3.0;
-/// The same as a part of what the effect explains: less is the form of a law rather than its name.
-const BEHIND_PART: f64 = 0.015;
-/// A rival this far behind in log-likelihood under a slow disturbance, and by half of what the winner gains there, is
-/// behind, and counts as by this many standard errors.
-const BEHIND_SLOW: f64 = 30.0;
-const BEHIND_SLOW_Z: f64 = 4.0;
-/// Most effects that a class may hold.
-const MOST_IN_CLASS: usize = 3;
 /// Standard errors behind within which a rival's shape is worth polishing.
 const WITHIN_REACH: f64 = 8.0;
 
@@ -107,7 +98,7 @@ pub(crate) fn fit_rivals(
             let without =
                 *without.get_or_insert_with(|| context.fit_slow(base.model.clone(), &[&slow.noise]).merit);
             let behind = slow.merit - theirs;
-            if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW {
+            if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW_NATS {
                 rival.z = BEHIND_SLOW_Z;
                 rival.lead = rival.lead.max(behind);
             }
@@ -136,7 +127,7 @@ pub(crate) fn class(
             class.push(twin);
         }
     }
-    let least = BEHIND.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
+    let least = BEHIND_NATS.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
     let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
     let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
     near.sort_by(|a, b| a.z.total_cmp(&b.z));

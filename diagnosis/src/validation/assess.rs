@@ -10,6 +10,7 @@ use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::excitation::Excitation;
 use crate::selection::search::{FitContext, FittedModel};
+use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover};
@@ -22,18 +23,6 @@ use crate::validation::residuals::{Residuals, above};
 use crate::validation::stepwise::{Search, eliminate};
 use crate::validation::tonal::{self, TonalDisturbance};
 use std::collections::BTreeMap;
-
-/// Least probability with which an effect is named: two to one.
-const NAMED: f64 = 2.0 / 3.0;
-/// Probability of a name where more effects are as near than a class may hold.
-const UNDECIDED: f64 = 0.5;
-/// Parts of the force: left so little, a model has understood it; left so much, it has not, whatever it names. Between the
-/// two it must leave less than this part of what the refit left.
-pub(crate) const LITTLE_FORCE: f64 = 0.12;
-const MUCH_FORCE: f64 = 0.5;
-const MUCH_OF_REFIT: f64 = 0.65;
-/// Part of the refit's mean square that a spring leaves where it may well be a gap.
-const LEAVES_MUCH: f64 = 0.3;
 
 /// Least part of a residual's mean square that counts as more than chance.
 const LEAST_ABOVE: f64 = 0.02;
@@ -128,7 +117,8 @@ impl Assessment {
             if assessed.undecided {
                 Some("more effects than a class may hold explain it as well".into())
             } else if assessed.confidence < NAMED {
-                Some(format!("it is right with a probability of only {:.2}", assessed.confidence))
+                let weakness = confidence::weakness(&assessed.evidence);
+                Some(format!("it is right with a probability of only {:.2}: {weakness}", assessed.confidence))
             } else {
                 None
             }
@@ -171,9 +161,6 @@ fn same_joint(
     let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }
-
-/// Factor within which two drifts are one: what is a step and fitted as a bend gives either a little of the other's.
-const ALIKE: f64 = 1.5;
 
 /// Whether gain and friction change by the same part: over an inertia that changes, both do.
 fn are_alike(gain: f64, friction: f64) -> bool {
@@ -291,7 +278,7 @@ impl Scales<'_> {
         };
         let part_of_force = left_holdout / estimator.rms(&on_holdout.force, known).max(1e-300);
         let helps_much = left_holdout < MUCH_OF_REFIT * refit_holdout;
-        let understood = part_of_force < LITTLE_FORCE || (helps_much && part_of_force < MUCH_FORCE);
+        let understood = part_of_force < UNDERSTOOD.0 || (helps_much && part_of_force < UNDERSTOOD.1);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
         let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
         let swing = hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(holdout, on_holdout)));
@@ -308,7 +295,7 @@ impl Scales<'_> {
                 let evidence = confidence::evidence(&found, leftover);
                 let parameters = parameters::parameters(context, patched, i);
                 let is_there = parameters::is_there(found.effect.name, &parameters);
-                let undecided = nearest < alternatives::BEHIND_Z;
+                let undecided = nearest < BEHIND_Z;
                 let most = if undecided { UNDECIDED } else { 1.0 };
                 let confidence = confidence::confidence(&evidence).min(most);
                 let creeps = candidates::creeps(&found.effect, context.span)

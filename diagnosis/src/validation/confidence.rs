@@ -4,6 +4,7 @@
 //! judge.
 
 use crate::effects::EffectName as N;
+use crate::thresholds::{BIAS, CERTAIN_SHARE, CLAIMED, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS};
 use crate::validation::evidence::EffectEvidence;
 use std::collections::BTreeMap;
 
@@ -21,24 +22,16 @@ pub(crate) struct Leftover {
     pub(crate) unexplained: f64,
 }
 
-/// Standard errors beyond which a gain is as sure as it gets.
-const SUREST: f64 = 20.0;
-/// Parts of the force: less is hardly anything left, more is as bad as it gets.
-const LITTLE: f64 = 0.005;
-const MUCH: f64 = 0.3;
-/// Least part that what stands out of every stretch counts with: it may be small beside larger effects.
-const CERTAIN_SHARE: f64 = 0.15;
-
 /// The evidence for an effect.
 pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     let log = |x: f64, low: f64, high: f64| x.max(low).min(high).ln();
     let least_share = if found.is_certain() { CERTAIN_SHARE } else { 0.03 };
     let unexplained = left.unexplained.min(1.0 - found.share).max(0.0);
     // What is left and is hardly more than nothing beside the force says little.
-    let of_force = log(left.of_force / LITTLE, 1.0, MUCH / LITTLE);
+    let of_force = log(left.of_force / LEFT_OF_FORCE.0, 1.0, LEFT_OF_FORCE.1 / LEFT_OF_FORCE.0);
     let share = log(found.share, least_share, 1.0);
     [
-        ("least_z", log(found.least_z(), 2.0, SUREST)),
+        ("least_z", log(found.least_z(), UNLIKELY_Z, SUREST_Z)),
         ("share", share),
         ("unexplained", unexplained),
         ("unexplained_of_force", unexplained * of_force),
@@ -49,25 +42,32 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     .into()
 }
 
-/// Score without any evidence, and the weight of each piece of it: a logistic regression, rounded towards doubt, on 728 names
-/// of seeds 14 and 16 (whole), 13 and 1701 to 1703 (one effect, nulls), 13 and 505 (pairs) and 1501, 1601, 1711 and 1712
-/// (physics without a name), 22 of them wrong.
-const BIAS: f64 = 2.0;
-const WEIGHTS: [(&str, f64); 5] = [
-    ("least_z", 1.4),
-    ("share", 0.8),
-    ("unexplained", -1.0),
-    ("unexplained_of_force", -3.4),
-    ("share_of_bristles", 2.0),
-];
-
-/// Least and most that is ever claimed.
-const CLAIMED: (f64, f64) = (0.01, 0.99);
+/// What each piece of evidence takes from the score of an effect that is as sure as it gets, is all that was left out and leaves nothing.
+fn takes(evidence: &Evidence) -> impl Iterator<Item = (&'static str, f64)> {
+    let best = |key: &str| if key == "least_z" { SUREST_Z.ln() } else { 0.0 };
+    WEIGHTS.iter().map(move |(key, weight)| (*key, weight * (best(key) - evidence[*key])))
+}
 
 /// Probability that the name or its class is right.
 pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     let score: f64 = WEIGHTS.iter().map(|(key, weight)| weight * evidence[*key]).sum();
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
+}
+
+/// What takes most from the probability, in words with its figure.
+pub(crate) fn weakness(evidence: &Evidence) -> String {
+    let most = takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key);
+    let unexplained = 100.0 * evidence["unexplained"];
+    match most {
+        "least_z" => format!(
+            "its gain is {:.1} standard errors on left-out blocks of the fitted or on held-out recordings",
+            evidence["least_z"].exp()
+        ),
+        "share" | "share_of_bristles" => {
+            format!("it takes {:.1} % of what the noise leaves", 100.0 * evidence["share"].exp())
+        }
+        _ => format!("{unexplained:.0} % of what the refit leaves beyond chance is still there with it"),
+    }
 }
 
 #[cfg(test)]
@@ -80,6 +80,15 @@ mod tests {
             assert!(all.insert((*key).to_owned(), *value).is_some(), "{key} is weighed");
         }
         all
+    }
+
+    #[test]
+    fn the_weakness_is_what_takes_most_from_the_probability() {
+        let sure = ("least_z", SUREST_Z.ln());
+        let says = |change: &[(&str, f64)]| weakness(&evidence(&[&[sure], change].concat()));
+        assert!(says(&[("least_z", 2.5_f64.ln())]).contains("2.5 standard errors"));
+        assert!(says(&[("share", 0.04_f64.ln())]).contains("4.0 % of what the noise leaves"));
+        assert!(says(&[("unexplained", 0.6), ("unexplained_of_force", 1.8)]).starts_with("60 %"));
     }
 
     #[test]

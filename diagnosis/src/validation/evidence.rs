@@ -2,21 +2,11 @@
 //! noise or chooses between effects.
 
 use crate::effects::{Effect, EffectName};
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::Noise;
-use crate::estimation::fit::Fit;
-use crate::estimation::force_residual::Estimator;
-use crate::estimation::model::{Key, Model, Nominal};
-use crate::numerics::bootstrap::{Gain, bootstrap};
-use crate::selection::candidates;
-use crate::selection::periodic;
-use crate::selection::predictive::left_out_costs;
-use crate::selection::search::{FitContext, FittedModel};
-use crate::validation::holdout::{self, HoldoutFit};
-use crate::validation::known_travel::known;
-use crate::validation::parameters;
-use crate::validation::residuals::{above, forces, relative_gain};
-use crate::validation::sizes::{played, sizes_on};
+use crate::numerics::bootstrap::Gain;
+use crate::thresholds::{
+    CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MOST_SHARE,
+    NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE,
+};
 use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.
@@ -42,39 +32,16 @@ pub(crate) struct EffectEvidence {
     pub(crate) sizes: Vec<f64>,
 }
 
-/// Part of the refit's residual above the noise that an effect must explain to be named.
-const SHARE: f64 = 0.05;
-/// Part of a refit's mean square that counts as above the noise at the least: how much of it the noise is, is itself unsure.
-const LEAST_EXPLAINABLE: f64 = 0.2;
-/// Below this part it must also stand out by [`CERTAIN`]: the form of a larger effect is never quite right.
-const FAIR_SHARE: f64 = 0.1;
-/// What explains this part is most of what was left out, and this many standard errors are sure.
-const MOST_SHARE: f64 = 0.5;
-const SURE: f64 = 3.0;
-/// Least part of what is hardly sure: a bias that wanders looks like many a small effect for as long as two recordings last.
-const UNSURE_SHARE: f64 = 0.7;
-/// Standard errors on the fitted recordings of what may carry beside another.
-const PROMISING: f64 = 2.5;
-/// What explains this part, and takes half of the held-out mean square with it, may rest on few moments there: counts are
-/// lost now and then.
-const NEARLY_ALL: f64 = 0.9;
-const HALF: f64 = 0.5;
-/// Part of a gain that is nothing.
-const LITTLE: f64 = 0.05;
-/// Factors on an effect that are the same size.
-const SAME_SIZE: Range<f64> = 0.75..1.33;
-const HARDLY_ANOTHER_SIZE: Range<f64> = 0.85..1.18;
-/// What a dry friction may gain with time, as parts of what it is at first.
-const DRIFT: Range<f64> = -0.95..3.0;
-/// Least part where its gain is this many standard errors on fitted and on held-out recordings, however counted.
-const LEAST_SHARE: f64 = 0.01;
-const CERTAIN: f64 = 6.0;
-
 impl EffectEvidence {
     /// Whether it stands out of every stretch of the held-out recordings and surely of the others, however little it explains
     /// beside larger effects.
     pub(crate) fn is_certain(&self) -> bool {
-        self.holdout.z.min(self.holdout.clipped_z).min(self.fit.z.max(self.fit.clipped_z)) >= CERTAIN
+        self.steadiest_z() >= CERTAIN_Z
+    }
+
+    /// Standard errors of its gain, over every stretch of the held-out recordings, or on the fitted ones, whichever are fewer.
+    fn steadiest_z(&self) -> f64 {
+        self.holdout.z.min(self.holdout.clipped_z).min(self.fit.z.max(self.fit.clipped_z))
     }
 
     /// Standard errors of its gain on fitted or on held-out recordings, whichever are fewer.
@@ -84,7 +51,7 @@ impl EffectEvidence {
 
     /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
     fn stands_out(&self) -> bool {
-        self.least_z() >= CERTAIN
+        self.least_z() >= CERTAIN_Z
     }
 
     /// Whether it carries to the held-out recordings: by likelihood, or, where it is most of what was left out, by the force
@@ -92,11 +59,11 @@ impl EffectEvidence {
     /// likely at many blocks and yet leave a third of the force.
     fn generalises(&self) -> bool {
         let likely = self.holdout.low > 0.0
-            && self.holdout.z.max(self.holdout.clipped_z) >= 2.0
-            && (self.least_z() >= SURE || self.share >= UNSURE_SHARE || self.comes_in_events());
+            && self.holdout.z.max(self.holdout.clipped_z) >= UNLIKELY_Z
+            && (self.least_z() >= SURE_Z || self.share >= UNSURE_SHARE || self.comes_in_events());
         let takes_most = self.force.low > 0.0 && self.share >= MOST_SHARE;
         let takes_all = self.takes_all() && self.holdout.sum > 0.0;
-        let least = if takes_all { PROMISING } else { SURE };
+        let least = if takes_all { PROMISING_Z } else { SURE_Z };
         likely
             || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= least)
             || self.agrees_everywhere()
@@ -110,8 +77,8 @@ impl EffectEvidence {
     /// Whether it is nearly all that was left out and as large on every recording, or most of it and hardly differs between
     /// them, and costs nothing in those moments of the held-out ones that do not play it, however few do.
     fn agrees_everywhere(&self) -> bool {
-        let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -LITTLE * gain.sum;
-        let is_nearly_all = self.share >= NEARLY_ALL && self.is_same_size();
+        let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -HARMLESS * gain.sum;
+        let is_nearly_all = self.share >= NEARLY_ALL_SHARE && self.is_same_size();
         let is_most = self.share >= MOST_SHARE && self.has_sizes_in(&HARDLY_ANOTHER_SIZE);
         (is_nearly_all || is_most) && harms_nowhere(&self.holdout) && harms_nowhere(&self.force)
     }
@@ -131,11 +98,11 @@ impl EffectEvidence {
 
     /// Whether it takes most of what the others leave, surely, however much they explain.
     fn takes_most_of_the_rest(&self) -> bool {
-        self.is_same_size() && self.force.sum >= HALF && self.force.low > 0.0
+        self.is_same_size() && self.force.sum >= HALF_OF_FORCE && self.force.low > 0.0
     }
 
     fn takes_all(&self) -> bool {
-        self.force.sum >= HALF && self.share >= NEARLY_ALL
+        self.force.sum >= HALF_OF_FORCE && self.share >= NEARLY_ALL_SHARE
     }
 
     /// Whether it leaves hardly anything and is as large on every recording: its law is right, not only near.
@@ -146,44 +113,67 @@ impl EffectEvidence {
     /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and not surely worse than
     /// nothing on the others.
     pub(crate) fn is_provisional(&self) -> bool {
-        self.fit.z >= PROMISING && self.holdout.z > -1.0 && self.share >= SHARE
+        self.fit.z >= PROMISING_Z && self.holdout.z > -1.0 && self.share >= SHARE
     }
 
-    /// Why it does not generalise, with the figures that say so.
+    /// What of a gain on every recording it lacks: the first requirement that it does not meet, with its figure.
     fn unsure(&self) -> String {
+        let (fit, holdout) = (self.fit.z.max(self.fit.clipped_z), self.holdout.z.max(self.holdout.clipped_z));
         if self.holdout.sum <= 0.0 {
-            return format!("held-out recordings are less likely with it, by {:.0} nats", -self.holdout.sum);
+            format!("held-out recordings are less likely with it, by {:.0} nats", -self.holdout.sum)
+        } else if holdout < UNLIKELY_Z {
+            format!("its gain on held-out recordings is {holdout:.1} standard errors, less than {UNLIKELY_Z}")
+        } else if self.holdout.low <= 0.0 {
+            let Gain { sum, low, high, .. } = self.holdout;
+            format!(
+                "its gain on held-out recordings, {sum:.0} nats, may be none (95 %: {low:.0} to {high:.0})"
+            )
+        } else {
+            format!(
+                "its gain is {fit:.1} standard errors on left-out blocks of the fitted recordings and {holdout:.1} on held-out ones, not {SURE_Z} on both, and it takes {:.0} % of what the noise leaves, less than {:.0} %",
+                100.0 * self.share.max(0.0),
+                100.0 * UNSURE_SHARE
+            )
         }
-        format!(
-            "its gain of {:.0} nats on held-out recordings is unsure ({:.1} standard errors there, {:.1} on left-out blocks of the fitted ones) and it takes {:.0} % of what the noise leaves",
-            self.holdout.sum,
-            self.holdout.z,
-            self.fit.z,
-            100.0 * self.share.max(0.0)
-        )
     }
 
-    /// Why an effect may not be named, if it may not.
+    /// What of its share is too little, if it is.
+    fn too_little(&self) -> Option<String> {
+        let says = |least: f64, z: f64| {
+            format!(
+                "it takes {:.1} % of what the noise leaves, less than {:.0} %, and its gain is {z:.1} standard errors, less than the {CERTAIN_Z} that so little needs",
+                100.0 * self.share,
+                100.0 * least
+            )
+        };
+        if self.share < LEAST_SHARE {
+            return Some(format!(
+                "it takes {:.1} % of what the noise leaves, less than {:.0} %",
+                100.0 * self.share,
+                100.0 * LEAST_SHARE
+            ));
+        }
+        if self.share < SHARE && !self.is_certain() && !self.takes_most_of_the_rest() {
+            return Some(says(SHARE, self.steadiest_z()));
+        }
+        (self.share < FAIR_SHARE && !self.stands_out()).then(|| says(FAIR_SHARE, self.least_z()))
+    }
+
+    /// Why an effect may not be named, if it may not: the requirement that it does not meet.
     pub(crate) fn rejection_reason(&self) -> Option<String> {
         if !self.generalises() {
             return Some(self.unsure());
         }
-        let rare = self.fit.z.max(self.fit.clipped_z) < 2.0 && self.holdout.z < 3.0;
+        let on_fit = self.fit.z.max(self.fit.clipped_z);
+        let rare = on_fit < UNLIKELY_Z && self.holdout.z < SURE_Z;
         if rare && !self.recurs() && !self.agrees_everywhere() {
-            return Some("its gain rests on few moments of the fitted recordings".into());
-        }
-        let may_be_little = self.is_certain() || self.takes_most_of_the_rest();
-        if self.share < SHARE && !(self.share >= LEAST_SHARE && may_be_little) {
             return Some(format!(
-                "it explains {:.1} % of what the noise leaves, less than 5 %",
-                100.0 * self.share
+                "its gain rests on few moments of the fitted recordings: {on_fit:.1} standard errors there, less than {UNLIKELY_Z}, and {:.1} on held-out ones, less than {SURE_Z}",
+                self.holdout.z
             ));
         }
-        if self.share < FAIR_SHARE && !self.stands_out() {
-            return Some(format!(
-                "it explains {:.1} % of what the noise leaves, and not surely enough for so little",
-                100.0 * self.share
-            ));
+        if let Some(reason) = self.too_little() {
+            return Some(reason);
         }
         if !self.is_comb {
             return Some(
@@ -206,97 +196,6 @@ pub(crate) struct Rival {
     pub(crate) held_out_lead: f64,
     /// Why it is none although it explains as much.
     pub(crate) absence: Option<String>,
-}
-
-/// Lays a model on every held-out recording.
-pub(crate) fn evaluate_all(
-    c: &FittedModel,
-    nominal: &Nominal,
-    tracks: &[BlockedRecording],
-    noise: &Noise,
-) -> Vec<HoldoutFit> {
-    tracks.iter().map(|track| holdout::evaluate(c, nominal, track, noise)).collect()
-}
-
-/// What speaks for each effect of a model.
-pub(crate) fn judge_all(
-    context: &FitContext,
-    last: &FittedModel,
-    holdout: &[BlockedRecording],
-) -> Vec<EffectEvidence> {
-    let holdout: &[BlockedRecording] = &known(holdout, &last.model, context.span);
-    let with = evaluate_all(last, context.nominal, holdout, &last.noise);
-    let with_fit = left_out_costs(&last.fit);
-    let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
-    let left = |c: &FittedModel, tracks: &[BlockedRecording], totals: &[Total]| {
-        forces(&estimator, tracks, totals, parameters::scale(context.nominal, c).0)
-    };
-    let left_on_fit = |c: &FittedModel| left(c, context.tracks, &c.fit.totals(context.tracks));
-    let left_on_holdout = |c: &FittedModel, evaluated: &[HoldoutFit]| {
-        left(c, holdout, &evaluated.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
-    };
-    let square = |left: &[Vec<f64>], tracks: &[BlockedRecording]| estimator.rms(left, tracks).powi(2);
-    let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
-    let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
-    let inertia = parameters::scale(context.nominal, last).0;
-    let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
-    let explainable = |left: &[Vec<f64>], tracks: &[BlockedRecording]| {
-        let floor = estimator.counting(tracks, &last.noise, count) * inertia;
-        above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
-    };
-    let of_null = left_on_holdout(&null, &evaluate_all(&null, context.nominal, holdout, &last.noise));
-    let held_out = explainable(&of_null, holdout);
-    let fitted = explainable(&left_on_fit(&null), context.tracks);
-    let (left_held_out, left_fitted) = (left_on_holdout(last, &with), left_on_fit(last));
-    (0..last.model.effects.len())
-        .map(|i| {
-            let mut less = last.model.clone();
-            let effect = less.effects.remove(i);
-            let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
-            let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
-            let without_fit = left_out_costs(&without.fit);
-            let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
-            let evaluated = evaluate_all(&without, context.nominal, holdout, &last.noise);
-            let holdout_gain = holdout::compare(&with, &evaluated);
-            // What one recording hardly plays another may be made for.
-            let (less_held_out, less_fitted) = (left_on_holdout(&without, &evaluated), left_on_fit(&without));
-            let share = ((square(&less_held_out, holdout) - square(&left_held_out, holdout)) / held_out)
-                .max((square(&less_fitted, context.tracks) - square(&left_fitted, context.tracks)) / fitted);
-            let force = relative_gain(&estimator, holdout, &less_held_out, &left_held_out);
-            let sizes = played(
-                sizes_on(&estimator, context.tracks, &left_fitted, &less_fitted),
-                sizes_on(&estimator, holdout, &left_held_out, &less_held_out),
-            );
-            // Bristles without damping are bristles all the same.
-            let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
-            let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
-            let is_bound = ends.any(
-                |((key, _), _)| matches!(key, Key::Term { effect, term } if *effect == i && counts(*term)),
-            );
-            let at_bound = is_bound
-                || candidates::is_at_end(&effect, context.span)
-                || drifts_too_far(&last.fit, i, effect.name);
-            let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
-            EffectEvidence {
-                effect,
-                rivals: Vec::new(),
-                holdout: holdout_gain,
-                fit: bootstrap(&gains),
-                force,
-                share,
-                at_bound,
-                is_comb,
-                sizes,
-            }
-        })
-        .collect()
-}
-
-/// Whether more of the dry friction goes or comes with time than warming explains.
-fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
-    let dry = fit.value(Key::Coulomb).filter(|dry| name == EffectName::FrictionDrift && *dry > 0.0);
-    let change = fit.value(Key::Term { effect, term: 0 });
-    dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }
 
 #[cfg(test)]
@@ -351,6 +250,37 @@ mod tests {
             })
         };
         assert!(fitted(2.6) && !fitted(2.0));
+    }
+
+    /// The figure that a reason gives is the one that rejects.
+    #[test]
+    fn a_reason_is_the_requirement_that_is_not_met_with_its_figure() {
+        let reason = |change: fn(&mut EffectEvidence)| {
+            let mut found = EffectEvidence { sizes: vec![1.0, 2.0], ..found() };
+            change(&mut found);
+            found.rejection_reason().expect("it is rejected")
+        };
+        assert!(
+            reason(|found| found.holdout = gain(-12.0, -50.0, -1.0))
+                .contains("less likely with it, by 12 nats")
+        );
+        let unlikely = reason(|found| found.holdout = gain(661.0, 10.0, 1.4));
+        assert!(unlikely.contains("1.4 standard errors, less than 2"), "{unlikely}");
+        let none = reason(|found| found.holdout = gain(661.0, -10.0, 2.4));
+        assert!(none.contains("661 nats, may be none (95 %: -10 to 1322)"), "{none}");
+        let hardly = reason(|found| {
+            found.fit = gain(90.0, 10.0, 2.5);
+            found.share = 0.4;
+        });
+        assert!(hardly.contains("2.5 standard errors on left-out") && hardly.contains("40 %"), "{hardly}");
+        let little = reason(|found| (found.share, found.fit) = (0.03, gain(90.0, 10.0, 4.0)));
+        assert!(
+            little.contains("3.0 %") && little.contains("4.0 standard errors, less than the 6"),
+            "{little}"
+        );
+        assert!(
+            reason(|found| found.share = 0.002).contains("0.2 % of what the noise leaves, less than 1 %")
+        );
     }
 
     #[test]

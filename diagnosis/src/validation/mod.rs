@@ -6,6 +6,7 @@ pub(crate) mod comparison;
 pub(crate) mod confidence;
 pub(crate) mod evidence;
 pub(crate) mod holdout;
+pub(crate) mod judge;
 pub(crate) mod known_travel;
 pub(crate) mod opponent;
 pub(crate) mod out_of_library;

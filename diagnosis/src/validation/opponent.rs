@@ -7,7 +7,7 @@ use crate::estimation::noise::Colour;
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
 use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::assess::Assessment;
-use crate::validation::evidence::judge_all;
+use crate::validation::judge::judge_all;
 use crate::validation::parameters;
 use crate::validation::stepwise::Search;
 

@@ -8,7 +8,8 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::search::{FitContext, FittedModel, PER_COEFFICIENT};
-use crate::validation::evidence::judge_all;
+use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
+use crate::validation::judge::judge_all;
 use rayon::prelude::*;
 
 /// Times in which a force may fade, s.
@@ -17,10 +18,6 @@ const FADES_S: [f64; 6] = [0.1, 0.25, 0.6, 1.5, 4.0, 10.0];
 const CHANGES: usize = 40;
 /// Degree of the polynomial along the travel that an inertia may follow.
 const INERTIA_DEGREE: f64 = 12.0;
-/// Part of what an effect gains that foreign physics must gain beside it: a law of slightly another form gains a little.
-const MUCH: f64 = 0.1;
-/// Part of what a refit leaves that foreign physics alone must explain to be told of: most of it.
-const MOST_ALONE: f64 = 0.5;
 
 /// OutOfLibrary physics in an effect's place, or alone.
 struct OutOfLibrary {
@@ -110,7 +107,7 @@ pub(crate) fn alone(
     let (_, best) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = context.fit(model(&best), &refit.noise, Colour::White);
     let found = judge_all(context, &fitted, holdout).pop()?;
-    let is_sure = found.rejection_reason().is_none() && found.is_certain() && found.share > MOST_ALONE;
+    let is_sure = found.rejection_reason().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
     is_sure.then(|| format!("{} would explain {:.0} % of it", best.what, 100.0 * found.share.min(1.0)))
 }
 
@@ -121,7 +118,7 @@ pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, 
         let mut model = fitted.model.clone();
         model.effects[effect] = foreign.effect.clone();
         let fit = Fit::new(&model, context.nominal, context.tracks, &fitted.noise);
-        let least = (MUCH * gain).max(foreign.freedom * PER_COEFFICIENT);
+        let least = (OUTSIDE_PART * gain).max(foreign.freedom * PER_COEFFICIENT);
         fit.log_likelihood - fitted.fit.log_likelihood - least
     };
     let all = like(&fitted.model.effects[effect], context);

@@ -6,7 +6,7 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::{Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::selection::search::FittedModel;
-use crate::validation::evidence::evaluate_all;
+use crate::validation::judge::evaluate_all;
 use crate::validation::parameters;
 
 /// Residual force of a model over recordings, per block.

@@ -16,14 +16,13 @@ use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
 use crate::selection::search::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
-use crate::validation::evidence::{EffectEvidence, evaluate_all, judge_all};
+use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
+use crate::validation::evidence::EffectEvidence;
+use crate::validation::judge::{evaluate_all, judge_all};
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use crate::validation::residuals::{drive_force, forces};
 use rayon::prelude::*;
-
-/// Least gain of log-likelihood under coloured noise, after the cost of freedom, for an effect to be looked at on.
-pub(crate) const MIN_LOG_LIKELIHOOD_GAIN: f64 = 6.0;
 
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;

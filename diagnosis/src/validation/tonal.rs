@@ -4,6 +4,7 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::numerics::golden::golden;
+use crate::thresholds::MISTAKEN;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -32,8 +33,7 @@ pub(crate) struct TonalDisturbance {
     pub(crate) taken: f64,
 }
 
-/// Parts from which on the effects found stand for a swing, and from which on a swing is what was left out.
-const MISTAKEN: f64 = 0.2;
+/// Part from which on a swing is what was left out.
 const DOMINANT: f64 = 0.4;
 
 impl TonalDisturbance {

@@ -3,6 +3,7 @@
 use super::basis::Inputs;
 use crate::effects::Variable;
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::thresholds::{FORM_SURE_Z, FORM_TOLD, NEARLY_ALL_OF_FORM};
 
 /// Log predictive density of each left-out unit, up to a constant of the data.
 #[derive(Debug, Clone)]
@@ -21,8 +22,6 @@ pub(crate) struct Gain {
 
 /// Most that one unit counts, nats.
 const WITNESS: f64 = 10.0;
-/// Standard errors from which a gain is sure: ten forms are asked of every model.
-const SURE: f64 = 3.0;
 
 impl Density {
     pub(crate) fn over(&self, other: &Self) -> Gain {
@@ -42,7 +41,7 @@ impl Density {
 impl Gain {
     /// Whether it is surely above nought.
     pub(crate) fn is_sure(&self) -> bool {
-        self.sum > 0.0 && self.z() > SURE
+        self.sum > 0.0 && self.z() > FORM_SURE_Z
     }
 
     /// Standard errors above nought, with or without a limit on what a unit counts, whichever is more.
@@ -80,13 +79,6 @@ pub(crate) struct Taken {
     pub(crate) gain: Gain,
 }
 
-/// Part of what a free form takes that an effect must take to be named, and must take beyond it where it takes less. Of a force of
-/// one variable alone the rest is enough: on EMPS friction by direction takes a quarter of what any force over speed takes, as
-/// real friction has more to it than one law.
-const NEARLY_ALL: f64 = 0.9;
-/// Part of the innovations' mean square that a form must take to be told.
-const TOLD: f64 = 0.005;
-
 impl Densities {
     /// What each form takes beside the model, most first.
     pub(crate) fn taken(&self) -> Vec<Taken> {
@@ -111,7 +103,7 @@ impl Densities {
             let better = if instead > most { form } else { both };
             let most = most.max(instead);
             let (beyond, beside) = (better.over(&self.alone), both.over(form).sum);
-            let little = (1.0 - NEARLY_ALL) * most;
+            let little = (1.0 - NEARLY_ALL_OF_FORM) * most;
             let is_small = variable.is_none() || own.sum < little;
             (is_small && beyond.is_sure() && beyond.sum > little && beside < little).then_some(Against {
                 inputs: *inputs,
@@ -127,7 +119,7 @@ impl Densities {
 /// Whether what a form takes is sure and enough to be told.
 pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
     let blocks: usize = tracks.iter().map(BlockedRecording::blocks).sum();
-    taken.gain.is_sure() && taken.gain.sum > 0.5 * TOLD * blocks as f64
+    taken.gain.is_sure() && taken.gain.sum > 0.5 * FORM_TOLD * blocks as f64
 }
 
 #[cfg(test)]

@@ -1,0 +1,114 @@
+//! What speaks for each effect of a fitted model, on left-out blocks of the fitted recordings and on held-out ones. Nothing here
+//! says what is enough to be named.
+
+use crate::effects::EffectName;
+use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::filter::Noise;
+use crate::estimation::fit::Fit;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::model::{Key, Model, Nominal};
+use crate::numerics::bootstrap::bootstrap;
+use crate::selection::candidates;
+use crate::selection::periodic;
+use crate::selection::predictive::left_out_costs;
+use crate::selection::search::{FitContext, FittedModel};
+use crate::thresholds::DRIFT;
+use crate::validation::evidence::EffectEvidence;
+use crate::validation::holdout::{self, HoldoutFit};
+use crate::validation::known_travel::known;
+use crate::validation::parameters;
+use crate::validation::residuals::{above, forces, relative_gain};
+use crate::validation::sizes::{played, sizes_on};
+
+/// Part of a refit's mean square that counts as above the noise at the least: how much of it the noise is, is itself unsure.
+const LEAST_EXPLAINABLE: f64 = 0.2;
+/// Lays a model on every held-out recording.
+pub(crate) fn evaluate_all(
+    c: &FittedModel,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+) -> Vec<HoldoutFit> {
+    tracks.iter().map(|track| holdout::evaluate(c, nominal, track, noise)).collect()
+}
+
+/// What speaks for each effect of a model.
+pub(crate) fn judge_all(
+    context: &FitContext,
+    last: &FittedModel,
+    holdout: &[BlockedRecording],
+) -> Vec<EffectEvidence> {
+    let holdout: &[BlockedRecording] = &known(holdout, &last.model, context.span);
+    let with = evaluate_all(last, context.nominal, holdout, &last.noise);
+    let with_fit = left_out_costs(&last.fit);
+    let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
+    let left = |c: &FittedModel, tracks: &[BlockedRecording], totals: &[Total]| {
+        forces(&estimator, tracks, totals, parameters::scale(context.nominal, c).0)
+    };
+    let left_on_fit = |c: &FittedModel| left(c, context.tracks, &c.fit.totals(context.tracks));
+    let left_on_holdout = |c: &FittedModel, evaluated: &[HoldoutFit]| {
+        left(c, holdout, &evaluated.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
+    };
+    let square = |left: &[Vec<f64>], tracks: &[BlockedRecording]| estimator.rms(left, tracks).powi(2);
+    let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
+    let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+    let inertia = parameters::scale(context.nominal, last).0;
+    let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
+    let explainable = |left: &[Vec<f64>], tracks: &[BlockedRecording]| {
+        let floor = estimator.counting(tracks, &last.noise, count) * inertia;
+        above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
+    };
+    let of_null = left_on_holdout(&null, &evaluate_all(&null, context.nominal, holdout, &last.noise));
+    let held_out = explainable(&of_null, holdout);
+    let fitted = explainable(&left_on_fit(&null), context.tracks);
+    let (left_held_out, left_fitted) = (left_on_holdout(last, &with), left_on_fit(last));
+    (0..last.model.effects.len())
+        .map(|i| {
+            let mut less = last.model.clone();
+            let effect = less.effects.remove(i);
+            let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
+            let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
+            let without_fit = left_out_costs(&without.fit);
+            let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
+            let evaluated = evaluate_all(&without, context.nominal, holdout, &last.noise);
+            let holdout_gain = holdout::compare(&with, &evaluated);
+            // What one recording hardly plays another may be made for.
+            let (less_held_out, less_fitted) = (left_on_holdout(&without, &evaluated), left_on_fit(&without));
+            let share = ((square(&less_held_out, holdout) - square(&left_held_out, holdout)) / held_out)
+                .max((square(&less_fitted, context.tracks) - square(&left_fitted, context.tracks)) / fitted);
+            let force = relative_gain(&estimator, holdout, &less_held_out, &left_held_out);
+            let sizes = played(
+                sizes_on(&estimator, context.tracks, &left_fitted, &less_fitted),
+                sizes_on(&estimator, holdout, &left_held_out, &less_held_out),
+            );
+            // Bristles without damping are bristles all the same.
+            let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
+            let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
+            let is_bound = ends.any(
+                |((key, _), _)| matches!(key, Key::Term { effect, term } if *effect == i && counts(*term)),
+            );
+            let at_bound = is_bound
+                || candidates::is_at_end(&effect, context.span)
+                || drifts_too_far(&last.fit, i, effect.name);
+            let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
+            EffectEvidence {
+                effect,
+                rivals: Vec::new(),
+                holdout: holdout_gain,
+                fit: bootstrap(&gains),
+                force,
+                share,
+                at_bound,
+                is_comb,
+                sizes,
+            }
+        })
+        .collect()
+}
+
+/// Whether more of the dry friction goes or comes with time than warming explains.
+fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
+    let dry = fit.value(Key::Coulomb).filter(|dry| name == EffectName::FrictionDrift && *dry > 0.0);
+    let change = fit.value(Key::Term { effect, term: 0 });
+    dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
+}
