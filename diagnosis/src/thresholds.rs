@@ -32,12 +32,17 @@ pub(crate) const LEFT_OF_FORCE: (f64, f64) = (0.005, 0.3);
 /// Share that an effect which stands out of every stretch counts with at the least: it may be small beside larger ones.
 pub(crate) const CERTAIN_SHARE: f64 = 0.15;
 
-/// z on fitted and on held-out recordings that is sure.
+/// Share that any other effect counts with at the least.
+pub(crate) const COUNTED_SHARE: f64 = 0.03;
+
+/// z on fitted and on held-out recordings that is sure, over stretches of time or of the score.
 pub(crate) const SURE_Z: f64 = 3.0;
 /// z on held-out recordings, and on fitted ones of what acts in few moments, below which a gain is none.
 pub(crate) const UNLIKELY_Z: f64 = 2.0;
 /// z on the fitted recordings of what may generalise beside another.
 pub(crate) const PROMISING_Z: f64 = 2.5;
+/// z on held-out recordings below which it is surely worse than nothing.
+pub(crate) const WORSE_Z: f64 = -1.0;
 /// z on fitted and on held-out recordings from which an effect may be small.
 pub(crate) const CERTAIN_Z: f64 = 6.0;
 /// Least share of an effect with that z.

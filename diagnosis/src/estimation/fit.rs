@@ -7,6 +7,7 @@ use crate::estimation::model::{Column, Key, Model, Nominal, total};
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Prior, Solution, Square, bounded};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A model over one recording under one noise: residuals at the reference and whitened columns.
 pub(crate) struct Prepared {
@@ -58,6 +59,23 @@ impl Prepared {
                 sum.max(0.0)
             })
             .collect()
+    }
+
+    /// Whitened residual of a block at a step from the reference, as weighed.
+    pub(crate) fn residual_at(&self, block: usize, places: &[usize], x: &[f64]) -> f64 {
+        let explained: f64 =
+            self.responses.iter().zip(places).map(|(response, place)| x[*place] * response[block]).sum();
+        self.residual[block] - explained
+    }
+
+    /// The blocks of a segment, and its weight.
+    pub(crate) fn segment(&self, segment: usize) -> (Range<usize>, f64) {
+        (self.bounds[segment]..self.bounds[segment + 1], self.weight[segment])
+    }
+
+    /// What the model pays for jumps that were found in this recording itself, in log-likelihood.
+    pub(crate) fn surcharge(&self) -> f64 {
+        self.surcharges.iter().sum()
     }
 
     /// Weight and number of blocks of each segment.

@@ -4,7 +4,9 @@
 //! judge.
 
 use crate::effects::EffectName as N;
-use crate::thresholds::{BIAS, CERTAIN_SHARE, CLAIMED, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS};
+use crate::thresholds::{
+    BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS,
+};
 use crate::validation::evidence::EffectEvidence;
 use std::collections::BTreeMap;
 
@@ -25,7 +27,7 @@ pub(crate) struct Leftover {
 /// The evidence for an effect.
 pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     let log = |x: f64, low: f64, high: f64| x.max(low).min(high).ln();
-    let least_share = if found.is_certain() { CERTAIN_SHARE } else { 0.03 };
+    let least_share = if found.is_certain() { CERTAIN_SHARE } else { COUNTED_SHARE };
     let unexplained = left.unexplained.min(1.0 - found.share).max(0.0);
     // What is left and is hardly more than nothing beside the force says little.
     let of_force = log(left.of_force / LEFT_OF_FORCE.0, 1.0, LEFT_OF_FORCE.1 / LEFT_OF_FORCE.0);

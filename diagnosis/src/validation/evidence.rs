@@ -5,7 +5,7 @@ use crate::effects::{Effect, EffectName};
 use crate::numerics::bootstrap::Gain;
 use crate::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MOST_SHARE,
-    NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE,
+    NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
 use std::ops::Range;
 
@@ -21,6 +21,9 @@ pub(crate) struct EffectEvidence {
     pub(crate) fit: Gain,
     /// How much less force it leaves on held-out recordings, over the square of what is left.
     pub(crate) force: Gain,
+    /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the fitted or on held-out recordings,
+    /// whichever are fewer; nought where it may be named without.
+    pub(crate) score_z: f64,
     /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
     pub(crate) share: f64,
     /// Whether one of its values stands at the end of what is possible.
@@ -33,6 +36,12 @@ pub(crate) struct EffectEvidence {
 }
 
 impl EffectEvidence {
+    /// Whether it predicts surely, however few moments it acts in. Bristles bend to what any model leaves next to reversals, and
+    /// reach that on recordings in which there is nothing.
+    fn predicts(&self) -> bool {
+        self.effect.name != EffectName::PreslidingFriction && self.score_z >= SURE_Z
+    }
+
     /// Whether it stands out of every stretch of the held-out recordings and surely of the others, however little it explains
     /// beside larger effects.
     pub(crate) fn is_certain(&self) -> bool {
@@ -46,7 +55,8 @@ impl EffectEvidence {
 
     /// Standard errors of its gain on fitted or on held-out recordings, whichever are fewer.
     pub(crate) fn least_z(&self) -> f64 {
-        self.holdout.z.max(self.holdout.clipped_z).min(self.fit.z.max(self.fit.clipped_z))
+        let over_time = self.holdout.z.max(self.holdout.clipped_z).min(self.fit.z.max(self.fit.clipped_z));
+        if self.predicts() { over_time.max(self.score_z) } else { over_time }
     }
 
     /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
@@ -67,6 +77,7 @@ impl EffectEvidence {
         likely
             || (self.is_same_size() && (takes_most || takes_all) && self.fit.z >= least)
             || self.agrees_everywhere()
+            || self.predicts()
     }
 
     /// Whether each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
@@ -113,7 +124,7 @@ impl EffectEvidence {
     /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and not surely worse than
     /// nothing on the others.
     pub(crate) fn is_provisional(&self) -> bool {
-        self.fit.z >= PROMISING_Z && self.holdout.z > -1.0 && self.share >= SHARE
+        self.fit.z >= PROMISING_Z && self.holdout.z > WORSE_Z && self.share >= SHARE
     }
 
     /// What of a gain on every recording it lacks: the first requirement that it does not meet, with its figure.
@@ -166,7 +177,7 @@ impl EffectEvidence {
         }
         let on_fit = self.fit.z.max(self.fit.clipped_z);
         let rare = on_fit < UNLIKELY_Z && self.holdout.z < SURE_Z;
-        if rare && !self.recurs() && !self.agrees_everywhere() {
+        if rare && !self.recurs() && !self.agrees_everywhere() && !self.predicts() {
             return Some(format!(
                 "its gain rests on few moments of the fitted recordings: {on_fit:.1} standard errors there, less than {UNLIKELY_Z}, and {:.1} on held-out ones, less than {SURE_Z}",
                 self.holdout.z
@@ -210,6 +221,7 @@ mod tests {
     fn found() -> EffectEvidence {
         EffectEvidence {
             effect: Effect::shaped(EffectName::QuadraticDrag, &[]),
+            score_z: 0.0,
             rivals: Vec::new(),
             holdout: gain(500.0, 300.0, 8.0),
             fit: gain(900.0, 600.0, 9.0),
@@ -281,6 +293,22 @@ mod tests {
         assert!(
             reason(|found| found.share = 0.002).contains("0.2 % of what the noise leaves, less than 1 %")
         );
+    }
+
+    #[test]
+    fn a_rare_effect_is_sure_by_its_score_and_bristles_are_not() {
+        let rare = |name| {
+            may_be_named(|found| {
+                found.effect = Effect::shaped(name, &[]);
+                (found.fit, found.holdout) = (gain(60.0, -5.0, 1.2), gain(40.0, -5.0, 1.3));
+                (found.share, found.score_z) = (0.3, 7.0);
+            })
+        };
+        assert!(rare(EffectName::CommandSaturation) && !rare(EffectName::PreslidingFriction));
+        assert!(!may_be_named(|found| {
+            (found.fit, found.holdout) = (gain(60.0, -5.0, 1.2), gain(40.0, -5.0, 1.3));
+            (found.share, found.score_z) = (0.3, 2.0);
+        }));
     }
 
     #[test]

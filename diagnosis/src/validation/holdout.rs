@@ -17,6 +17,10 @@ pub(crate) struct HoldoutFit {
     pub(crate) bias: f64,
     /// Cost of each segment, in log-likelihood.
     pub(crate) costs: Vec<f64>,
+    /// Whitened residual of each block of the segments that the model knows something of.
+    pub(crate) residual: Vec<f64>,
+    /// What the model pays for jumps found in this very recording, in log-likelihood.
+    pub(crate) surcharge: f64,
 }
 
 impl HoldoutFit {
@@ -230,7 +234,11 @@ fn evaluate_once(
         .map(|(cost, is_known)| if is_known { cost } else { 0.0 })
         .collect();
     let bias = offset.map_or(0.0, |o| theta[o]);
-    HoldoutFit { total: total(track, &one.columns, &theta), bias, costs }
+    let known = track.segments.windows(2).zip(track.known_segments()).filter(|(_, is_known)| *is_known);
+    let residual =
+        known.flat_map(|(w, _)| (w[0]..w[1]).map(|j| one.residual_at(j, &places, &step))).collect();
+    let surcharge = one.surcharge();
+    HoldoutFit { total: total(track, &one.columns, &theta), bias, costs, residual, surcharge }
 }
 
 /// Held-out gain of one model over another under the same noise.

@@ -4,13 +4,13 @@
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::Noise;
-use crate::estimation::fit::Fit;
+use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::{Key, Model, Nominal};
 use crate::numerics::bootstrap::bootstrap;
 use crate::selection::candidates;
 use crate::selection::periodic;
-use crate::selection::predictive::left_out_costs;
+use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::selection::search::{FitContext, FittedModel};
 use crate::thresholds::DRIFT;
 use crate::validation::evidence::EffectEvidence;
@@ -32,10 +32,11 @@ pub(crate) fn evaluate_all(
     tracks.iter().map(|track| holdout::evaluate(c, nominal, track, noise)).collect()
 }
 
-/// What speaks for each effect of a model.
+/// What speaks for each effect of a model fitted under white noise; its score is that under `slow`.
 pub(crate) fn judge_all(
     context: &FitContext,
     last: &FittedModel,
+    slow: &Noise,
     holdout: &[BlockedRecording],
 ) -> Vec<EffectEvidence> {
     let holdout: &[BlockedRecording] = &known(holdout, &last.model, context.span);
@@ -91,8 +92,9 @@ pub(crate) fn judge_all(
                 || candidates::is_at_end(&effect, context.span)
                 || drifts_too_far(&last.fit, i, effect.name);
             let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
-            EffectEvidence {
+            let mut found = EffectEvidence {
                 effect,
+                score_z: 0.0,
                 rivals: Vec::new(),
                 holdout: holdout_gain,
                 fit: bootstrap(&gains),
@@ -101,9 +103,37 @@ pub(crate) fn judge_all(
                 at_bound,
                 is_comb,
                 sizes,
+            };
+            if found.rejection_reason().is_some() {
+                found.score_z = score_z_of(context, &last.model, &without.model, slow, holdout);
             }
+            found
         })
         .collect()
+}
+
+/// Standard errors of what one model gains over another under one noise with heavy tails, on left-out blocks of the fitted or on
+/// held-out recordings, whichever are fewer.
+fn score_z_of(
+    context: &FitContext,
+    with: &Model,
+    without: &Model,
+    noise: &Noise,
+    holdout: &[BlockedRecording],
+) -> f64 {
+    // What is left, and what the model pays, on fitted and on held-out recordings.
+    let left = |model: &Model| {
+        let fit = Fit::new(model, context.nominal, context.tracks, noise);
+        let fitted = FittedModel { model: model.clone(), noise: *noise, fit, merit: 0.0 };
+        let evaluated = evaluate_all(&fitted, context.nominal, holdout, noise);
+        let on_holdout: Vec<f64> = evaluated.iter().flat_map(|one| one.residual.iter().copied()).collect();
+        let paid: f64 = fitted.fit.prepared.iter().map(Prepared::surcharge).sum();
+        let paid_on_holdout: f64 = evaluated.iter().map(|one| one.surcharge).sum();
+        [(left_out_residuals(&fitted.fit), paid), (on_holdout, paid_on_holdout)]
+    };
+    let both = left(with).into_iter().zip(left(without));
+    both.map(|((with, paid), (without, before))| score_z(&with, &without, paid - before))
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Whether more of the dry friction goes or comes with time than warming explains.

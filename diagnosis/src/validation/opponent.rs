@@ -82,6 +82,6 @@ pub(crate) fn alone(
         let effects = vec![Effect::tabled(shape.table.clone(), context.nominal.rig.turn())];
         context.fit(Model { effects, ..Model::default() }, &refit.noise, Colour::White)
     });
-    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, holdout).pop());
+    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, &s.null.noise, holdout).pop());
     Some(Unnamed { taken, shape, fitted, holdout_gain: judged.map(|found| found.holdout.sum) })
 }

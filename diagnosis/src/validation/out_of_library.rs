@@ -106,7 +106,7 @@ pub(crate) fn alone(
         all.into_par_iter().map(|foreign| (merit(&foreign), foreign)).collect();
     let (_, best) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = context.fit(model(&best), &refit.noise, Colour::White);
-    let found = judge_all(context, &fitted, holdout).pop()?;
+    let found = judge_all(context, &fitted, &refit.noise, holdout).pop()?;
     let is_sure = found.rejection_reason().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
     is_sure.then(|| format!("{} would explain {:.0} % of it", best.what, 100.0 * found.share.min(1.0)))
 }

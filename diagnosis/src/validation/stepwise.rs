@@ -225,8 +225,9 @@ fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Ne
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
         smooth_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
-        if judge_all(&own, &white, &holdout).iter().all(|judged| judged.rejection_reason().is_none()) {
-            let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
+        let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
+        let judged = judge_all(&own, &white, &slow.noise, &holdout);
+        if judged.iter().all(|judged| judged.rejection_reason().is_none()) {
             return Some(Next { state: SearchState { white, slow, tracks, holdout }, generalises: true });
         }
     }
@@ -268,7 +269,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
         smooth_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
-        let judged = judge_all(&own, &white, &holdout).pop().expect("the last effect is judged");
+        let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
         let rejection_reason = judged
             .rejection_reason()
             .or_else(|| parameters::absence(&own, &white, white.model.effects.len() - 1));
@@ -412,7 +413,7 @@ impl SearchContext<'_> {
 pub(crate) fn eliminate(s: &mut Search, context: &FitContext, holdout: &[BlockedRecording], noise: &Noise) {
     loop {
         let plain = context.fit(s.last.model.clone(), noise, Colour::White);
-        s.found = judge_all(context, &plain, holdout);
+        s.found = judge_all(context, &plain, &s.last.noise, holdout);
         let weakest = s
             .found
             .iter()
