@@ -1,5 +1,7 @@
 //! The law of seed 002 against its floating-point twin, written from the equations, and what a hand would notice of it.
 
+mod needle;
+
 use control_core::config::{
     Cutting, Fixture, FrictionLaw, Law, Layer, Lugre, Parabola, SPRING_BACK, Sparte, SpeedMethod, Tissue,
     Wall,
@@ -7,11 +9,12 @@ use control_core::config::{
 use control_core::event::State;
 use control_core::plan::Field;
 use control_core::units::{
-    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillimetresPerSecond,
-    MillinewtonMetres, Milliradians, Newtons, Stiffness,
+    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillimetresPerSecond, MillinewtonMetres,
+    Milliradians, Newtons, Stiffness,
 };
-use control_core::{Config, Controller, Order, Refusal, TickInput, TickOutput};
+use control_core::{Config, Refusal, TickOutput};
 use fixed::types::{I8F24, I16F16};
+use needle::{Needle, force};
 use proptest::prelude::*;
 
 /// A needle straight into the skin: lengths along it are depths.
@@ -178,46 +181,9 @@ impl Twin {
     }
 }
 
-struct Needle {
-    core: Controller,
-    at_mm: f64,
-    tilt: Milliradians,
-}
-
-impl Needle {
-    fn new(config: &Config) -> Self {
-        let mut core = Controller::new(config.plan().expect("it is sound"));
-        core.tick(TickInput { count: Counts(-60), tilt: STRAIGHT });
-        core.order(Order::Start);
-        Self { core, at_mm: -0.94, tilt: STRAIGHT }
-    }
-
-    fn tick(&mut self) -> TickOutput {
-        let per_count = self.core.plan().mm_per_count().to_num::<f64>();
-        self.core.order(Order::Heartbeat);
-        self.core.tick(TickInput { count: Counts((self.at_mm / per_count).round() as i32), tilt: self.tilt })
-    }
-
-    fn go(&mut self, mm: f64, mm_per_s: f64, mut see: impl FnMut(&TickOutput)) {
-        let step = mm_per_s / 1e4 * (mm - self.at_mm).signum();
-        while (mm - self.at_mm).abs() > step.abs() {
-            self.at_mm += step;
-            see(&self.tick());
-        }
-    }
-
-    fn rest(&mut self, seconds: f64) -> TickOutput {
-        (0..(seconds * 1e4) as usize).map(|_| self.tick()).last().expect("a tick")
-    }
-}
-
-fn force(out: &TickOutput) -> f64 {
-    out.force.0.to_num()
-}
-
 #[test]
 fn every_layer_is_cut_at_the_force_of_the_paper() {
-    let mut needle = Needle::new(&shoulder());
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
     let sliding = 0.3 + 0.001 * 10.0;
     // Deep enough in each layer for the tracking wall to be full, and where no wall is pushed in.
     for (mm, cutting) in [(7.5, 1.5), (19.0, 2.0), (25.8, 2.5), (31.0, 3.0), (38.0, 4.0)] {
@@ -229,7 +195,7 @@ fn every_layer_is_cut_at_the_force_of_the_paper() {
 
 #[test]
 fn a_wall_gives_way_with_a_sharp_drop() {
-    let mut needle = Needle::new(&shoulder());
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
     let (mut before, mut after, mut peak) = (0.0, 0.0, 0.0_f64);
     needle.go(3.2, 10.0, |out| {
         if out.transitions.puncture == 1 {
@@ -245,7 +211,7 @@ fn a_wall_gives_way_with_a_sharp_drop() {
 
 #[test]
 fn a_needle_that_stops_keeps_the_friction_that_holds_it_and_stays_there() {
-    let mut needle = Needle::new(&shoulder());
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
     needle.go(15.0, 10.0, |_| ());
     let moving = force(&needle.tick());
     let soon = force(&needle.rest(0.1));
@@ -258,7 +224,7 @@ fn a_needle_that_stops_keeps_the_friction_that_holds_it_and_stays_there() {
 
 #[test]
 fn on_the_way_out_forces_have_magnitudes_of_their_own() {
-    let mut needle = Needle::new(&shoulder());
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
     needle.go(15.0, 10.0, |_| ());
     let mut last = None;
     needle.go(10.0, 10.0, |out| last = Some(*out));
@@ -270,7 +236,7 @@ fn on_the_way_out_forces_have_magnitudes_of_their_own() {
 
 #[test]
 fn the_fixture_holds_the_direction_of_entry_up_to_its_largest_angle() {
-    let mut needle = Needle::new(&shoulder());
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
     needle.go(10.0, 10.0, |_| ());
     assert_eq!(needle.tick().lateral, Newtons::default());
     let turned = |needle: &mut Needle, mrad: i16| {
@@ -306,7 +272,7 @@ fn more_than_the_motor_gives_is_refused_unless_a_scale_is_declared() {
     assert!(config.plan().is_ok(), "a smaller roller bears it");
     // What is given to the hand is the declared share of it.
     let config = shoulder();
-    let mut needle = Needle::new(&config);
+    let mut needle = Needle::new(&config, STRAIGHT);
     needle.rest(0.5);
     needle.go(38.0, 10.0, |_| ());
     let out = needle.tick();
@@ -367,7 +333,7 @@ proptest! {
         (law.friction.sliding, law.friction.sticking) = (n(sliding), n(sliding + extra));
         law.friction.speed.0 = q(speed);
         prop_assume!(config.plan().is_ok());
-        let (mut needle, mut twin) = (Needle::new(&config), Twin::new(&config));
+        let (mut needle, mut twin) = (Needle::new(&config, STRAIGHT), Twin::new(&config));
         let mut worst = 0.0_f64;
         let mut see = |out: &TickOutput| {
             let wanted = twin.tick(out);

@@ -1,11 +1,14 @@
 //! The force table of seed 000 against its floating-point twin, and what a hand would notice of it.
 
+mod needle;
+
 use control_core::config::{ForceTable, Law, SpeedMethod};
 use control_core::event::{Limits, State};
 use control_core::plan::Field;
-use control_core::units::{Counts, Millimetres, MillimetresPerSecond, Milliradians, Stiffness};
-use control_core::{Config, Controller, Order, Refusal, TickInput, TickOutput};
+use control_core::units::{Millimetres, MillimetresPerSecond, Milliradians, Stiffness};
+use control_core::{Config, Refusal};
 use fixed::types::I16F16;
+use needle::{Needle, force};
 use proptest::prelude::*;
 
 fn q(value: f64) -> I16F16 {
@@ -52,40 +55,6 @@ fn rising(depth: f64, speed: f64, angle: f64) -> f64 {
     0.1 * depth * (0.8 + 0.05 * speed) * (0.6 + 0.4 * angle)
 }
 
-struct Needle {
-    core: Controller,
-    at_mm: f64,
-    tilt: Milliradians,
-}
-
-impl Needle {
-    fn new(config: &Config, tilt: i16) -> Self {
-        let mut core = Controller::new(config.plan().expect("it is sound"));
-        let tilt = Milliradians(tilt);
-        core.tick(TickInput { count: Counts(-60), tilt });
-        core.order(Order::Start);
-        Self { core, at_mm: -1.0, tilt }
-    }
-
-    fn tick(&mut self) -> TickOutput {
-        let per_count = self.core.plan().mm_per_count().to_num::<f64>();
-        self.core.order(Order::Heartbeat);
-        self.core.tick(TickInput { count: Counts((self.at_mm / per_count).round() as i32), tilt: self.tilt })
-    }
-
-    fn go(&mut self, mm: f64, mm_per_s: f64, mut see: impl FnMut(&TickOutput)) {
-        let step = mm_per_s / 1e4 * (mm - self.at_mm).signum();
-        while (mm - self.at_mm).abs() > step.abs() {
-            self.at_mm += step;
-            see(&self.tick());
-        }
-    }
-}
-
-fn force(out: &TickOutput) -> f64 {
-    out.force.0.to_num()
-}
-
 #[test]
 fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
     let config = config(table(rising));
@@ -98,7 +67,7 @@ fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
         (1.0, 524, false),
         (3.0, 785, false),
     ] {
-        let mut needle = Needle::new(&config, angle);
+        let mut needle = Needle::new(&config, Milliradians(angle));
         let (mut worst, mut flags) = (0.0_f64, 0);
         let (mut ticks, mut inside) = (0, 0);
         needle.go(12.0, speed, |out| {
@@ -124,13 +93,10 @@ fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
 #[test]
 fn a_resting_needle_keeps_its_force_and_a_withdrawn_one_is_held_by_a_share_of_it() {
     let config = config(table(rising));
-    let mut needle = Needle::new(&config, 1_047);
+    let mut needle = Needle::new(&config, Milliradians(1_047));
     needle.go(12.0, 5.0, |_| ());
     let moving = force(&needle.tick());
-    let mut last = needle.tick();
-    for _ in 0..20_000 {
-        last = needle.tick();
-    }
+    let mut last = needle.rest(2.0);
     // At rest the table is asked for its slowest speed.
     let below = |along: f64| along * 1.047_f64.sin();
     let slow = rising(below(12.0), 1.0, 1.047);
@@ -179,7 +145,7 @@ proptest! {
         let table = table(random);
         let config = config(table.clone());
         prop_assume!(config.plan().is_ok());
-        let mut needle = Needle::new(&config, tilt);
+        let mut needle = Needle::new(&config, Milliradians(tilt));
         let mut anchor = -1.0_f64;
         let mut worst = 0.0_f64;
         needle.go(16.0, speed, |out| {
