@@ -8,6 +8,7 @@ import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PatientEditor } from "./patient.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
+import { OwnForces } from "./own_forces.js";
 import { Scrub } from "./scrub.js";
 import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
@@ -58,6 +59,7 @@ const receive = {
   frame(message) {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
+    ownForces.follow(linkStatus.compensation);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
       jumps = linkStatus.replay.jumps;
@@ -107,6 +109,7 @@ const link = new Link((message) => receive[message.type]?.(message));
 const hand = new Hand(byId("section"), section, link);
 body.setHand(hand);
 const scrub = new Scrub(link);
+const ownForces = new OwnForces(link);
 const patient = new PatientEditor(link);
 
 /** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
@@ -123,6 +126,7 @@ let lastPanel = -Infinity;
 function draw(nowMs) {
   hand.tell();
   scrub.tell();
+  ownForces.tell();
   view.seconds = Math.min(0.1, (nowMs - lastDrawn) / 1000);
   lastDrawn = nowMs;
   view.hand = hand.depth;

@@ -142,7 +142,11 @@ impl Driver {
             Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
             Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
             Request::ReportDevice => self.waiting.push_back(Command::ReportDevice),
-            Request::Compensate(gains) => self.waiting.push_back(Command::Compensate(gains)),
+            Request::Compensate(gains) => {
+                // A slider that is dragged asks faster than a device answers: only its last place counts.
+                self.waiting.retain(|command| !matches!(command, Command::Compensate(_)));
+                self.waiting.push_back(Command::Compensate(gains));
+            }
             Request::Index(count) => self.waiting.push_back(Command::Index(Some(count))),
         }
     }

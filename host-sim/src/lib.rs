@@ -16,6 +16,7 @@ pub mod failure;
 pub mod force_fit;
 pub mod import;
 pub mod library;
+pub mod live_gains;
 pub mod pace;
 pub mod patients;
 pub mod plant;

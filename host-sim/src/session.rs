@@ -199,6 +199,8 @@ pub struct LinkStatus {
     pub notice: Option<String>,
     /// Where a recording that is played stands.
     pub replay: Option<ReplayStatus>,
+    /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
+    pub compensation: Option<f64>,
 }
 
 /// Where a recording that is played stands.
@@ -280,6 +282,11 @@ pub enum Control {
     },
     /// The needle goes into somebody else from now on; torque is off meanwhile.
     Patient(PatientWish),
+    /// So much of the device's compensation is in force from now on, torque on or off.
+    Compensate {
+        /// Share of the stored gains, 0 to 1.
+        share: f64,
+    },
     /// A recording goes on from here, or stays here where it is paused.
     Seek {
         /// Time into the recording, s.

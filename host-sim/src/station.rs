@@ -6,6 +6,7 @@ use crate::device::virtual_device::VirtualDevice;
 use crate::device::{Port, Wire};
 use crate::driver::{Driver, Request};
 use crate::failure::Failure;
+use crate::live_gains::LiveGains;
 use crate::pace::Pace;
 use crate::recording::messages::Hello;
 use crate::recording::write::Recorder;
@@ -35,13 +36,14 @@ pub struct Outlets {
     pub recorder: Option<Recorder>,
     /// The totals.
     pub tally: Tally,
+    gains: LiveGains,
     failure: Option<Failure>,
 }
 
 impl Outlets {
     /// Nothing has arrived yet.
     pub fn new(publisher: Publisher, recorder: Option<Recorder>, tally: Tally) -> Self {
-        Self { publisher, recorder, tally, failure: None }
+        Self { publisher, recorder, tally, gains: LiveGains::default(), failure: None }
     }
 
     fn frame(&mut self, frame: &DeviceFrame) {
@@ -80,7 +82,11 @@ impl Outlets {
                 self.publisher.timing(*timing);
                 Ok(())
             }
-            DeviceFrame::Ack(_) | DeviceFrame::Device(_) => Ok(()),
+            DeviceFrame::Device(device) => {
+                self.gains.learn(device);
+                Ok(())
+            }
+            DeviceFrame::Ack(_) => Ok(()),
         }
     }
 
@@ -101,6 +107,7 @@ impl Outlets {
                 recording,
                 notice,
                 replay: None,
+                compensation: self.gains.share(),
             };
         });
     }
@@ -116,6 +123,8 @@ pub struct Station<'a> {
     /// Set from outside (Ctrl-C) to end the run in good order.
     stop: &'a AtomicBool,
     was_ready: bool,
+    /// Whether this device, since it is connected, has been asked how it is configured.
+    has_asked: bool,
     /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
     person_starts: bool,
     /// The tip is at depth 0 when it is started for the first time.
@@ -142,6 +151,7 @@ impl<'a> Station<'a> {
             outlets,
             stop,
             was_ready: false,
+            has_asked: false,
             person_starts: false,
             zeroes_first: false,
             bedside: None,
@@ -296,9 +306,14 @@ impl<'a> Station<'a> {
     /// The person who started the program asked for a start: once, and not again after a stop or a reconnection.
     fn start_once(&mut self, now: Duration) {
         if !self.driver.is_ready(now) {
+            self.has_asked = false;
+            self.outlets.gains.forget();
             return;
         }
         self.was_ready = true;
+        if !std::mem::replace(&mut self.has_asked, true) {
+            self.driver.request(Request::ReportDevice);
+        }
         if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
             if std::mem::take(&mut self.zeroes_first) {
                 self.driver.request(Request::Zero);
@@ -316,6 +331,11 @@ impl<'a> Station<'a> {
             }
             Control::Zero => self.driver.request(Request::Zero),
             Control::Patient(wish) => self.wish_patient(&wish),
+            Control::Compensate { share } => {
+                if let Some(gains) = self.outlets.gains.at(share) {
+                    self.driver.request(Request::Compensate(gains));
+                }
+            }
             other => hand(other),
         }
     }

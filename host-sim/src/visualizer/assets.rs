@@ -42,6 +42,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/events.js", "events.js", SCRIPT),
     asset!("/hand.js", "hand.js", SCRIPT),
     asset!("/patient.js", "patient.js", SCRIPT),
+    asset!("/own_forces.js", "own_forces.js", SCRIPT),
     asset!("/scrub.js", "scrub.js", SCRIPT),
     asset!("/body.js", "body.js", SCRIPT),
     asset!("/bytes.js", "bytes.js", SCRIPT),

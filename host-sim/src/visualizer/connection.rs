@@ -104,6 +104,7 @@ fn carry_out(message: FromPage, shared: &Shared) {
         FromPage::Tilt { rad } => Control::Tilt { rad },
         FromPage::Choose { patient } => Control::Patient(PatientWish::Named(patient)),
         FromPage::Edit { profile } => Control::Patient(PatientWish::Edited(profile)),
+        FromPage::Compensate { share } => Control::Compensate { share },
         FromPage::Seek { at_s } => Control::Seek { at_s },
     };
     shared.session.control(control);

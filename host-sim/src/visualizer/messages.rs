@@ -191,6 +191,11 @@ pub enum FromPage {
         /// Key by key as in a profile's file.
         profile: serde_json::Value,
     },
+    /// So much of the device's compensation is to be in force.
+    Compensate {
+        /// Share of what the device has stored, 0 to 1.
+        share: f64,
+    },
     /// A recording is to go on from here.
     Seek {
         /// Time into the recording in s, 0 or more.
@@ -208,6 +213,9 @@ impl FromPage {
             }
             Self::Tilt { rad } if !(0.0..=std::f64::consts::FRAC_PI_2).contains(&rad) => {
                 Err(format!("tilt {rad} rad is not within 0 to pi/2"))
+            }
+            Self::Compensate { share } if !(0.0..=1.0).contains(&share) => {
+                Err(format!("share {share} is not within 0 to 1"))
             }
             Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
                 Err(format!("time {at_s} s is not within 0 to 1e9 s"))
@@ -237,6 +245,7 @@ mod tests {
             r#"{"do":"drag","depth_mm":null}"#,
             r#"{"do":"tilt","rad":2}"#,
             r#"{"do":"seek","at_s":-1}"#,
+            r#"{"do":"compensate","share":1.01}"#,
         ] {
             let error = FromPage::parse(bad).unwrap_err();
             assert!(!error.contains('\n'), "{error}");
