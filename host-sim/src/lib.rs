@@ -14,6 +14,7 @@ pub mod device;
 pub mod driver;
 pub mod failure;
 pub mod force_fit;
+pub mod guide;
 pub mod import;
 pub mod library;
 pub mod live_gains;

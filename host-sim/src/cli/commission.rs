@@ -1,11 +1,11 @@
 //! `host-sim commission`: how a device is wired and built, found out before anybody holds its needle.
 
-use super::confirm::{confirm, needle_is_out};
+use super::confirm::{Consent, ConsentFlags};
 use super::run::stop_on_signals;
 use clap::Args;
 use host_sim::characterise::mechanism::Wiring;
 use host_sim::characterise::{self, written};
-use host_sim::commission::bench::WireLine;
+use host_sim::commission::bench::{GuidedLine, Line, WireLine};
 use host_sim::commission::mechanism::VirtualLine;
 use host_sim::commission::{self, Outcome, Step, Wish};
 use host_sim::device::Port;
@@ -22,6 +22,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim commission
+  host-sim commission --device /dev/ttyACM0 --page
   host-sim commission --device /dev/ttyACM0 --pull-mm 200 --out device.toml"))]
 pub(crate) struct Commission {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
@@ -36,9 +37,8 @@ pub(crate) struct Commission {
     /// Counts a turn after quadrature, where the encoder's are known
     #[arg(long, value_name = "N")]
     counts_per_turn: Option<u16>,
-    /// Ask nothing: the needle is out
-    #[arg(long)]
-    yes: bool,
+    #[command(flatten)]
+    consent: ConsentFlags,
     /// Write the device's part to this file too
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
@@ -47,7 +47,16 @@ pub(crate) struct Commission {
 impl Commission {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let wish = self.wish()?;
-        let outcome = if self.device == "virtual" { self.on_virtual(&wish)? } else { self.on_port(&wish)? };
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+        let consent = self.consent.open("Commissioning", &self.device, &stop)?;
+        let outcome = if self.device == "virtual" {
+            self.on_virtual(&wish, &consent)
+        } else {
+            self.on_port(&wish, &consent, &stop)
+        };
+        consent.end(outcome.as_ref().map(Outcome::lines));
+        let outcome = outcome?;
         for line in outcome.lines() {
             say!("{line}");
         }
@@ -80,30 +89,21 @@ impl Commission {
         Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
     }
 
-    fn on_virtual(&self, wish: &Wish) -> Result<Outcome, Failure> {
+    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Outcome, Failure> {
         let scale = characterise::scale(&characterise::configuration())?;
         let rig = written::nominal_rig(&scale);
-        let mut line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
-        commission::commission(&mut line, wish, |step: Step| {
-            eprintln!("{step}");
-            Ok(())
-        })
+        let line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
+        on(line, wish, consent)
     }
 
-    fn on_port(&self, wish: &Wish) -> Result<Outcome, Failure> {
+    fn on_port(&self, wish: &Wish, consent: &Consent, stop: &AtomicBool) -> Result<Outcome, Failure> {
         let mut port = SerialPort::find(&self.device)?;
-        needle_is_out(self.yes)?;
-        let stop = Arc::new(AtomicBool::new(false));
-        stop_on_signals(&stop)?;
-        let wire = port.open().map_err(Failure::failed)?;
-        let mut line = WireLine::new(wire, &stop);
-        commission::commission(&mut line, wish, |step: Step| {
-            if step.moves() {
-                confirm(&step, self.yes)
-            } else {
-                eprintln!("{step}");
-                Ok(())
-            }
-        })
+        consent.needle_is_out()?;
+        on(WireLine::new(port.open().map_err(Failure::failed)?, stop), wish, consent)
     }
+}
+
+fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<Outcome, Failure> {
+    let mut line = GuidedLine { line, guide: consent.guide() };
+    commission::commission(&mut line, wish, |step: Step| consent.ask(&step, step.moves()))
 }

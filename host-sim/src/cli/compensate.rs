@@ -1,11 +1,11 @@
 //! `host-sim compensate`: what a diagnosis found, fed forward by the device.
 
-use super::confirm::{confirm, needle_is_out};
+use super::confirm::{Consent, ConsentFlags};
 use super::run::stop_on_signals;
 use clap::Args;
 use diagnosis::rig::Rig;
 use host_sim::characterise::{self, written};
-use host_sim::commission::bench::{Line, WireLine};
+use host_sim::commission::bench::{GuidedLine, Line, WireLine};
 use host_sim::commission::mechanism::VirtualLine;
 use host_sim::compensate::{self, Outcome, Step, page};
 use host_sim::device::Port;
@@ -24,7 +24,7 @@ use std::sync::atomic::AtomicBool;
 #[command(after_help = examples!("Examples:
   host-sim characterise --device /dev/ttyACM0 --out bench
   host-sim diagnose --rig bench/rig.toml --fit bench/fit.csv --fit bench/fit2.csv --holdout bench/holdout.csv --out report
-  host-sim compensate --report report --device /dev/ttyACM0 --out after
+  host-sim compensate --report report --device /dev/ttyACM0 --out after --page
   host-sim compensate --report report --device /dev/ttyACM0 --align"))]
 pub(crate) struct Compensate {
     /// The folder that `diagnose --out` wrote
@@ -42,9 +42,8 @@ pub(crate) struct Compensate {
     /// Only find the rotor's angle again, after a restart of a device that is compensated
     #[arg(long, conflicts_with_all = ["out", "gain"])]
     align: bool,
-    /// Ask nothing: the needle is out
-    #[arg(long)]
-    yes: bool,
+    #[command(flatten)]
+    consent: ConsentFlags,
     /// Folder for compensation.html and device.toml
     #[arg(long, value_name = "DIR", required_unless_present = "align")]
     out: Option<PathBuf>,
@@ -56,8 +55,20 @@ impl Compensate {
             return Err(Failure::input(format_args!("--gain is {}; it must lie from 0 to 1", self.gain)));
         }
         let rig = compensate::read_report(&self.report)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+        let consent = self.consent.open("Compensation", &self.device, &stop)?;
+        let outcome = self.on_device(&rig, &consent, &stop);
+        consent.end(outcome.as_ref().map(|lines| lines.to_vec()));
+        for line in outcome? {
+            say!("{line}");
+        }
+        Ok(())
+    }
+
+    fn on_device(&self, rig: &Rig, consent: &Consent, stop: &AtomicBool) -> Result<Vec<String>, Failure> {
         if self.device == "virtual" {
-            return self.on(&mut *self.virtual_line()?, &rig, true);
+            return self.on(self.virtual_line()?, rig, consent);
         }
         if self.plant.is_some() {
             return Err(Failure::input(
@@ -65,47 +76,45 @@ impl Compensate {
             ));
         }
         let mut port = SerialPort::find(&self.device)?;
-        needle_is_out(self.yes)?;
-        let stop = Arc::new(AtomicBool::new(false));
-        stop_on_signals(&stop)?;
-        let wire = port.open().map_err(Failure::failed)?;
-        self.on(&mut WireLine::new(wire, &stop), &rig, self.yes)
+        consent.needle_is_out()?;
+        self.on(WireLine::new(port.open().map_err(Failure::failed)?, stop), rig, consent)
     }
 
-    fn virtual_line(&self) -> Result<Box<dyn Line>, Failure> {
+    fn virtual_line(&self) -> Result<VirtualLine, Failure> {
         let scale = characterise::scale(&characterise::configuration())?;
         let (plant, file) = match &self.plant {
             Some(path) => (Rig::read(path).map_err(Failure::input)?, path.display().to_string()),
             None => (written::nominal_rig(&scale), "the nominal rig".to_owned()),
         };
-        Ok(Box::new(VirtualLine::commissioned(&plant, &file, scale.roller_radius_mm)?))
+        VirtualLine::commissioned(&plant, &file, scale.roller_radius_mm)
     }
 
-    fn on(&self, line: &mut dyn Line, rig: &Rig, yes: bool) -> Result<(), Failure> {
+    /// What came of it, a line each.
+    fn on(&self, line: impl Line, rig: &Rig, consent: &Consent) -> Result<Vec<String>, Failure> {
+        let mut line = GuidedLine { line, guide: consent.guide() };
         if self.align {
-            confirm(&Step::Before, yes)?;
-            let angle = compensate::align(line, rig)?;
-            say!("angle index_counts={} agreement={:.3}", angle.count, angle.agreement);
-            return Ok(());
+            consent.ask(&Step::Before, true)?;
+            let angle = compensate::align(&mut line, rig)?;
+            return Ok(vec![format!("angle index_counts={} agreement={:.3}", angle.count, angle.agreement)]);
         }
-        let outcome = compensate::compensate(line, rig, self.gain, |step| confirm(&step, yes))?;
-        self.write(&outcome)?;
-        for left_out in &outcome.left_out {
-            say!("{left_out}");
-        }
+        let outcome =
+            compensate::compensate(&mut line, rig, self.gain, |step| consent.ask(&step, step.moves()))?;
+        let mut lines = self.write(&outcome)?;
+        lines.extend(outcome.left_out.iter().cloned());
         let (before, after) = (&outcome.before, &outcome.after);
-        let line = |what: &str, before: f64, after: f64| {
-            say!("{what} before={:.1} after={:.1} mN rms", before * 1e3, after * 1e3);
+        let mut compare = |what: &str, before: f64, after: f64| {
+            lines.push(format!("{what} before={:.1} after={:.1} mN rms", before * 1e3, after * 1e3));
         };
-        line("insertion", before.insertion, after.insertion);
-        line("hold", before.hold, after.hold);
-        line("withdrawal", before.withdrawal, after.withdrawal);
-        line("all", before.all(), after.all());
-        Ok(())
+        compare("insertion", before.insertion, after.insertion);
+        compare("hold", before.hold, after.hold);
+        compare("withdrawal", before.withdrawal, after.withdrawal);
+        compare("all", before.all(), after.all());
+        Ok(lines)
     }
 
-    fn write(&self, outcome: &Outcome) -> Result<(), Failure> {
-        let Some(out) = &self.out else { return Ok(()) };
+    /// Writes the page and the device's part; the files' names.
+    fn write(&self, outcome: &Outcome) -> Result<Vec<String>, Failure> {
+        let Some(out) = &self.out else { return Ok(Vec::new()) };
         let refuse = |cause: std::io::Error| {
             Failure::input(format_args!(
                 "{}: cannot be written ({cause}); the device is compensated; choose another --out",
@@ -114,10 +123,12 @@ impl Compensate {
         };
         std::fs::create_dir_all(out).map_err(refuse)?;
         let device = part::to_toml(&self.device, &outcome.device)?;
+        let mut written = Vec::new();
         for (file, text) in [("compensation.html", page::html(outcome)), ("device.toml", device)] {
-            std::fs::write(out.join(file), text).map_err(refuse)?;
-            say!("{}", out.join(file).display());
+            let path = out.join(file);
+            std::fs::write(&path, text).map_err(refuse)?;
+            written.push(path.display().to_string());
         }
-        Ok(())
+        Ok(written)
     }
 }

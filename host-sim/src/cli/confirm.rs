@@ -1,11 +1,90 @@
-//! What a person has to agree to before a motor moves.
+//! What a person has to agree to before a motor moves: on the terminal, or in the page of a guide.
 
+use clap::Args;
 use host_sim::failure::Failure;
+use host_sim::guide::Guide;
+use host_sim::visualizer::{self, Server};
 use std::fmt::Display;
 use std::io::BufRead;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Where a person agrees.
+#[derive(Args)]
+pub(crate) struct ConsentFlags {
+    /// Ask nothing: the needle is out
+    #[arg(long)]
+    yes: bool,
+    /// Show the steps in a page and ask there
+    #[arg(long, conflicts_with = "yes")]
+    page: bool,
+    /// Port of the page on this computer; 0 takes any free one
+    #[arg(long, default_value_t = 8710, value_name = "N")]
+    port: u16,
+}
+
+impl ConsentFlags {
+    /// Opens the page where one was asked for; `title` is its heading, `stop` ends its waits.
+    pub(crate) fn open(&self, title: &str, device: &str, stop: &Arc<AtomicBool>) -> Result<Consent, Failure> {
+        let guide = if self.page {
+            let guide = Guide::new(title, device, stop.clone());
+            let server = visualizer::serve_guide(guide.watches(), guide.said(), self.port);
+            let server = server.map_err(Failure::failed)?;
+            say!("guide at {}", server.url());
+            Some((guide, server))
+        } else {
+            None
+        };
+        // Nobody stands beside a virtual device.
+        Ok(Consent { yes: self.yes || device == "virtual", guide })
+    }
+}
+
+/// A person who is asked.
+pub(crate) struct Consent {
+    yes: bool,
+    guide: Option<(Guide, Server)>,
+}
+
+impl Consent {
+    /// The guide, where there is one.
+    pub(crate) fn guide(&self) -> Option<Guide> {
+        self.guide.as_ref().map(|(guide, _)| guide.clone())
+    }
+
+    /// Says what comes next. Waits until a person agrees where the motor `moves`, and always in a page.
+    pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Failure> {
+        match &self.guide {
+            Some((guide, _)) => guide.ask(step, moves),
+            None if moves => confirm(step, self.yes),
+            None => {
+                eprintln!("{step}");
+                Ok(())
+            }
+        }
+    }
+
+    /// Shows in the page what came of it.
+    pub(crate) fn end(&self, outcome: Result<Vec<String>, &Failure>) {
+        if let Some((guide, _)) = &self.guide {
+            guide.end(outcome);
+        }
+    }
+
+    /// The motor will move by itself: asks that the needle is out.
+    pub(crate) fn needle_is_out(&self) -> Result<(), Failure> {
+        match &self.guide {
+            // Nothing moves before the next step.
+            Some((guide, _)) => guide.ask(&NEEDLE_OUT, false),
+            None => confirm(&NEEDLE_OUT, self.yes),
+        }
+    }
+}
+
+const NEEDLE_OUT: &str = "the roller will move by itself: take the needle out of the device, and keep hands off unless a step asks for them";
 
 /// Says `what` comes and waits for Enter; with `yes`, only says it.
-pub(crate) fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
+fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
     eprintln!("{what}");
     if yes {
         return Ok(());
@@ -18,7 +97,7 @@ pub(crate) fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
     }
 }
 
-/// The motor will move by itself: asks that the needle is out.
+/// The same as [`Consent::needle_is_out`] without a page.
 pub(crate) fn needle_is_out(yes: bool) -> Result<(), Failure> {
-    confirm(&"the roller will move by itself: take the needle out of the device, and keep hands off", yes)
+    confirm(&NEEDLE_OUT, yes)
 }

@@ -3,6 +3,7 @@
 use crate::device::Wire;
 use crate::driver::{Driver, Request};
 use crate::failure::Failure;
+use crate::guide::{Guide, Reading};
 use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::excitation::Excitation;
@@ -36,6 +37,34 @@ pub trait Line {
 
     /// What is asked of the hand. Where a person has the hand, a prompt has asked already.
     fn act(&mut self, act: Act);
+
+    /// The newest sample of what has come.
+    fn saw(&mut self, _newest: &Sample) {}
+}
+
+/// A line whose readings a guide shows.
+pub struct GuidedLine<L> {
+    /// The way to the device.
+    pub line: L,
+    /// What shows them, where there is one.
+    pub guide: Option<Guide>,
+}
+
+impl<L: Line> Line for GuidedLine<L> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+        self.line.exchange(out, into)
+    }
+
+    fn act(&mut self, act: Act) {
+        self.line.act(act);
+    }
+
+    fn saw(&mut self, newest: &Sample) {
+        if let Some(guide) = &self.guide {
+            let tilt_deg = (f64::from(newest.tilt_mrad) * 1e-3).to_degrees();
+            guide.read(Reading { counts: newest.count, tilt_deg });
+        }
+    }
 }
 
 /// A device behind a wire, in real time.
@@ -214,7 +243,10 @@ impl<'a> Bench<'a> {
         self.driver.receive(self.now, &self.bytes, |frame| frames.push(frame.clone()));
         for frame in frames {
             match frame {
-                DeviceFrame::Samples(block) => self.samples.extend(&block.samples),
+                DeviceFrame::Samples(block) => {
+                    self.samples.extend(&block.samples);
+                    block.samples.last().into_iter().for_each(|newest| self.line.saw(newest));
+                }
                 DeviceFrame::Device(device) => self.device = Some(device),
                 DeviceFrame::Event(event) => match event.kind {
                     EventKind::Fault { cause } => self.fault = Some(cause),

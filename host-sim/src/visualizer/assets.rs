@@ -24,12 +24,16 @@ macro_rules! asset {
 pub(super) const DEVICE_PAGE: Asset = asset!("/", "index.html", PAGE);
 /// The page of a class.
 pub(super) const CLASS_PAGE: Asset = asset!("/", "class.html", PAGE);
+/// The page of a guide.
+pub(super) const GUIDE_PAGE: Asset = asset!("/", "guide.html", PAGE);
 
 /// What the pages are made of.
 pub(super) const ASSETS: &[Asset] = &[
     asset!("/style.css", "style.css", "text/css; charset=utf-8"),
     asset!("/class.css", "class.css", "text/css; charset=utf-8"),
     asset!("/class.js", "class.js", SCRIPT),
+    asset!("/guide.css", "guide.css", "text/css; charset=utf-8"),
+    asset!("/guide.js", "guide.js", SCRIPT),
     asset!("/icon.svg", "icon.svg", "image/svg+xml"),
     asset!("/main.js", "main.js", SCRIPT),
     asset!("/link.js", "link.js", SCRIPT),

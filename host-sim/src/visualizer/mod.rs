@@ -1,7 +1,7 @@
 //! The page: serves it from the program itself, streams to it what the device does, and passes on what a person does.
 //!
 //! [`messages`] is what is said between server and page, [`condense`] turns 10 kHz into what a picture needs,
-//! `server` and `connection` carry it, `watched` carries a page that only looks (a class), `assets` holds the files of
+//! `server` and `connection` carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide), `assets` holds the files of
 //! `host-sim/page`.
 //!
 //! This module may not touch the device, the link or a recording: it knows a [`crate::session::Session`] and nothing
@@ -14,8 +14,8 @@ pub mod messages;
 mod server;
 mod watched;
 
-pub use server::{ServeError, Server, serve, serve_watched};
-pub use watched::{Watch, Watches};
+pub use server::{ServeError, Server, serve, serve_guide, serve_watched};
+pub use watched::{Said, Watch, Watches};
 
 #[cfg(test)]
 pub(crate) fn test_scene() -> crate::session::Scene {

@@ -1,8 +1,8 @@
 //! Serves the page on this computer only.
 
-use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE};
+use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
 use super::connection;
-use super::watched::{self, Watches};
+use super::watched::{self, Said, Watched, Watches};
 use crate::bounded_listener::BoundedListener;
 use crate::session::Session;
 use axum::Router;
@@ -111,7 +111,12 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
 
 /// Serves a page of a class, which only looks at what `watches` give, as [`serve`] does.
 pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> {
-    start(port, &CLASS_PAGE, get(watched::live).with_state(watches))
+    start(port, &CLASS_PAGE, get(watched::live).with_state(Watched { watches, said: None }))
+}
+
+/// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes, as [`serve`] does.
+pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
+    start(port, &GUIDE_PAGE, get(watched::live).with_state(Watched { watches, said: Some(said) }))
 }
 
 fn start(port: u16, page: &'static Asset, live: MethodRouter) -> Result<Server, ServeError> {

@@ -1,4 +1,4 @@
-//! A page that only looks: it is sent a text whenever there is one, and nothing that it says is listened to.
+//! A page that looks: it is sent a text whenever there is one. What it says goes to whoever listens, which is nobody for a class.
 
 use super::server::is_own_page;
 use axum::extract::ws::{Message, WebSocket};
@@ -14,33 +14,47 @@ pub type Watch = Box<dyn FnMut() -> Option<String> + Send>;
 /// A [`Watch`] for each page that comes.
 pub type Watches = Arc<dyn Fn() -> Watch + Send + Sync>;
 
+/// Takes what a page says; false where it is nonsense, which ends that page's connection.
+pub type Said = Arc<dyn Fn(&str) -> bool + Send + Sync>;
+
+/// What a page of this kind is joined to.
+#[derive(Clone)]
+pub(super) struct Watched {
+    pub(super) watches: Watches,
+    pub(super) said: Option<Said>,
+}
+
 /// Between two looks: ten a second are enough for an overview.
 const PERIOD: Duration = Duration::from_millis(100);
 /// A page that takes nothing for so long is gone.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Longest message that is read and thrown away, in bytes.
+/// Longest message that is read, in bytes.
 const LONGEST_MESSAGE: usize = 1_024;
 
 pub(super) async fn live(
-    State(watches): State<Watches>,
+    State(watched): State<Watched>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     if !is_own_page(&headers) {
-        return (StatusCode::FORBIDDEN, "only the page of this program may look").into_response();
+        return (StatusCode::FORBIDDEN, "only the page of this program may look and agree").into_response();
     }
     upgrade
         .max_message_size(LONGEST_MESSAGE)
         .max_frame_size(LONGEST_MESSAGE)
-        .on_upgrade(move |socket| tell(socket, watches()))
+        .on_upgrade(move |socket| tell(socket, (watched.watches)(), watched.said))
 }
 
-async fn tell(mut socket: WebSocket, mut watch: Watch) {
+async fn tell(mut socket: WebSocket, mut watch: Watch, listener: Option<Said>) {
     let mut due = interval(PERIOD);
     due.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tokio::select! {
             said = socket.recv() => match said {
+                Some(Ok(Message::Text(text))) => match &listener {
+                    Some(take) if !take(&text) => return,
+                    _ => continue,
+                },
                 Some(Ok(_)) => continue,
                 _ => return,
             },

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A start on a busy machine.
 const START: Duration = Duration::from_secs(60);
@@ -82,6 +82,22 @@ impl Program {
     pub fn port(&self) -> Result<u16, Failure> {
         let port = self.url.trim_end_matches('/').rsplit(':').next().and_then(|port| port.parse().ok());
         port.ok_or_else(|| format!("no port in {}", self.url))
+    }
+
+    /// Waits until it has ended by itself, without a failure.
+    pub fn ended(&mut self, limit: Duration) -> Result<(), Failure> {
+        let begin = Instant::now();
+        loop {
+            match self.process.try_wait() {
+                Ok(Some(status)) if status.success() => return Ok(()),
+                Ok(Some(status)) => return Err(format!("the program failed ({status})")),
+                Ok(None) if begin.elapsed() > limit => {
+                    return Err(format!("the program goes on after {} s", limit.as_secs()));
+                }
+                Ok(None) => std::thread::sleep(Duration::from_millis(20)),
+                Err(error) => return Err(format!("the program was lost: {error}")),
+            }
+        }
     }
 
     /// Ends it as a crash would.
