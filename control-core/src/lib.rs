@@ -18,6 +18,7 @@
 )]
 
 pub mod anatomy;
+pub mod ceilings;
 pub mod compensation;
 pub mod config;
 pub mod controller;

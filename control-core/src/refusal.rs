@@ -176,6 +176,10 @@ pub enum Field {
     FrictionGain,
     WeightGain,
     DriveGain,
+    SpeedCeiling,
+    EncoderSign,
+    MotorSign,
+    Converter,
 }
 
 impl fmt::Display for Refusal {

@@ -18,6 +18,7 @@
 
 use crate::TICK_HZ;
 use crate::event::Fault;
+use crate::units::MillimetresPerSecond;
 use fixed::types::{I2F30, I16F16};
 
 /// Ticks from one look to the next: 0.8 ms.
@@ -40,6 +41,17 @@ const COASTING_TURNS: u32 = 1;
 const DRIVEN_LOOKS: u32 = 2;
 /// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
 const LEAST_COUNTS: i32 = 5;
+
+/// A needle is too fast at this share of what an encoder that works may count in a tick: 0.4 m/s where that is 16 counts of
+/// 16 µm.
+const SLOWER: u32 = 6;
+
+/// The speed past which a needle is too fast that may move so many counts, each so many mm long, in a tick.
+pub(crate) fn fastest(mm_per_count: I2F30, max_counts_per_tick: u16) -> MillimetresPerSecond {
+    let per_tick_q30 = i64::from(mm_per_count.to_bits()) * i64::from(max_counts_per_tick);
+    let bits = (per_tick_q30 * i64::from(TICK_HZ / SLOWER)) >> 14;
+    MillimetresPerSecond(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+}
 
 /// Ready for the tick.
 #[derive(Clone, Copy, Debug)]
@@ -75,8 +87,7 @@ impl Bounds {
         Self {
             least: i32::try_from(counts(LEAST)).unwrap_or(i32::MAX).max(LEAST_COUNTS),
             per_mnm_q8: (per_mnm_q8(PER_NEWTON.0), per_mnm_q8(PER_NEWTON.1)),
-            // A sixth of what an encoder that works may count in a tick: 0.4 m/s where it is 16 counts of 16 µm.
-            fastest: u32::from(max_counts_per_tick) * (SPAN as u32) / 6,
+            fastest: u32::from(max_counts_per_tick) * (SPAN as u32) / SLOWER,
         }
     }
 

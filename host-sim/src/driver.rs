@@ -35,6 +35,8 @@ pub enum Request {
     Patient(Box<Patient>),
     /// Another device's part.
     Device(Box<Device>),
+    /// What the device is configured with was found by commissioning it.
+    Commission,
     /// Which device's part is in force.
     ReportDevice,
     /// Other gains of the compensation.
@@ -47,7 +49,7 @@ pub enum Request {
 pub struct Driver {
     patient: Patient,
     /// Sent too, where it is not the one that the device has.
-    device: Option<Device>,
+    device: Option<Command>,
     reception: Reception,
     commands: Commands,
     open: bool,
@@ -95,9 +97,10 @@ impl Driver {
         }
     }
 
-    /// Configures the device's own part as well; without it, that stays as commissioning found it.
-    pub fn with_device(self, device: Device) -> Self {
-        Self { device: Some(device), ..self }
+    /// Gives the device its own part as well; without it, that stays as commissioning found it.
+    /// `part` is the command that does it.
+    pub fn with_device(self, part: Command) -> Self {
+        Self { device: Some(part), ..self }
     }
 
     /// A connection is open: hello, torque off, configuration.
@@ -123,6 +126,7 @@ impl Driver {
                         c,
                         Command::Hello { .. }
                             | Command::ConfigureDevice(_)
+                            | Command::RestoreDevice(_)
                             | Command::ConfigurePatient(_)
                             | Command::Stop
                     )
@@ -141,6 +145,7 @@ impl Driver {
             Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
             Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
             Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
+            Request::Commission => self.waiting.push_back(Command::Commission),
             Request::ReportDevice => self.waiting.push_back(Command::ReportDevice),
             Request::Compensate(gains) => {
                 // A slider that is dragged asks faster than a device answers: only its last place counts.
@@ -231,7 +236,7 @@ impl Driver {
         self.waiting.clear();
         self.waiting.push_back(Command::Hello { version: PROTOCOL_VERSION });
         self.waiting.push_back(Command::Stop);
-        self.waiting.extend(self.device.map(Command::ConfigureDevice));
+        self.waiting.extend(self.device.clone());
         self.waiting.push_back(Command::ConfigurePatient(self.patient.clone()));
     }
 
@@ -275,11 +280,22 @@ impl Driver {
             (Ok(()), _) => {}
             // The same bytes again, soon.
             (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
-            (Err(Rejection::Powered), Command::ConfigureDevice(_) | Command::ConfigurePatient(_)) => {
+            (
+                Err(Rejection::Powered),
+                Command::ConfigureDevice(_) | Command::RestoreDevice(_) | Command::ConfigurePatient(_),
+            ) => {
                 self.waiting.push_front(pending.command);
                 self.waiting.push_front(Command::Stop);
             }
-            (Err(why @ (Rejection::Config(_) | Rejection::Version)), _) => {
+            (
+                Err(
+                    why @ (Rejection::Config(_)
+                    | Rejection::Version
+                    | Rejection::Commissioned(_)
+                    | Rejection::NotShown),
+                ),
+                _,
+            ) => {
                 self.waiting.clear();
                 self.refused = Some(format!("the device refused: {why}"));
                 self.notice = self.refused.clone();

@@ -82,8 +82,8 @@ impl Outlets {
                 self.publisher.timing(*timing);
                 Ok(())
             }
-            DeviceFrame::Device(device) => {
-                self.gains.learn(device);
+            DeviceFrame::Device(record) => {
+                self.gains.learn(&record.device);
                 Ok(())
             }
             DeviceFrame::Ack(_) => Ok(()),

@@ -34,8 +34,8 @@ fn commission_on(
 fn commissioned(wiring: Wiring) -> Outcome {
     let (outcome, _, in_force) = commission_on(&rig(), wiring, (0.1, 1.0));
     let outcome = outcome.expect("it passes");
-    assert_eq!(outcome.device, in_force, "the device has what was found");
-    assert!(outcome.device.commissioned);
+    assert_eq!(outcome.record.device, in_force, "the device has what was found");
+    assert!(outcome.record.device.commissioned);
     outcome
 }
 
@@ -51,7 +51,7 @@ fn a_device_that_is_right_is_measured() {
     let rig = rig();
     let found = commissioned(Wiring::default());
     assert!(!found.channels_swapped && !found.leads_reversed);
-    let device = &found.device;
+    let device = &found.record.device;
     assert_eq!((device.counts_per_turn, device.dac_zero), (4_000, 0));
     assert!((found.radius_mm / RADIUS_MM - 1.0).abs() < 0.005, "{} mm", found.radius_mm);
     assert!((device.skin_tilt.0 - 100).abs() <= 1, "{} mrad", device.skin_tilt.0);
@@ -70,7 +70,7 @@ fn each_wrong_wire_is_named_and_put_right() {
         let found = commissioned(Wiring { leads_reversed, channels_swapped, ..Wiring::default() });
         assert_eq!((found.leads_reversed, found.channels_swapped), (leads_reversed, channels_swapped));
         assert_eq!(
-            (found.device.motor_reversed, found.device.encoder_reversed),
+            (found.record.device.motor_reversed, found.record.device.encoder_reversed),
             (leads_reversed, channels_swapped)
         );
         let lines = found.lines().join("\n");
@@ -112,7 +112,7 @@ fn the_converters_zero_is_found_whichever_way_the_leads_are() {
         rig.model.offset = Some(0.3e-3);
         let wiring = Wiring { leads_reversed, ..Wiring::default() };
         let (outcome, ..) = commission_on(&rig, wiring, (0.0, 1.0));
-        let zero = outcome.expect("it passes").device.dac_zero;
+        let zero = outcome.expect("it passes").record.device.dac_zero;
         let codes = 0.3 / 28.8 * 2_047.0 * if leads_reversed { 1.0 } else { -1.0 };
         assert!((f64::from(zero) - codes).abs() < 3.0, "{zero} codes for {codes}");
     }
@@ -133,5 +133,5 @@ fn what_is_written_is_read_again() {
     let text = found.to_toml("bench 3").expect("it can be written");
     let source = host_sim::library::Text { origin: "device.toml".into(), text };
     let part = host_sim::device::part::DevicePart::parse(source).expect("it is sound");
-    assert_eq!(part.device, found.device);
+    assert_eq!(part.device, found.record.device);
 }

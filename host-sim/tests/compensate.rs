@@ -42,10 +42,10 @@ fn what_the_diagnosis_found_is_felt_by_a_quarter_only() {
         assert!(after <= before, "tenth {tenth}: {after} N after {before} N");
     }
     // The device has it, and a file keeps it to the last place.
-    assert_eq!(line.device().plan().device(), &outcome.device);
-    let text = part::to_toml("mine", &outcome.device).expect("it can be written");
+    assert_eq!(line.device().plan().device(), &outcome.record.device);
+    let text = part::to_toml("mine", &outcome.record).expect("it can be written");
     let read = DevicePart::parse(Text { origin: "device.toml".into(), text }).expect("sound");
-    assert_eq!(read.device, outcome.device);
+    assert_eq!(read.device, outcome.record.device);
     let html = page::html(&outcome);
     assert!(html.contains("7 times a turn") && !html.contains("http"), "{html}");
 }

@@ -26,7 +26,15 @@ fn every_fault_rejection_and_failure_to_save_stands_in_the_glossary_word_for_wor
         let wanted = format!("| {fault} |");
         assert!(faults.iter().any(|row| row.contains(&wanted)), "{fault:?}: {wanted}");
     }
-    let own = [Rejection::Powered, Rejection::Version, Rejection::Full, Rejection::NoSession];
+    let own = [
+        Rejection::Powered,
+        Rejection::Version,
+        Rejection::Full,
+        Rejection::NoSession,
+        // Any field.
+        Rejection::Commissioned(Field::TorqueLimit),
+        Rejection::NotShown,
+    ];
     let interlocked = Interlock::ALL.map(Rejection::Interlocked);
     let kept = [SaveFailure::Flash, SaveFailure::Full, SaveFailure::TooLong];
     let sentences = own.iter().chain(&interlocked).map(ToString::to_string);

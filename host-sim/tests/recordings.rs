@@ -29,7 +29,8 @@ fn setup() -> Setup {
 
 fn hello() -> Hello {
     let profile = Profile::find("adult").expect("it is built in");
-    Endpoint::new(Identity { serial: [7; 12], firmware: [1, 2, 3] }, &profile.plan, None).hello()
+    Endpoint::new(Identity { serial: [7; 12], firmware: [1, 2, 3], ..Identity::VIRTUAL }, &profile.plan, None)
+        .hello()
 }
 
 fn minute_of_blocks(

@@ -5,6 +5,7 @@ use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;
 use control_core::{Controller, TickInput};
 use link::codec::{self, MAX_FRAME};
+use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{Command, HostFrame, PROTOCOL_VERSION};
 use link::host::Reception;
@@ -16,8 +17,7 @@ fn main() {
     let mut random = fastrand::Rng::with_seed(seed);
     let end = Instant::now() + Duration::from_secs(seconds);
     let plan = Config::default().plan().expect("the default is sound");
-    let identity = Identity { serial: [0; 12], firmware: [0; 3] };
-    let mut device = Endpoint::new(identity, &plan, None).knowing_depth();
+    let mut device = Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth();
     let mut controller = Controller::new(plan);
     let mut reception = Reception::default();
     let (mut rounds, mut tick, mut id) = (0_u64, 0_u64, 0_u32);
@@ -61,13 +61,15 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 }
 
 fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
-    let command = match random.u8(0..11) {
+    let command = match random.u8(0..13) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
         7 => Command::ReportDevice,
         8 => Command::Compensate(Gains { angle: Gain(random.u8(..)), ..Gains::OFF }),
         9 => Command::Index(Some(random.i32(..))),
+        10 => Command::RestoreDevice(Record::of(&config(random).device, [0; 12])),
+        11 => Command::Commission,
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::Zero,

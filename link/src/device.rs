@@ -1,11 +1,15 @@
 //! The device's end: commands in, orders for the control law out; ticks in, frames out. The board and the virtual device
 //! share it. It never waits: what the PC does not take in time is dropped, oldest block first, and counted.
 
+mod waiting;
+
 use crate::codec::{self, Decoder, MAX_FRAME};
+use crate::commissioning::{Proof, Record, may_become};
 use crate::frames::{
     Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
     PROTOCOL_VERSION, Pose, Rejection, SampleBlock, SaveFailure, Timing,
 };
+use control_core::ceilings::Ceilings;
 use control_core::compensation::check::check;
 use control_core::config::{Device, Tissue};
 use control_core::event::{Fault, Limits};
@@ -13,13 +17,9 @@ use control_core::interlock::{Interlock, Interlocks};
 use control_core::units::Counts;
 use control_core::{Order, Patient, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
-use heapless::{Deque, HistoryBuf};
+use heapless::HistoryBuf;
+pub use waiting::Waiting;
 
-/// Blocks that wait for the PC: 77 ms of samples.
-const WAITING_BLOCKS: usize = 24;
-const WAITING_EVENTS: usize = 32;
-const WAITING_ACKS: usize = 16;
-const WAITING_ORDERS: usize = 4;
 /// Commands whose answer is remembered.
 const REMEMBERED: usize = 16;
 /// Ticks from one pose to the next.
@@ -34,27 +34,13 @@ pub struct Identity {
     pub serial: [u8; 12],
     /// Version of the firmware.
     pub firmware: [u8; 3],
+    /// What the firmware lets no command raise.
+    pub ceilings: Ceilings,
 }
 
-/// What waits for the PC or for the control law. It is large, and may stand where it is at home from the start.
-pub struct Waiting {
-    acks: Deque<Ack, WAITING_ACKS>,
-    events: Deque<Event, WAITING_EVENTS>,
-    blocks: Deque<SampleBlock, WAITING_BLOCKS>,
-    orders: Deque<Order, WAITING_ORDERS>,
-}
-
-impl Default for Waiting {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Waiting {
-    /// Nothing waits.
-    pub const fn new() -> Self {
-        Self { acks: Deque::new(), events: Deque::new(), blocks: Deque::new(), orders: Deque::new() }
-    }
+impl Identity {
+    /// Of every virtual device.
+    pub const VIRTUAL: Self = Self { serial: [0; 12], firmware: [0, 1, 0], ceilings: Ceilings::VIRTUAL };
 }
 
 /// The device's end of the link.
@@ -69,6 +55,7 @@ pub struct Endpoint<W = Waiting> {
     start_ordered: bool,
     /// Somebody has said where depth 0 is.
     zeroed: bool,
+    proof: Proof,
     interlocks: Interlocks,
     limits: Limits,
     fault: Option<Fault>,
@@ -101,6 +88,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             powered: false,
             start_ordered: false,
             zeroed: false,
+            proof: Proof::None,
             interlocks: Interlocks::default(),
             limits: Limits::default(),
             fault: reset_cause,
@@ -139,6 +127,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     pub fn disconnect(&mut self) {
         self.in_session = false;
         self.start_ordered = false;
+        self.proof.interrupt();
         self.waiting.borrow_mut().orders.clear();
         self.decoder = Decoder::default();
         self.forget_waiting();
@@ -162,6 +151,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     /// Takes what a tick gave. `tick` counts from power-on without a gap.
     pub fn record(&mut self, tick: u64, output: &TickOutput) {
         self.note_events(tick, output);
+        self.proof.see(&output.sample, self.plan.device().dac.mid_scale(), output.tripped.is_some());
         if !self.in_session {
             return;
         }
@@ -227,7 +217,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return None;
         }
         if core::mem::take(&mut self.device_due) {
-            return Some(DeviceFrame::Device(*self.plan.device()));
+            let record = Record::of(self.plan.device(), self.identity.serial);
+            return Some(DeviceFrame::Device(record));
         }
         if let Some(event) = self.waiting.borrow_mut().events.pop_front() {
             return Some(DeviceFrame::Event(event));
@@ -292,6 +283,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Heartbeat => self.order(Order::Heartbeat),
             Command::Stop => {
                 self.start_ordered = false;
+                self.proof.interrupt();
                 // A stop must not wait behind other orders.
                 self.waiting.borrow_mut().orders.clear();
                 self.order(Order::Stop)
@@ -309,6 +301,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             }
             Command::ConfigurePatient(_)
             | Command::ConfigureDevice(_)
+            | Command::RestoreDevice(_)
+            | Command::Commission
             | Command::Zero
             | Command::Excite(_)
             | Command::Index(_)
@@ -324,10 +318,12 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Excite(excitation) => {
                 excitation.check(&self.plan).map_err(Rejection::Config)?;
                 self.may_give_torque()?;
-                if !excitation.is_gentle() {
+                let is_gentle = excitation.is_gentle();
+                if !is_gentle {
                     self.is_commissioned()?;
                 }
                 self.order(Order::Excite(excitation))?;
+                self.proof = if is_gentle { Proof::Ordered } else { Proof::None };
                 self.start_ordered = true;
                 self.fault = None;
                 Ok(())
@@ -336,17 +332,21 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.configure(Plan::new(self.plan.device(), &patient).map_err(Rejection::Config)?)
             }
             Command::ConfigureDevice(device) => {
-                // A patient for another device leaves; what is wrong with the device itself is wrong without a patient too.
-                let plan = Plan::new(&device, self.plan.patient())
-                    .or_else(|_| Plan::new(&device, &Patient::nobody()))
-                    .map_err(Rejection::Config)?;
-                let counts =
-                    |device: &Device| (device.encoder_reversed, device.counts_per_turn, device.roller_radius);
-                // Otherwise the same counts are another depth.
-                let are_the_same = counts(&device) == counts(self.plan.device());
-                self.configure(plan)?;
-                self.zeroed &= are_the_same;
-                Ok(())
+                may_become(self.plan.device(), &device)?;
+                self.configure_device(&device)
+            }
+            Command::RestoreDevice(record) => {
+                if !record.is_of(self.identity.serial) {
+                    may_become(self.plan.device(), &record.device)?;
+                }
+                self.configure_device(&record.device)
+            }
+            Command::Commission => {
+                let device = Device { commissioned: true, ..*self.plan.device() };
+                if !self.proof.is_shown() {
+                    may_become(self.plan.device(), &device)?;
+                }
+                self.configure_device(&device)
             }
             Command::ReportDevice => {
                 self.device_due = true;
@@ -371,6 +371,22 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return Err(Rejection::NoSession);
         }
         self.interlocks.first().map_or(Ok(()), |interlock| Err(Rejection::Interlocked(interlock)))
+    }
+
+    /// A patient for another device leaves; what is wrong with the device itself is wrong without a patient too.
+    fn configure_device(&mut self, device: &Device) -> Result<(), Rejection> {
+        self.identity.ceilings.check(device).map_err(Rejection::Config)?;
+        let plan = Plan::new(device, self.plan.patient())
+            .or_else(|_| Plan::new(device, &Patient::nobody()))
+            .map_err(Rejection::Config)?;
+        let before = *self.plan.device();
+        self.configure(plan)?;
+        self.proof.keep(&before, device);
+        let counts =
+            |device: &Device| (device.encoder_reversed, device.counts_per_turn, device.roller_radius);
+        // Otherwise the same counts are another depth.
+        self.zeroed &= counts(&before) == counts(device);
+        Ok(())
     }
 
     fn configure(&mut self, plan: Plan) -> Result<(), Rejection> {

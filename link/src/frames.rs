@@ -1,19 +1,20 @@
 //! What is said. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
+use crate::commissioning::Record;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
-use control_core::plan::Refusal;
+use control_core::plan::{Field, Refusal};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
 use fixed::types::I2F30;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 4;
+pub const PROTOCOL_VERSION: u16 = 5;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -32,10 +33,6 @@ pub struct Numbered {
 
 /// Device to PC.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nothing allocates here, and blocks of samples are most frames"
-)]
 pub enum DeviceFrame {
     /// Who speaks and in which scale; the answer to a hello and to a new configuration.
     Hello(Hello),
@@ -50,7 +47,7 @@ pub enum DeviceFrame {
     /// The answer to a command.
     Ack(Ack),
     /// The device's part of the configuration in force; the answer to [`Command::ReportDevice`].
-    Device(Device),
+    Device(Record),
 }
 
 /// Who speaks and in which scale.
@@ -246,6 +243,10 @@ pub enum Rejection {
     NoSession,
     /// Something keeps the device from being started.
     Interlocked(Interlock),
+    /// What commissioning found of this device, or a ceiling that it has, would be another one or higher.
+    Commissioned(Field),
+    /// The device has not seen by pulses of its own that its motor and its encoder go together.
+    NotShown,
 }
 
 impl core::fmt::Display for Rejection {
@@ -259,6 +260,13 @@ impl core::fmt::Display for Rejection {
             Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
             Rejection::NoSession => f.write_str("nobody has said hello to the device; connect to it first"),
             Rejection::Interlocked(interlock) => interlock.fmt(f),
+            Rejection::Commissioned(field) => write!(
+                f,
+                "{field:?} of a device that has been commissioned is neither changed nor raised; run host-sim commission with it again, or give back the file that it wrote, unchanged"
+            ),
+            Rejection::NotShown => f.write_str(
+                "this is not what this device was commissioned with, and its own pulses have not shown that its motor and its encoder go together; run host-sim commission with it",
+            ),
         }
     }
 }
@@ -294,8 +302,9 @@ pub enum Command {
     Heartbeat,
     /// Play an excitation, with nobody's hand on the needle; only while torque is off.
     Excite(Excitation),
-    /// How the device is built, as commissioning found it; taken whole or refused with the reason, and only while torque is
-    /// off. A patient whom it does not suit leaves: until another is sent there is nobody, and no force.
+    /// The device's part of the configuration; taken whole or refused with the reason, and only while torque is off. One that
+    /// calls itself commissioned is taken by a device that is, where it exchanges nothing that commissioning found and raises
+    /// no ceiling. A patient whom it does not suit leaves: until another is sent there is nobody, and no force.
     ConfigureDevice(Device),
     /// Tell the device's part of the configuration.
     ReportDevice,
@@ -305,4 +314,9 @@ pub enum Command {
     /// The rotor's angle is nought at this many counts past the zero, until the device is restarted; `None`: it is not known.
     /// Only while torque is off.
     Index(Option<i32>),
+    /// [`Command::ConfigureDevice`] with what this device has told of itself before: taken as it is where the seal is its own.
+    RestoreDevice(Record),
+    /// What the device is configured with was found by commissioning it: taken where its own pulses have shown that the motor
+    /// and the encoder go together, and only while torque is off. Nothing else commissions a device.
+    Commission,
 }

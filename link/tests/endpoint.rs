@@ -9,6 +9,7 @@ use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milli
 use control_core::{Controller, Order, Patient, Plan, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
 use link::codec::{self, MAX_FRAME, TooLong};
+use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{
     Command, DeviceFrame, EventKind, Numbered, PROTOCOL_VERSION, Rejection, SampleBlock, Timing,
@@ -26,9 +27,8 @@ struct Device {
 impl Device {
     fn new() -> Self {
         let plan = Config::default().plan().expect("the default is sound");
-        let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
-            endpoint: Endpoint::new(identity, &plan, None).knowing_depth(),
+            endpoint: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             commands: Commands::default(),
             reception: Reception::default(),
@@ -111,7 +111,7 @@ fn another_version_is_turned_away() {
 fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
     let mut device = Device::in_session();
     let plan = Plan::new(&config::Device::unknown(), &Patient::default()).expect("as sound as the default");
-    device.endpoint = Endpoint::new(Identity { serial: [0; 12], firmware: [0, 1, 0] }, &plan, None);
+    device.endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
     assert_eq!(device.answer(Command::Hello { version: PROTOCOL_VERSION }), Ok(()));
     let interlocked = |interlock| Err(Rejection::Interlocked(interlock));
     assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotCommissioned));
@@ -141,7 +141,8 @@ fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
         assert_eq!(device.answer(command), if is_taken { Ok(()) } else { refused });
     }
     device.answer(Command::Stop).expect("a stop is always taken");
-    assert_eq!(device.answer(Command::ConfigureDevice(config::Device::default())), Ok(()));
+    let record = Record::of(&config::Device::default(), [0; 12]);
+    assert_eq!(device.answer(Command::RestoreDevice(record)), Ok(()));
     while device.endpoint.next_order().is_some() {}
     assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotZeroed));
     assert_eq!(device.answer(Command::Zero), Ok(()));

@@ -5,6 +5,7 @@ use control_core::controller::Sample;
 use control_core::event::Fault;
 use control_core::{Controller, Device, Order, Patient, TickInput};
 use link::codec::{self, Decoder, Garbage, MAX_FRAME};
+use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{
     BLOCK_SAMPLES, Command, DeviceFrame, EventKind, HostFrame, Numbered, PROTOCOL_VERSION, Rejection,
@@ -114,9 +115,8 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let plan = Config::default().plan().expect("the default is sound");
-        let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
-            device: Endpoint::new(identity, &plan, None).knowing_depth(),
+            device: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             commands: Commands::default(),
             reception: Reception::default(),
@@ -252,7 +252,7 @@ fn a_patient_leaves_the_device_alone_and_a_device_that_does_not_suit_one_sends_o
     };
     let hash = |device: Device, patient: Patient| codec::hash(&Config { device, patient });
     let mut device = Device { motor_reversed: true, dac_zero: 3, ..Device::default() };
-    let told = hello(&ask(&mut bench, Command::ConfigureDevice(device)));
+    let told = hello(&ask(&mut bench, Command::RestoreDevice(Record::of(&device, [0; 12]))));
     assert_eq!(told.config_hash, hash(device, Patient::default()), "the patient stays");
     assert_eq!(told.device_hash, codec::hash(&device));
 
@@ -261,10 +261,10 @@ fn a_patient_leaves_the_device_alone_and_a_device_that_does_not_suit_one_sends_o
     let told = hello(&ask(&mut bench, Command::ConfigurePatient(patient.clone())));
     assert_eq!(told.config_hash, hash(device, patient.clone()), "the device stays");
     let reported = ask(&mut bench, Command::ReportDevice);
-    assert!(reported.contains(&DeviceFrame::Device(device)), "{reported:?}");
+    assert!(reported.contains(&DeviceFrame::Device(Record::of(&device, [0; 12]))), "{reported:?}");
 
     // Refused whole: neither part changes.
-    let refused = Device { counts_per_turn: 3, ..device };
+    let refused = Device { counts_per_turn: 3, commissioned: false, ..device };
     assert!(matches!(bench.send(Command::ConfigureDevice(refused)), Err(Rejection::Config(_))));
     assert_eq!(bench.device.hello().config_hash, hash(device, patient));
     // A ceiling of 0.2 N bears no adult.

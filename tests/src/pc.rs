@@ -10,6 +10,7 @@ use control_core::config::Device;
 use control_core::controller::Sample;
 use control_core::interlock::Interlock;
 use link::codec::MAX_FRAME;
+use link::commissioning::Record;
 use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
 use link::host::{Commands, Counts, Reception};
 use link::{Command, DeviceFrame};
@@ -31,7 +32,7 @@ pub struct Heard {
     /// The latest hello.
     pub hello: Option<Hello>,
     /// The device's part of the configuration, where it was asked for.
-    pub device: Option<Device>,
+    pub record: Option<Record>,
     /// Every sample, with its tick.
     pub samples: Vec<(u64, Sample)>,
     /// Every event.
@@ -75,14 +76,7 @@ impl Pc {
     ///
     /// When the port does not come, or nobody answers.
     pub fn connect(&mut self, board: &mut Board) {
-        board.at_stop(|stopped| stopped.usb().host.plug());
-        let settled = |port: Port| matches!(port, Port::Configured | Port::Failed(_));
-        board.run_while_not(PORT_MS, 1_000, move |stopped| settled(stopped.usb().host.port()));
-        let port = board.at_stop(|stopped| {
-            stopped.usb().host.open();
-            stopped.usb().host.port()
-        });
-        assert_eq!(port, Port::Configured, "the serial port");
+        open_port(board);
         self.hello(board);
     }
 
@@ -172,8 +166,19 @@ impl Pc {
     ///
     /// When it refuses or does not answer.
     pub fn configure(&mut self, board: &mut Board, config: &Config) {
-        self.must(board, Command::ConfigureDevice(config.device));
+        self.must(board, self.record_of(config.device));
         self.must(board, Command::ConfigurePatient(config.patient.clone()));
+    }
+
+    /// The command that gives the device at the other end its own record back, were it one of `device`.
+    ///
+    /// # Panics
+    ///
+    /// Before the hello.
+    #[must_use]
+    pub fn record_of(&self, device: Device) -> Command {
+        let hello = self.heard.hello.as_ref().expect("the device has said hello");
+        Command::RestoreDevice(Record::of(&device, hello.identity))
     }
 
     /// Lets `milliseconds` pass, with the heartbeat going.
@@ -208,7 +213,7 @@ impl Pc {
         let heard = &mut self.heard;
         match frame {
             DeviceFrame::Hello(hello) => heard.hello = Some(hello),
-            DeviceFrame::Device(device) => heard.device = Some(device),
+            DeviceFrame::Device(record) => heard.record = Some(record),
             DeviceFrame::Samples(block) => {
                 if self.keep_samples {
                     heard.samples.extend((block.first_tick..).zip(block.samples));
@@ -234,4 +239,20 @@ impl Pc {
     pub fn heard_event(&self, wanted: impl Fn(&EventKind) -> bool) -> bool {
         self.heard.events.iter().any(|event| wanted(&event.kind))
     }
+}
+
+/// Plugs the cable in, waits for the port and opens it.
+///
+/// # Panics
+///
+/// When the port does not come.
+pub fn open_port(board: &mut Board) {
+    board.at_stop(|stopped| stopped.usb().host.plug());
+    let settled = |port: Port| matches!(port, Port::Configured | Port::Failed(_));
+    board.run_while_not(PORT_MS, 1_000, move |stopped| settled(stopped.usb().host.port()));
+    let port = board.at_stop(|stopped| {
+        stopped.usb().host.open();
+        stopped.usb().host.port()
+    });
+    assert_eq!(port, Port::Configured, "the serial port");
 }

@@ -1,17 +1,26 @@
 //! A board that nobody has commissioned gives no torque but two millinewton metres, and says why; one that has been switched
-//! on does not start before it knows its depth.
+//! on does not start before it knows its depth. `host-sim commission` on the flash image; no command does it instead.
+
+use std::f64::consts::TAU;
+use std::time::Duration;
 
 use control_core::Device;
+use control_core::config::SafetyConfig;
 use control_core::event::State;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::interlock::Interlock;
+use control_core::plan::Field;
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use fixed::types::I16F16;
+use host_sim::commission::bench::{Act, Line};
+use host_sim::commission::{Outcome, Wish, commission};
+use host_sim::failure::Failure;
 use link::Command;
 use link::frames::Rejection;
-use tests::board::{Wiring, plant};
+use tests::board::wires::{Wire, Wires};
+use tests::board::{Board, Wiring, plant};
 use tests::needle::Needle;
-use tests::pc::Pc;
+use tests::pc::{Pc, open_port};
 use tests::rig::ZERO_TORQUE;
 use tests::scenario::{board, board_wired};
 
@@ -41,6 +50,12 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     assert_eq!(pc.must_not(&mut board, ramps(strong, 0.0)), NOT_COMMISSIONED);
     assert_eq!(pc.must_not(&mut board, ramps(GENTLE_TORQUE, 0.1)), NOT_COMMISSIONED, "a servo");
 
+    assert_eq!(
+        pc.must_not(&mut board, Command::Commission),
+        Rejection::NotShown,
+        "it has not seen itself move"
+    );
+
     board.at_stop(|stopped| stopped.log().written.clear());
     pc.must(&mut board, ramps(GENTLE_TORQUE, 0.0));
     pc.run_ms(&mut board, 600);
@@ -55,8 +70,14 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     assert!(furthest.is_some_and(|codes| (100..=143).contains(&codes)), "{furthest:?} codes");
 
     let turned = Device { encoder_reversed: true, ..Device::default() };
-    pc.must(&mut board, Command::ConfigureDevice(turned));
-    pc.must(&mut board, Command::ConfigureDevice(Device::default()));
+    for device in [turned, Device::default()] {
+        let refused = pc.must_not(&mut board, Command::ConfigureDevice(device));
+        assert_eq!(refused, Rejection::NotShown, "a command does not commission it");
+    }
+    let record = pc.record_of(turned);
+    pc.must(&mut board, record);
+    let record = pc.record_of(Device::default());
+    pc.must(&mut board, record);
     assert_eq!(
         pc.must_not(&mut board, Command::Start),
         Rejection::Interlocked(Interlock::NotZeroed),
@@ -96,4 +117,172 @@ fn a_zero_outlives_a_cable_that_is_pulled() {
     board.run_ms(50);
     pc.connect(&mut board);
     assert_eq!(pc.command(&mut board, Command::Start).result, Ok(()));
+}
+
+/// The board was built for so much, whatever a record says; and what has been commissioned is lowered, not raised.
+#[test]
+fn no_command_raises_a_ceiling() {
+    let mut board = board(plant::held());
+    let mut pc = Pc::new();
+    pc.connect(&mut board);
+    let with = |change: fn(&mut Device)| {
+        let mut device = Device::default();
+        change(&mut device);
+        device
+    };
+    let strong = with(|device| {
+        device.full_scale_torque.0 = I16F16::from_num(200);
+        device.limits.torque.0 = I16F16::from_num(101);
+    });
+    let fast = with(|device| device.limits.max_counts_per_tick = 24);
+    for device in [strong, fast] {
+        let unknown = Device { commissioned: false, ..device };
+        for command in [pc.record_of(device), Command::ConfigureDevice(unknown)] {
+            let refused = pc.must_not(&mut board, command);
+            assert!(matches!(refused, Rejection::Config(_)), "{refused:?}");
+        }
+    }
+    let weak = with(|device| device.limits.torque.0 = I16F16::from_num(20));
+    pc.must(&mut board, Command::ConfigureDevice(weak));
+    for (device, field) in [
+        (Device::default(), Field::TorqueLimit),
+        (
+            Device { limits: SafetyConfig { max_counts_per_tick: 17, ..weak.limits }, ..weak },
+            Field::MaxCountsPerTick,
+        ),
+        (Device { motor_reversed: true, ..weak }, Field::MotorSign),
+    ] {
+        let refused = pc.must_not(&mut board, Command::ConfigureDevice(device));
+        assert_eq!(refused, Rejection::Commissioned(field));
+    }
+    // It is in flash as well.
+    pc.run_ms(&mut board, 50);
+    board.at_stop(|stopped| stopped.reset_by_pin());
+    board.run_ms(20);
+    pc.connect(&mut board);
+    let hash = pc.heard.hello.as_ref().map(|hello| hello.device_hash);
+    assert_eq!(hash, Some(link::codec::hash(&weak)));
+}
+
+/// `host-sim commission` at the end of the emulated cable, with a hand that does what a person is asked.
+struct Bench {
+    board: Board,
+    needle: Needle,
+    /// Where the hand ends, in m.
+    end: Option<f64>,
+}
+
+/// The needle's roller in mm, and how fast a hand turns it, in m/s.
+const ROLLER_MM: f64 = 10.0;
+const HAND_SPEED: f64 = 0.06;
+
+impl Bench {
+    fn new(reversed: bool, wires: Wires) -> Self {
+        let needle = Needle::held_at(0.0);
+        needle.change(|state| (state.hand, state.reversed) = (None, reversed));
+        let unknown = Wiring { commissioned: false, ..Wiring::default() };
+        let mut board = board_wired(unknown, needle.plant(0));
+        board.at_stop(move |stopped| stopped.set_wires(wires));
+        open_port(&mut board);
+        Self { board, needle, end: None }
+    }
+
+    fn commission(&mut self) -> (Result<Outcome, Failure>, bool) {
+        let wish = Wish { turns: 1, pull_mm: 40.0, counts_per_turn: None };
+        let mut has_moved = false;
+        let outcome = commission(self, &wish, |step| {
+            has_moved |= step.moves();
+            Ok(())
+        });
+        (outcome, has_moved)
+    }
+}
+
+impl Line for Bench {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+        let out = out.to_vec();
+        self.board.at_stop(move |stopped| stopped.usb().host.write(&out));
+        self.board.run_ms(1);
+        let end = self.end;
+        self.needle.change(|state| {
+            if let (Some(at), Some(end)) = (state.hand, end)
+                && at >= end
+            {
+                (state.hand, state.hand_speed) = (Some(end), 0.0);
+            }
+        });
+        into.extend(self.board.at_stop(|stopped| stopped.usb().host.read()));
+        Ok(Duration::from_nanos(self.board.now()))
+    }
+
+    fn act(&mut self, act: Act) {
+        let from = self.needle.state().depth;
+        let way = match act {
+            Act::HandsOff => None,
+            Act::Turn(turns) => Some(TAU * f64::from(turns) * ROLLER_MM * 1e-3),
+            Act::Pull(mm) => Some(mm * 1e-3),
+            Act::Tilt(rad) => {
+                let axes = [-rad.sin(), 0.0, rad.cos()].map(|share| (1e3 * share).round() as i32);
+                self.board.at_stop(move |stopped| {
+                    stopped.tilt().expect("an accelerometer").set_milligravities(axes);
+                });
+                None
+            }
+        };
+        self.end = way.map(|way| from + way);
+        self.needle.change(|state| {
+            (state.hand, state.hand_speed) =
+                (way.map(|_| from), if way.is_some() { HAND_SPEED } else { 0.0 });
+        });
+    }
+}
+
+#[test]
+fn a_device_is_commissioned_over_its_cable_and_keeps_its_record() {
+    for reversed in [false, true] {
+        let mut bench = Bench::new(reversed, Wires::default());
+        let (outcome, _) = bench.commission();
+        let outcome = outcome.unwrap_or_else(|why| panic!("leads reversed {reversed}: {why}"));
+        assert_eq!(outcome.leads_reversed, reversed);
+        let lines = outcome.lines().join("\n");
+        let said = if reversed { "motor leads reversed: driven the other way" } else { "motor leads right" };
+        assert!(lines.contains(said), "{lines}");
+        let device = outcome.record.device;
+        assert!(device.commissioned && device.counts_per_turn == 4_000, "{lines}");
+        assert_eq!((device.motor_reversed, device.encoder_reversed), (reversed, false));
+        assert!((outcome.radius_mm / ROLLER_MM - 1.0).abs() < 0.01, "{lines}");
+        // 30 g on 10 mm.
+        assert!((outcome.mechanism.inertia / 3e-6 - 1.0).abs() < 0.15, "{lines}");
+        assert!((outcome.mechanism.dry / 6e-4 - 1.0).abs() < 0.15, "{lines}");
+
+        let mut pc = Pc::new();
+        bench.board.at_stop(|stopped| stopped.reset_by_pin());
+        bench.board.run_ms(20);
+        pc.connect(&mut bench.board);
+        let hash = pc.heard.hello.as_ref().map(|hello| hello.device_hash);
+        assert_eq!(hash, Some(link::codec::hash(&device)), "it outlives a reset");
+        pc.must(&mut bench.board, Command::Zero);
+        pc.must(&mut bench.board, Command::Start);
+        // Given back to the same board.
+        pc.must(&mut bench.board, Command::Stop);
+        pc.run_ms(&mut bench.board, 20);
+        pc.must(&mut bench.board, Command::RestoreDevice(outcome.record));
+    }
+}
+
+#[test]
+fn a_dead_channel_is_named_before_the_motor_moves() {
+    let wires = Wires { b: Wire::Stuck(false), ..Wires::default() };
+    let mut bench = Bench::new(false, wires);
+    let (outcome, has_moved) = bench.commission();
+    let said = outcome.map(|outcome| outcome.lines()).expect_err("it does not pass").to_string();
+    assert!(
+        said.contains("one of the encoder's channels is dead") && said.contains("check the wires"),
+        "{said}"
+    );
+    assert!(!has_moved);
+    let mut pc = Pc::new();
+    pc.hello(&mut bench.board);
+    pc.must(&mut bench.board, Command::Zero);
+    assert_eq!(pc.must_not(&mut bench.board, Command::Start), NOT_COMMISSIONED);
 }

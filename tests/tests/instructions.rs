@@ -156,7 +156,6 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
         config.device.dac = if is(2) { DacWidth::Bits8 } else { DacWidth::Bits12 };
         config.device.limits.continuous_torque = MillinewtonMetres(q(10.0));
         config.device.limits.stiffness = Stiffness(q(3.0));
-        config.device.limits.max_counts_per_tick = 400;
         config
     })
 }

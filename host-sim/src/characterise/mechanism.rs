@@ -12,8 +12,6 @@ use crate::failure::Failure;
 
 /// Physics steps in a tick.
 const STEPS_PER_TICK: u32 = 20;
-/// Of a virtual device.
-const IDENTITY: Identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
 const STEP_S: f64 = 1.0 / (TICK_HZ as f64 * STEPS_PER_TICK as f64);
 
 /// What is wrong with the wires between motor, encoder and board.
@@ -83,7 +81,7 @@ impl BareDevice {
             plant: Plant::new(rig),
             wiring: Wiring::default(),
             middle: f64::from(plan.zero_torque_code().0),
-            endpoint: Endpoint::new(IDENTITY, &plan, None).knowing_depth(),
+            endpoint: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             tick: 0,
             command: 0.0,
@@ -94,7 +92,7 @@ impl BareDevice {
     pub fn uncommissioned(self, wiring: Wiring) -> Result<Self, Failure> {
         let device = Device::unknown();
         let plan = Plan::new(&device, &Patient::nobody()).map_err(Failure::failed)?;
-        let endpoint = Endpoint::new(IDENTITY, &plan, None);
+        let endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
         Ok(Self { wiring, endpoint, controller: Controller::new(plan), ..self })
     }
 

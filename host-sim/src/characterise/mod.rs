@@ -32,7 +32,7 @@ pub fn configuration() -> Config {
 /// The scale of a device that is configured with `config`.
 pub fn scale(config: &Config) -> Result<Hello, Failure> {
     let plan = config.plan().map_err(Failure::failed)?;
-    let device = Endpoint::new(Identity { serial: [0; 12], firmware: [0, 1, 0] }, &plan, None);
+    let device = Endpoint::new(Identity::VIRTUAL, &plan, None);
     Ok(Hello::from(&device.hello()))
 }
 

@@ -122,7 +122,7 @@ impl Compensate {
             ))
         };
         std::fs::create_dir_all(out).map_err(refuse)?;
-        let device = part::to_toml(&self.device, &outcome.device)?;
+        let device = part::to_toml(&self.device, &outcome.record)?;
         let mut written = Vec::new();
         for (file, text) in [("compensation.html", page::html(outcome)), ("device.toml", device)] {
             let path = out.join(file);

@@ -143,7 +143,7 @@ impl Run {
 
         let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
         let driver = Driver::new(profile.config.patient.clone());
-        let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.device));
+        let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
         let station = Station::new(driver, outlets, &stop).with_bedside(bedside);
         let station = if is_virtual || self.headless {
             if self.zero { station.zeroing_first() } else { station }

@@ -8,6 +8,7 @@ use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient, TICK_HZ};
+use link::commissioning::Record;
 use link::frames::{DeviceFrame, EventKind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -109,7 +110,7 @@ pub struct Bench<'a> {
     now: Duration,
     bytes: Vec<u8>,
     samples: Vec<Sample>,
-    device: Option<Device>,
+    record: Option<Record>,
     fault: Option<Fault>,
     not_saved: Option<String>,
 }
@@ -125,7 +126,7 @@ impl<'a> Bench<'a> {
             now: Duration::ZERO,
             bytes: Vec::new(),
             samples: Vec::new(),
-            device: None,
+            record: None,
             fault: None,
             not_saved: None,
         };
@@ -143,24 +144,40 @@ impl<'a> Bench<'a> {
 
     /// The device's part of the configuration.
     pub fn device(&mut self) -> Result<Device, Failure> {
-        self.device = None;
+        Ok(self.record()?.device)
+    }
+
+    /// The same under the device's seal.
+    pub fn record(&mut self) -> Result<Record, Failure> {
+        const SILENT: &str = "the device did not say how it is configured; start it again";
+        self.record = None;
         self.driver.request(Request::ReportDevice);
-        self.until("the device did not say how it is configured; start it again", |bench| {
-            bench.device.is_some()
-        })?;
-        self.device.ok_or_else(|| Failure::failed("the device did not say how it is configured"))
+        self.until(SILENT, |bench| bench.record.is_some())?;
+        self.record.ok_or_else(|| Failure::failed(SILENT))
     }
 
     /// Gives the device its part and sees that it has taken and kept it.
     pub fn configure(&mut self, device: &Device) -> Result<(), Failure> {
-        self.driver.request(Request::Device(Box::new(*device)));
-        if self.device()? != *device {
+        self.ask(Request::Device(Box::new(*device)), device).map(drop)
+    }
+
+    /// Has the device, which `device` is what was found of, take itself for commissioned: it looks at what its own pulses have
+    /// shown. Its record.
+    pub fn commission(&mut self, device: &Device) -> Result<Record, Failure> {
+        self.ask(Request::Commission, &Device { commissioned: true, ..*device })
+    }
+
+    /// Asks for something that makes the device `wanted`, and sees that it is and stays so.
+    fn ask(&mut self, request: Request, wanted: &Device) -> Result<Record, Failure> {
+        self.driver.request(request);
+        let record = self.record()?;
+        if record.device != *wanted {
             return Err(Failure::failed("the device did not take its new configuration; start it again"));
         }
         // An erasure of the flash takes a second or two, and what becomes of it is said afterwards.
         let until = self.now + Duration::from_millis(100);
         self.until("the device fell silent while it saved; start it again", |bench| bench.now >= until)?;
-        self.not_saved.take().map_or(Ok(()), |why| Err(Failure::failed(why)))
+        self.not_saved.take().map_or(Ok(record), |why| Err(Failure::failed(why)))
     }
 
     /// Tells the device where the rotor's angle is nought, in counts past the zero.
@@ -247,7 +264,7 @@ impl<'a> Bench<'a> {
                     self.samples.extend(&block.samples);
                     block.samples.last().into_iter().for_each(|newest| self.line.saw(newest));
                 }
-                DeviceFrame::Device(device) => self.device = Some(device),
+                DeviceFrame::Device(record) => self.record = Some(record),
                 DeviceFrame::Event(event) => match event.kind {
                     EventKind::Fault { cause } => self.fault = Some(cause),
                     EventKind::NotSaved { cause } => self.not_saved = Some(cause.to_string()),

@@ -22,6 +22,8 @@ const WINDOW_TICKS: usize = 100;
 const MOVING: f64 = 1.0;
 /// Windows that a fit of four numbers needs.
 const LEAST_WINDOWS: usize = 20;
+/// Faster than a hand, in mm/s.
+const LARGEST_SPEED: f64 = 400.0;
 /// Turned by less than this, the tilt sensor does not follow; in mrad.
 const LEAST_TILT: f64 = 200.0;
 
@@ -198,6 +200,14 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
     let [inertia, viscous, dry, offset] =
         least_squares(&rows).filter(|_| rows.len() >= LEAST_WINDOWS).ok_or(Trouble::NoFit)?;
     Ok(Mechanism { inertia, viscous, dry, offset })
+}
+
+/// The largest movement in a tick, in counts, that makes the device too fast at [`LARGEST_SPEED`]: its ceiling of speed. The
+/// device trips at a sixth of it.
+pub fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
+    let per_count = TAU * radius_mm / f64::from(counts_per_turn);
+    // Two is the least that the device takes.
+    ((6.0 * LARGEST_SPEED / f64::from(TICK_HZ) / per_count).ceil() as u16).max(2)
 }
 
 /// The code of zero torque for a device that has `offset` N·m too much, where a code is `code` N·m.

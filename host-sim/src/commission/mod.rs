@@ -16,6 +16,7 @@ use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
 use findings::{Mechanism, Trouble};
 use fixed::types::I16F16;
+use link::commissioning::Record;
 use std::fmt;
 use std::time::Duration;
 
@@ -96,8 +97,8 @@ impl fmt::Display for Step {
 /// What was found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The device's part, as the device has it now.
-    pub device: Device,
+    /// The device's part, as the device has it now, under its seal.
+    pub record: Record,
     /// The channels were swapped, as the device was configured before.
     pub channels_swapped: bool,
     /// The motor's leads were reversed, as the device was configured before.
@@ -111,7 +112,7 @@ pub struct Outcome {
 impl Outcome {
     /// What was found, a line each.
     pub fn lines(&self) -> Vec<String> {
-        let (device, m) = (&self.device, &self.mechanism);
+        let (device, m) = (&self.record.device, &self.mechanism);
         let way =
             |wrong: bool, right: &'static str, swapped: &'static str| if wrong { swapped } else { right };
         vec![
@@ -135,7 +136,7 @@ impl Outcome {
     /// The device's part as a file, with what was found beside it.
     pub fn to_toml(&self, name: &str) -> Result<String, Failure> {
         let found: String = self.lines().iter().map(|line| format!("# {line}\n")).collect();
-        Ok(found + &part::to_toml(name, &self.device)?)
+        Ok(found + &part::to_toml(name, &self.record)?)
     }
 }
 
@@ -178,6 +179,7 @@ pub fn commission(
     device.encoder_reversed ^= channels_swapped;
     device.roller_radius = Millimetres(I16F16::from_num(radius_mm));
     device.skin_tilt = Milliradians(flat.round() as i16);
+    device.limits.max_counts_per_tick = findings::counts_per_tick(radius_mm, counts_per_turn);
     bench.configure(&device)?;
 
     ask(Step::Pulses)?;
@@ -197,9 +199,9 @@ pub fn commission(
         }
     };
     device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
-    device.commissioned = true;
     bench.configure(&device)?;
-    Ok(Outcome { device, channels_swapped, leads_reversed, radius_mm, mechanism })
+    let record = bench.commission(&device)?;
+    Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism })
 }
 
 /// What moves; none where it turns against its torque.

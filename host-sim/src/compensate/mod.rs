@@ -18,6 +18,7 @@ use control_core::{Device, Patient, Plan};
 use diagnosis::rig::Rig;
 use felt::Felt;
 use fixed::types::I16F16;
+use link::commissioning::Record;
 use std::f64::consts::TAU;
 use std::fmt;
 use std::path::Path;
@@ -64,8 +65,8 @@ impl fmt::Display for Step {
 /// What came of it.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The device's part, as the device has it now.
-    pub device: Device,
+    /// The device's part, as the device has it now, under its seal.
+    pub record: Record,
     /// Where the rotor's angle is nought, where anything depends on it.
     pub angle: Option<angle::Angle>,
     /// What a hand would feel of the mechanism without and with it.
@@ -126,7 +127,7 @@ pub fn compensate(
     let (compensated_turns, compensated_hold) = excitations(found.inertia, radius, true);
     let fed = play(&mut bench, &compensated_turns, &compensated_hold)?;
     Ok(Outcome {
-        device,
+        record: bench.record()?,
         angle,
         before: felt::felt(&plan, (&turns, &bare.0), (&hold, &bare.1))?,
         after: felt::felt(&plan, (&turns, &fed.0), (&hold, &fed.1))?,

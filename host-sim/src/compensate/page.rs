@@ -71,7 +71,7 @@ pub fn html(outcome: &Outcome) -> String {
 }
 
 fn parts(outcome: &Outcome) -> Vec<Vec<Cell>> {
-    let found = &outcome.device.compensation;
+    let found = &outcome.record.device.compensation;
     let mut rows = Vec::new();
     let mut put = |part: &str, value: String, gain: Gain| {
         rows.push(vec![

@@ -10,6 +10,8 @@ use control_core::config::{DacWidth, SafetyConfig, SpeedMethod};
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
 use control_core::{Device, Patient, Plan};
 use fixed::types::I8F24;
+use link::Command;
+use link::commissioning::Record;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -20,6 +22,8 @@ pub struct DevicePart {
     pub name: String,
     /// As the control law takes it, checked.
     pub device: Device,
+    /// Under which the device has told it, where one has.
+    seal: Option<u32>,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
@@ -39,13 +43,20 @@ impl DevicePart {
         }
         let device = file.device().map_err(refuse)?;
         Plan::new(&device, &Patient::nobody()).map_err(|why| refuse(why.to_string()))?;
-        Ok(Self { name: file.name, device, source })
+        Ok(Self { name: file.name, device, seal: file.seal, source })
+    }
+
+    /// The command that gives it to a device.
+    pub fn command(&self) -> Command {
+        let device = self.device;
+        self.seal
+            .map_or(Command::ConfigureDevice(device), |seal| Command::RestoreDevice(Record { device, seal }))
     }
 }
 
-/// The text of a device's part, which [`DevicePart::parse`] reads again to the last place.
-pub fn to_toml(name: &str, device: &Device) -> Result<String, Failure> {
-    toml::to_string(&File::new(name, device)).map_err(Failure::failed)
+/// The text of a device's part as the device told it, which [`DevicePart::parse`] reads again to the last place.
+pub fn to_toml(name: &str, record: &Record) -> Result<String, Failure> {
+    toml::to_string(&File::new(name, record)).map_err(Failure::failed)
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -56,6 +67,8 @@ struct File {
     /// As `commission` writes it; without it, the device refuses to start.
     #[serde(default)]
     commissioned: bool,
+    /// As the device told it: by this it knows its own record again.
+    seal: Option<u32>,
     #[serde(default)]
     drive: Drive,
     #[serde(default)]
@@ -161,12 +174,13 @@ impl File {
         Ok(device)
     }
 
-    fn new(name: &str, device: &Device) -> Self {
+    fn new(name: &str, Record { device, seal }: &Record) -> Self {
         let limits = &device.limits;
         Self {
             format: 1,
             name: name.to_owned(),
             commissioned: device.commissioned,
+            seal: Some(*seal),
             drive: Drive {
                 roller_radius_mm: Some(device.roller_radius.0.to_num()),
                 counts_per_turn: Some(device.counts_per_turn),
@@ -244,6 +258,7 @@ mod tests {
         let part = parse("format = 1\nname = \"bench 3\"\n[drive]\nmotor_reversed = true\n").expect("sound");
         assert_eq!(part.device, Device { motor_reversed: true, ..Device::unknown() });
         assert_eq!(part.name, "bench 3");
+        assert_eq!(part.command(), Command::ConfigureDevice(part.device), "no device has told it");
     }
 
     #[test]
@@ -262,8 +277,10 @@ mod tests {
         // A count of so coarse an encoder is 2.4 mm/s in a speed window.
         device.compensation.rest_speed = MillimetresPerSecond(I16F16::from_num(3));
         device.limits.torque.0 /= 3;
-        let text = to_toml("mine", &device).expect("it can be written");
-        assert_eq!(parse(&text).expect("sound").device, device);
+        let record = Record::of(&device, [7; 12]);
+        let part = parse(&to_toml("mine", &record).expect("it can be written")).expect("sound");
+        assert_eq!(part.device, device);
+        assert_eq!(part.command(), Command::RestoreDevice(record));
     }
 
     #[test]

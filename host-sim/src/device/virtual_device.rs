@@ -72,10 +72,9 @@ impl VirtualDevice {
         );
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
         plant.set_tilt(procedure.entry_rad.unwrap_or(profile.entry_rad) + profile.skin_tilt_rad());
-        let identity = Identity { serial: [0; 12], firmware: [0, 1, 0] };
         Self {
             plant,
-            endpoint: Endpoint::new(identity, &plan, None).knowing_depth(),
+            endpoint: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
             tick: 0,
             hand: Hand::Script { since: 0 },

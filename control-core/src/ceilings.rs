@@ -1,0 +1,134 @@
+//! What no command raises: the ceilings that a board's firmware was built with, and those of a device that has been
+//! commissioned. It compares configurations; who may send which one is `link`'s business.
+
+use crate::config::Device;
+use crate::kinematics::mm_per_count;
+use crate::refusal::{Field, Refusal, milli, within};
+use crate::runaway::fastest;
+use crate::units::{MillimetresPerSecond, MillinewtonMetres};
+use fixed::types::I16F16;
+
+/// The most that a board may ever be configured for. They are constants of its firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ceilings {
+    /// Of [`crate::config::SafetyConfig::torque`].
+    pub torque: MillinewtonMetres,
+    /// Of the speed past which [`crate::event::Fault::Overspeed`] trips.
+    pub speed: MillimetresPerSecond,
+}
+
+impl Ceilings {
+    /// Of a device without a motor that could hurt anybody: what [`crate::Plan`] takes.
+    pub const VIRTUAL: Self =
+        Self { torque: MillinewtonMetres(I16F16::MAX), speed: MillimetresPerSecond(I16F16::MAX) };
+
+    /// Of so many whole mN·m and mm/s.
+    pub const fn new(torque_mnm: i16, speed_mm_per_s: i16) -> Self {
+        Self {
+            torque: MillinewtonMetres(I16F16::from_bits((torque_mnm as i32) << 16)),
+            speed: MillimetresPerSecond(I16F16::from_bits((speed_mm_per_s as i32) << 16)),
+        }
+    }
+
+    /// Whether `device` stays below them.
+    pub fn check(&self, device: &Device) -> Result<(), Refusal> {
+        let per_count = mm_per_count(device.roller_radius, device.counts_per_turn);
+        let speed = fastest(per_count, device.limits.max_counts_per_tick);
+        within(Field::TorqueLimit, device.limits.torque.0, milli(100), self.torque.0)?;
+        within(Field::SpeedCeiling, speed.0, I16F16::ZERO, self.speed.0)
+    }
+}
+
+/// What keeps a device that was commissioned as `before` from becoming `after` without being commissioned again: the first
+/// value that commissioning found and that is another one, or a ceiling that is higher. What only makes the device gentler,
+/// or shows in nothing but the feel, may change.
+pub fn changed(before: &Device, after: &Device) -> Option<Field> {
+    let (old, new) = (&before.limits, &after.limits);
+    let kept = [
+        (Field::RollerRadius, after.roller_radius == before.roller_radius),
+        (Field::CountsPerTurn, after.counts_per_turn == before.counts_per_turn),
+        (Field::EncoderSign, after.encoder_reversed == before.encoder_reversed),
+        (Field::FullScaleTorque, after.full_scale_torque == before.full_scale_torque),
+        (Field::Converter, after.dac == before.dac),
+        (Field::DacZero, after.dac_zero == before.dac_zero),
+        (Field::MotorSign, after.motor_reversed == before.motor_reversed),
+        (Field::TorqueLimit, new.torque <= old.torque),
+        (Field::ContinuousTorque, new.continuous_torque <= old.continuous_torque),
+        (Field::WindingTimeS, new.winding_time_s <= old.winding_time_s),
+        (Field::SlewPerTick, new.slew_per_tick <= old.slew_per_tick),
+        (Field::MaxCountsPerTick, new.max_counts_per_tick <= old.max_counts_per_tick),
+        (Field::Travel, new.travel <= old.travel),
+        (Field::StiffnessLimit, new.stiffness <= old.stiffness),
+        (Field::HeartbeatMs, new.heartbeat_ms <= old.heartbeat_ms),
+    ];
+    kept.into_iter().find_map(|(field, is_kept)| (!is_kept).then_some(field))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Millimetres;
+
+    const BOARD: Ceilings = Ceilings::new(40, 600);
+
+    #[test]
+    fn a_board_bounds_torque_and_the_speed_that_its_counts_make() {
+        let mut device = Device::default();
+        assert_eq!(BOARD.check(&device), Ok(()));
+        device.limits.max_counts_per_tick = 23;
+        let refused = BOARD.check(&device);
+        assert!(
+            matches!(refused, Err(Refusal::OutOfRange { field: Field::SpeedCeiling, .. })),
+            "{refused:?}"
+        );
+        // Half the roller, half the speed.
+        device.roller_radius = Millimetres(I16F16::from_num(5));
+        assert_eq!(BOARD.check(&device), Ok(()));
+        device.limits.torque.0 = BOARD.torque.0 + I16F16::DELTA;
+        let refused = BOARD.check(&device);
+        assert!(matches!(refused, Err(Refusal::OutOfRange { field: Field::TorqueLimit, .. })), "{refused:?}");
+        assert_eq!(Ceilings::VIRTUAL.check(&device), Ok(()));
+    }
+
+    /// Each value that is raised or exchanged alone.
+    #[test]
+    fn a_commissioned_device_is_lowered_and_never_raised_or_wired_anew() {
+        type Change = (Field, fn(&mut Device));
+        let changes: [Change; 15] = [
+            (Field::RollerRadius, |d| d.roller_radius.0 -= I16F16::ONE),
+            (Field::CountsPerTurn, |d| d.counts_per_turn += 4),
+            (Field::EncoderSign, |d| d.encoder_reversed = true),
+            (Field::FullScaleTorque, |d| d.full_scale_torque.0 += I16F16::ONE),
+            (Field::Converter, |d| d.dac = crate::config::DacWidth::Bits8),
+            (Field::DacZero, |d| d.dac_zero = 1),
+            (Field::MotorSign, |d| d.motor_reversed = true),
+            (Field::TorqueLimit, |d| d.limits.torque.0 += I16F16::DELTA),
+            (Field::ContinuousTorque, |d| d.limits.continuous_torque.0 += I16F16::DELTA),
+            (Field::WindingTimeS, |d| d.limits.winding_time_s += 1),
+            (Field::SlewPerTick, |d| d.limits.slew_per_tick.0 += I16F16::DELTA),
+            (Field::MaxCountsPerTick, |d| d.limits.max_counts_per_tick += 1),
+            (Field::Travel, |d| d.limits.travel.0 += I16F16::DELTA),
+            (Field::StiffnessLimit, |d| d.limits.stiffness.0 += I16F16::DELTA),
+            (Field::HeartbeatMs, |d| d.limits.heartbeat_ms += 1),
+        ];
+        let before = Device::default();
+        for (field, change) in changes {
+            let mut after = before;
+            change(&mut after);
+            assert_eq!(changed(&before, &after), Some(field));
+        }
+        let mut gentler = before;
+        gentler.limits.torque.0 /= 2;
+        gentler.limits.continuous_torque.0 /= 2;
+        gentler.limits.winding_time_s = 5;
+        gentler.limits.slew_per_tick.0 /= 2;
+        gentler.limits.max_counts_per_tick = 8;
+        gentler.limits.travel.0 /= 2;
+        gentler.limits.stiffness.0 /= 2;
+        gentler.limits.heartbeat_ms = 100;
+        gentler.limits.fade_in_ms = 444;
+        gentler.skin_tilt.0 = 70;
+        assert_eq!(changed(&before, &gentler), None);
+        assert_eq!(changed(&gentler, &before), Some(Field::TorqueLimit), "not back again");
+    }
+}

@@ -1,0 +1,32 @@
+//! What waits at the device's end of the link.
+
+use crate::frames::{Ack, Event, SampleBlock};
+use control_core::Order;
+use heapless::Deque;
+
+/// Blocks that wait for the PC: 77 ms of samples.
+const WAITING_BLOCKS: usize = 24;
+const WAITING_EVENTS: usize = 32;
+const WAITING_ACKS: usize = 16;
+const WAITING_ORDERS: usize = 4;
+
+/// What waits for the PC or for the control law. It is large, and may stand where it is at home from the start.
+pub struct Waiting {
+    pub(super) acks: Deque<Ack, WAITING_ACKS>,
+    pub(super) events: Deque<Event, WAITING_EVENTS>,
+    pub(super) blocks: Deque<SampleBlock, WAITING_BLOCKS>,
+    pub(super) orders: Deque<Order, WAITING_ORDERS>,
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Waiting {
+    /// Nothing waits.
+    pub const fn new() -> Self {
+        Self { acks: Deque::new(), events: Deque::new(), blocks: Deque::new(), orders: Deque::new() }
+    }
+}
