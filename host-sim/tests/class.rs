@@ -125,7 +125,7 @@ fn a_wrong_token_or_none_is_not_let_in() {
     let token = "a-long-enough-token";
     let meeting = meeting("guarded", Some(token));
     let (board, _listener) = listen(&meeting);
-    let mut children = vec![
+    let mut children = [
         device(&meeting, "without", &[]),
         device(&meeting, "wrong", &["--class-token", "a-long-enough-tokem"]),
         device(&meeting, "right", &["--class-token", token]),

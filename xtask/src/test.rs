@@ -252,12 +252,12 @@ fn prove(clock: &Clock) -> Result<Ended, Failure> {
 /// The tests of a class, which need a build of their own, and the measurement of thirty devices.
 pub(crate) fn class() -> Result<(), Failure> {
     let clock = Clock(Instant::now() + LIMIT);
-    let build = ["-p", "host-sim", "--features", "class", ANY_RUST];
+    let build = ["--features", "host-sim/class", ANY_RUST];
     let mut clippy = cargo();
-    clippy.args(["clippy", "--release", "--all-targets"]).args(build).args(["--", "-D", "warnings"]);
-    clock.run(&mut clippy)?;
+    clippy.args(["clippy", "--release", "--all-targets"]).args(CRATES).args(build);
+    clock.run(clippy.args(["--", "-D", "warnings"]))?;
     let mut test = cargo();
-    test.args(["test", "--release", "--test", "class"]).args(build);
+    test.args(["test", "--release", "--test", "class", "--test", "class_hostile"]).args(CRATES).args(build);
     // One after the other: what is measured must not share the machine.
     test.args(["--", "--include-ignored", "--nocapture", "--test-threads", "1"]);
     clock.run(&mut test)

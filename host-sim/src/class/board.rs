@@ -13,8 +13,6 @@ use std::time::{Duration, Instant};
 
 /// Devices at the most; messages of one more are thrown away.
 const MOST_MEMBERS: usize = 200;
-/// Longest message in bytes: a scene and its score have about 3,000, four poses 1,000.
-const LONGEST_MESSAGE: usize = 65_536;
 /// Events that are kept of each device.
 const MOST_EVENTS: usize = 8;
 /// A device that says nothing for so long is gone.
@@ -150,7 +148,7 @@ impl Members {
     fn hear(&mut self, device: &str, kind: &str, bytes: &[u8], now: Instant) -> Option<()> {
         let name: Name = device.parse().ok()?;
         let kind = Kind::from_name(kind)?;
-        if bytes.len() > LONGEST_MESSAGE {
+        if bytes.len() > kind.longest() {
             return None;
         }
         let is_known = self.by_name.contains_key(&name);
@@ -308,12 +306,14 @@ mod tests {
     #[test]
     fn nonsense_and_a_flood_of_names_are_bounded() {
         let (board, now) = (Board::default(), Instant::now());
-        let huge = vec![b' '; LONGEST_MESSAGE + 1];
+        // In good form, but longer than any device's.
+        let mut huge = br#"{"kind":"contact"}"#.to_vec();
+        huge.resize(Kind::Event.longest() + 1, b' ');
         let bad: [(&str, &str, &[u8]); 7] = [
             ("a/b", "pose", b"[]"),
             ("a", "orders", b"[]"),
             ("a", "pose", b"not even JSON"),
-            ("a", "pose", &huge),
+            ("a", "event", &huge),
             ("a", "about", b"{}"),
             ("a", "event", b"7"),
             ("a", "score", b"null"),

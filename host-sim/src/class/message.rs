@@ -28,6 +28,17 @@ impl Kind {
         Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
     }
 
+    /// Longest message in bytes that the instructor takes, several times what a device sends. Poses that had to wait for a second
+    /// come in one message.
+    pub(super) const fn longest(self) -> usize {
+        match self {
+            Self::Pose => 64 * 1024,
+            Self::Event => 1024,
+            Self::Score => 4 * 1024,
+            Self::About => 32 * 1024,
+        }
+    }
+
     /// From a key's last part.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().find(|(_, known)| *known == name).map(|(kind, _)| *kind)

@@ -23,6 +23,13 @@ use zenoh::{Config, Session, Wait};
 const PERIOD: Duration = Duration::from_millis(40);
 /// How long the end of a program waits for a goodbye that the network may not take.
 const GOODBYE: Duration = Duration::from_millis(500);
+/// Bytes of a message in pieces that are put together, at the most; Zenoh's own is 1 GiB. The board takes half of it.
+const LONGEST_TRANSFER: &str = "131072";
+/// How long a connection may take to say who it is, ms. Zenoh's own is 10 s with 100 of them at a time: silent ones would keep
+/// devices out for so long.
+const ACCEPT_TIMEOUT_MS: &str = "2000";
+/// Connections at a time that have not said who they are; one more is closed.
+const ACCEPT_PENDING: &str = "400";
 /// What every key of this project begins with.
 const PREFIX: &str = "needle";
 /// The only user that there is; the token is its password.
@@ -167,6 +174,9 @@ fn open(meeting: &Meeting, side: Side) -> Result<Session, zenoh::Error> {
         ("open/return_conditions", "{ connect_scouted: false, declares: false }"),
         ("scouting/multicast/enabled", "false"),
         ("scouting/gossip/enabled", "false"),
+        ("transport/link/rx/max_message_size", LONGEST_TRANSFER),
+        ("transport/unicast/accept_timeout", ACCEPT_TIMEOUT_MS),
+        ("transport/unicast/accept_pending", ACCEPT_PENDING),
     ] {
         config.insert_json5(key, value)?;
     }

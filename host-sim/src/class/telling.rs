@@ -218,6 +218,9 @@ mod tests {
         let about = read(&messages, Kind::About).next_back().unwrap();
         assert_eq!(about["scene"]["profile"], "adult");
         assert_eq!(about["score"]["insertions"], 1, "whoever comes later is told too");
+        for (kind, bytes) in &messages {
+            assert!(bytes.len() * 2 <= kind.longest(), "{} bytes of {kind:?}", bytes.len());
+        }
     }
 
     #[test]
