@@ -74,6 +74,13 @@ fn a_cut_at_any_place_and_any_flipped_byte_is_survived() {
         }
         samples(&damaged);
     }
+    // Every bit of a beginning: lengths of records and chunks among them.
+    let beginning = &whole[..whole.len().min(8_000)];
+    for bit in 0..8 * 4_000 {
+        let mut damaged = beginning.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        samples(&damaged);
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! exports to the rig and CSV of the diagnosis.
 
 pub mod export;
+mod intact;
 pub mod messages;
 pub mod read;
 pub mod write;

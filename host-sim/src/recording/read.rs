@@ -1,5 +1,6 @@
 //! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is said.
 
+use super::intact::intact;
 use super::messages::{Message, Setup};
 use crate::failure::Failure;
 use crate::library::Text;
@@ -37,7 +38,7 @@ impl Recording {
                 "{file}: not an MCAP recording; give one that `run --record` made"
             )));
         }
-        let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
+        let stream = MessageStream::new_with_options(intact(bytes), Options::IgnoreEndMagic.into())
             .map_err(|cause| Failure::input(format_args!("{file}: not a usable MCAP recording ({cause})")))?;
         let (mut setup, mut messages, mut cut) = (None, Vec::new(), None);
         for message in stream {
