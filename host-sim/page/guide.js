@@ -50,7 +50,7 @@ function end({ well, lines }) {
   write(section.querySelector("h2"), well ? "Done" : "Not done");
   section.querySelector("ul").replaceChildren(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
   write(byId("leave"), "Close");
-  section.scrollIntoView({ block: "nearest" });
+  byId("leave").scrollIntoView({ block: "nearest" });
 }
 
 const link = new Link(follow);
