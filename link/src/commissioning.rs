@@ -1,5 +1,5 @@
 //! What makes a device commissioned, and what keeps it so. No command says that it is: the device plays gentle pulses, sees in
-//! its own counts that the motor drives them the way it is asked to ([`Proof`]), and only then takes
+//! its own counts that the motor drives them the way it is asked to (`Proof`), and only then takes
 //! [`crate::Command::Commission`]. From then on a command may lower its ceilings and raise none
 //! ([`control_core::ceilings`]). A record that the device has told carries its seal ([`Record`]) and is taken back.
 

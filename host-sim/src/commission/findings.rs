@@ -202,7 +202,7 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
     Ok(Mechanism { inertia, viscous, dry, offset })
 }
 
-/// The largest movement in a tick, in counts, that makes the device too fast at [`LARGEST_SPEED`]: its ceiling of speed. The
+/// The largest movement in a tick, in counts, that makes the device too fast at 0.4 m/s: its ceiling of speed. The
 /// device trips at a sixth of it.
 pub fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
     let per_count = TAU * radius_mm / f64::from(counts_per_turn);
