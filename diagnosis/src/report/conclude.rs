@@ -189,9 +189,16 @@ fn hypotheses(assessment: &Assessment, s: &Search) -> Vec<Hypothesis> {
             out.push(Hypothesis { name, holdout_gain, evidence: None, class: Vec::new(), rejected_because });
         }
     };
-    for one in assessment.effects.iter().map(|e| &e.found) {
+    for Assessed { found: one, class, .. } in &assessment.effects {
         for rival in &one.rivals {
-            let behind = || format!("{} explains more by {:.1} standard errors", one.effect.name, rival.z);
+            let winner = one.effect.name;
+            let behind = || {
+                if class.contains(&rival.name) {
+                    format!("the recordings do not tell it from {winner}")
+                } else {
+                    format!("{winner} explains more by {:.1} standard errors", rival.z)
+                }
+            };
             let reason = rival.absence.clone().unwrap_or_else(behind);
             lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), reason);
         }
