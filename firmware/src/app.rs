@@ -1,5 +1,5 @@
 //! The tasks of the firmware and nothing else: which interrupt starts them and at which priority. What they do is in
-//! [`firmware::tasks`], what they do it with in [`crate::board`].
+//! [`firmware::tasks`], what they do it with in [`crate::board`] and [`crate::chip`].
 //!
 //! No task shares anything by lock. Orders go to the tick and samples come from it through queues with one writer and one
 //! reader; single words go through atomics ([`firmware::tasks::shared`]).
@@ -13,7 +13,8 @@ const _: () = {
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use crate::SHARED;
-    use crate::board::{self, Discovery, Statics};
+    use crate::board::{Current, Wires};
+    use crate::chip::{Statics, Supply, Wiring};
     use core::mem::MaybeUninit;
     use firmware::tasks::queues::Queues;
     use firmware::tasks::supervisor::Watch;
@@ -27,24 +28,24 @@ mod app {
 
     #[local]
     struct Local {
-        tick: &'static mut Tick<Discovery>,
-        supply: board::Supply,
-        supervisor: Watch<Discovery>,
-        usb: Port<Discovery>,
-        telemetry: &'static mut Telemetry<Discovery>,
-        tilt: Tilt<Discovery>,
+        tick: &'static mut Tick<Current>,
+        supply: Supply,
+        supervisor: Watch<Current>,
+        usb: Port<Current>,
+        telemetry: &'static mut Telemetry<Current>,
+        tilt: Tilt<Current>,
     }
 
     // What is large has its place from the start: a `Local` that held it would be moved there over the stack.
     #[init(local = [
         queues: Queues = Queues::new(),
         statics: Statics = Statics::new(),
-        tick_place: MaybeUninit<Tick<Discovery>> = MaybeUninit::uninit(),
-        telemetry_place: MaybeUninit<Telemetry<Discovery>> = MaybeUninit::uninit(),
+        tick_place: MaybeUninit<Tick<Current>> = MaybeUninit::uninit(),
+        telemetry_place: MaybeUninit<Telemetry<Current>> = MaybeUninit::uninit(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let ends = context.local.queues.split();
-        let parts = board::init(context.core, context.device, context.local.statics);
+        let parts = Wires::init(context.core, context.device, context.local.statics);
         let local = Local {
             tick: context.local.tick_place.write(Tick::new(
                 &SHARED,
@@ -107,13 +108,13 @@ mod app {
         context.local.usb.run();
     }
 
-    /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that this board does not use.
+    /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that is not used.
     #[task(binds = USART2, priority = 2, local = [telemetry])]
     fn telemetry(context: telemetry::Context) {
         context.local.telemetry.run();
     }
 
-    /// Reads the tilt sensor. On the interrupt of a serial port that this board does not use.
+    /// Reads the tilt sensor. On the interrupt of a serial port that is not used.
     #[task(binds = USART3, priority = 1, local = [tilt])]
     fn tilt(context: tilt::Context) {
         context.local.tilt.run();

@@ -1,4 +1,4 @@
-//! On the board: the firmware (`app.rs` the tasks, `board.rs` the wiring). On a PC: a launcher that builds the image, flashes it
+//! On a board: the firmware (`app.rs` the tasks, `board` the wiring, `chip` the microcontroller). On a PC: a launcher that builds the image, flashes it
 //! through a debug probe and shows its log, so that `cargo run -p firmware --release` does what it says.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 // Direct access to registers has its few places, each with its reason; everything else is held to the safe language.
@@ -12,11 +12,14 @@ use defmt_rtt as _;
 mod app;
 #[cfg(target_os = "none")]
 mod board;
+#[cfg(target_os = "none")]
+mod chip;
+#[cfg(target_os = "none")]
+mod crash;
 
 /// The words that the tasks share.
 #[cfg(target_os = "none")]
-static SHARED: firmware::tasks::shared::Shared =
-    firmware::tasks::shared::Shared::new(&board::crash::LAST_WORDS);
+static SHARED: firmware::tasks::shared::Shared = firmware::tasks::shared::Shared::new(&crash::LAST_WORDS);
 
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {

@@ -3,10 +3,10 @@
 
 use control_core::TICK_HZ;
 
-/// The crystal on the STM32F4DISCOVERY.
-pub const CRYSTAL_HZ: u32 = 8_000_000;
+/// What a board brings from outside: a crystal, or the clock of its debugger.
+pub const EXTERNAL_CLOCK_HZ: u32 = 8_000_000;
 
-/// The most that an STM32F407 runs at; the cycle counter counts it.
+/// The most that an STM32F407 runs at, and an STM32F429 without over-drive; the cycle counter counts it.
 pub const CORE_HZ: u32 = 168_000_000;
 
 /// The most that the APB1 bus allows.

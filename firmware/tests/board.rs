@@ -10,24 +10,26 @@ fn main() {}
 use defmt_rtt as _;
 
 #[cfg(target_os = "none")]
-#[allow(
-    unsafe_code,
-    dead_code,
-    unreachable_pub,
-    reason = "the image's own board, of which a test uses a part"
-)]
+#[allow(dead_code, reason = "the image's own, of which a test uses a part")]
 #[path = "../src/board/mod.rs"]
 mod board;
+#[cfg(target_os = "none")]
+#[allow(dead_code, unused_imports, reason = "the image's own, of which a test uses a part")]
+#[path = "../src/chip/mod.rs"]
+mod chip;
+#[cfg(target_os = "none")]
+#[path = "../src/crash.rs"]
+mod crash;
 
 /// The words that the tasks would share.
 #[cfg(target_os = "none")]
-static SHARED: firmware::tasks::shared::Shared =
-    firmware::tasks::shared::Shared::new(&board::crash::LAST_WORDS);
+static SHARED: firmware::tasks::shared::Shared = firmware::tasks::shared::Shared::new(&crash::LAST_WORDS);
 
 #[cfg(target_os = "none")]
 #[embedded_test::tests]
 mod tests {
-    use super::board::{self, Parts, Statics};
+    use super::board::Wires;
+    use super::chip::{self, Statics, Wiring};
     use control_core::config::DacWidth;
     use control_core::controller::TickInput;
     use control_core::event::State;
@@ -36,6 +38,8 @@ mod tests {
     use cortex_m::peripheral::DWT;
     use firmware::port::{ReadDrive, SerialPort, SupplyLevel, TickTimer};
     use firmware::timing;
+
+    type Parts = chip::Parts<Wires>;
 
     /// Room for what the image keeps in its start-up task.
     static mut STATICS: Statics = Statics::new();
@@ -49,7 +53,7 @@ mod tests {
         };
         // SAFETY: a test begins with a reset and calls this once.
         #[allow(unsafe_code, static_mut_refs)]
-        board::init(core, device, unsafe { &mut STATICS })
+        Wires::init(core, device, unsafe { &mut STATICS })
     }
 
     /// Waits for the next latch of the converter, and for what it puts out to settle.

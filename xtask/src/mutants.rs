@@ -9,7 +9,16 @@ use std::path::Path;
 const CRATES: [(&str, &[&str]); 3] = [
     ("control-core", &[]),
     ("link", &[]),
-    ("firmware", &["firmware/src/main.rs", "firmware/src/app.rs", "firmware/src/board/**"]),
+    (
+        "firmware",
+        &[
+            "firmware/src/main.rs",
+            "firmware/src/app.rs",
+            "firmware/src/crash.rs",
+            "firmware/src/board/**",
+            "firmware/src/chip/**",
+        ],
+    ),
 ];
 /// A mutant that runs longer hangs.
 const LIMIT_S: &str = "30";

@@ -1,41 +1,29 @@
 //! Panic, hard fault, stray interrupt: the amplifier goes off, then the converters to zero torque, by direct register
 //! writes that need nothing to be in order, not even the stack. Then word is left for the next start, and the device
-//! resets itself, so that a PC finds a device that answers and says what happened.
+//! resets itself, so that a PC finds a device that answers and says what happened. It names no pin: those are the board's.
 #![allow(unsafe_code, reason = "after a fault nothing that owns a register can be trusted")]
 
-use control_core::config::DacWidth;
+use crate::board::Wires;
+use crate::chip::{self, Wiring};
 use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use firmware::reset::{Crash, CrashKind, LastWords};
-use stm32f4xx_hal::pac::{DAC, GPIOD, GPIOE, RCC};
+use stm32f4xx_hal::pac::RCC;
 
 /// What survives a reset: start-up code leaves this section alone, any bits are valid in it, and it says itself which mean
 /// something.
 #[unsafe(link_section = ".uninit.last_words")]
 pub(crate) static LAST_WORDS: LastWords = LastWords::new();
 
-/// PD7, the amplifier's enable, off.
-const ENABLE_OFF: u32 = 1 << (7 + 16);
-/// PE8 to PE15 at mid-scale: the highest bit set, the others cleared.
-const LINES_ZERO_TORQUE: u32 = 1 << 15 | 0x7F << (8 + 16);
-
 /// Amplifier off, then zero torque.
 fn safe_state() {
     cortex_m::interrupt::disable();
-    // SAFETY: interrupts are off and whatever was interrupted never continues: nobody else uses these registers again. The
-    // writes are valid whatever state the peripherals are in; to one without a clock they do nothing, and then its pins
-    // are still inputs and the external pull-down holds the amplifier off.
-    unsafe {
-        (*GPIOD::ptr()).bsrr().write(|w| w.bits(ENABLE_OFF));
-        // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out (14.3.4).
-        let mid_scale = DacWidth::Bits12.mid_scale().into();
-        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit());
-        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
-        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit().en1().set_bit());
-        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
-        (*GPIOE::ptr()).bsrr().write(|w| w.bits(LINES_ZERO_TORQUE));
-    }
+    // Interrupts are off and whatever was interrupted never continues: nobody else uses these registers again. The writes are
+    // valid whatever state the peripherals are in; to one without a clock they do nothing, and then its pins are still inputs
+    // and the external pull-down holds the amplifier off.
+    Wires::ENABLE.set_low();
+    chip::outputs_to_zero_torque();
 }
 
 fn end(kind: CrashKind, detail: u32) -> ! {
@@ -49,20 +37,12 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(CrashKind::Panic, info.location().map_or(0, |place| place.line()))
 }
 
-/// The crystal has stopped while its clock security (RM0090 7.2.7) watched; the core goes on, on its own oscillator.
+/// The clock from outside has stopped while the clock security (RM0090 7.2.7) watched it; the core goes on, on its own oscillator.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     // SAFETY: interrupts cannot mask this one; nobody else runs any more.
     let state = unsafe { &*RCC::ptr() }.cr().read().bits();
     end(CrashKind::Clock, state)
-}
-
-/// Has the clock security watch the crystal once it runs. One that never comes leaves the device here, its pins inputs and
-/// the amplifier held off by its pull-down, until a person looks: without the crystal there is neither USB nor a tick.
-pub(crate) fn wait_for_crystal(rcc: &RCC) {
-    rcc.cr().modify(|_, w| w.hseon().set_bit());
-    while rcc.cr().read().hserdy().bit_is_clear() {}
-    rcc.cr().modify(|_, w| w.csson().set_bit());
 }
 
 /// An interrupt that no task serves.

@@ -9,11 +9,12 @@ use stm32f4xx_hal::pac::{FLASH, IWDG, RCC};
 
 /// Words of a sector: 128 KiB.
 const SECTOR_WORDS: usize = 128 * 1024 / 4;
-/// Both sectors by their number.
+/// Both sectors by their number (RM0090 3.3). Parts with two megabytes have the same twelve sectors in their first bank (3.4); those
+/// of the second bank, which begin at 16 in `SNB` (3.9.8), are left alone.
 const SECTORS: [u8; 2] = [10, 11];
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Sectors 10 and 11, `CONFIG` of `memory.x`.
+/// Sectors 10 and 11, `CONFIG` of a board's `memory.x`.
 pub(crate) struct Sectors(FLASH);
 
 impl Sectors {

@@ -1,4 +1,4 @@
-//! The converters of the board, as the traits that the hardware-free parts know.
+//! The converters, as the traits that the hardware-free parts know.
 #![allow(unsafe_code, reason = "the HAL leaves the converter's trigger to its user")]
 
 use control_core::config::DacWidth;
@@ -9,7 +9,8 @@ use stm32f4xx_hal::adc::Adc;
 use stm32f4xx_hal::adc::config::{AdcConfig, Clock, SampleTime};
 use stm32f4xx_hal::dac::{C1, DacOut};
 use stm32f4xx_hal::gpio::outport::OutPort8;
-use stm32f4xx_hal::gpio::{Analog, PC1, PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
+use stm32f4xx_hal::gpio::{PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
+use stm32f4xx_hal::hal_02::adc::Channel;
 use stm32f4xx_hal::pac::{ADC1, DAC, GPIOE};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -46,7 +47,7 @@ impl MotorDac for OnChipDac {
 
 type LinePins = (PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15);
 
-/// Eight lines of port E, set in one write.
+/// Eight lines of port E, set in one write: the same on every board, for both have this half of a port free on one header.
 pub(crate) struct Lines(OutPort8<'E', 8, 9, 10, 11, 12, 13, 14, 15>);
 
 impl Lines {
@@ -67,6 +68,26 @@ impl Lines {
     }
 }
 
+/// Mid-scale on them, after a crash: the highest bit set, the others cleared.
+pub(super) fn lines_to_zero_torque() {
+    const ZERO_TORQUE: u32 = 1 << 15 | 0x7F << (8 + 16);
+    // SAFETY: as in `put`; whoever owned the lines never runs again.
+    unsafe { &*GPIOE::ptr() }.bsrr().write(|w| unsafe { w.bits(ZERO_TORQUE) });
+}
+
+/// Mid-scale at the microcontroller's own converter, after a crash, whatever it waited for.
+pub(super) fn dac_to_zero_torque() {
+    let mid_scale = DacWidth::Bits12.mid_scale().into();
+    // SAFETY: valid codes and bits; whoever owned the converter never runs again.
+    unsafe {
+        // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out (14.3.4).
+        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit());
+        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
+        (*DAC::ptr()).cr().write(|w| w.boff1().set_bit().en1().set_bit());
+        (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
+    }
+}
+
 impl ByteBus for Lines {
     fn put(&mut self, byte: u8) {
         // Of port E's upper half: what is to rise in the lower word, what is to fall in the upper one.
@@ -77,22 +98,22 @@ impl ByteBus for Lines {
     }
 }
 
-/// The analogue inclinometer's pin.
-pub(crate) struct InclinometerPin {
+/// The analogue inclinometer, on the pin that the board chooses for it.
+pub(crate) struct InclinometerPin<P> {
     converter: Adc<ADC1>,
-    pin: PC1<Analog>,
+    pin: P,
 }
 
-impl InclinometerPin {
+impl<P: Channel<ADC1, ID = u8>> InclinometerPin<P> {
     /// On ADC 1.
-    pub(crate) fn new(adc: ADC1, pin: PC1<Analog>, rcc: &mut Rcc) -> Self {
-        // 84 MHz by 4: by 2, as the HAL would have it, is more than the converter's 36 MHz (DS8626, ADC characteristics).
+    pub(crate) fn new(adc: ADC1, pin: P, rcc: &mut Rcc) -> Self {
+        // 84 MHz by 4: by 2, as the HAL would have it, is more than the converter's 36 MHz (data sheet, ADC characteristics).
         let config = AdcConfig::default().clock(Clock::Pclk2_div_4);
         Self { converter: Adc::new(adc, true, config, rcc), pin }
     }
 }
 
-impl ReadCode for InclinometerPin {
+impl<P: Channel<ADC1, ID = u8>> ReadCode for InclinometerPin<P> {
     fn read_code(&mut self) -> u16 {
         // The longest sampling: 20 µs, for a source of tens of kΩ.
         self.converter.convert(&self.pin, SampleTime::Cycles_480)

@@ -1,0 +1,118 @@
+//! STM32F4DISCOVERY (MB997, STM32F407VG), the default board.
+//!
+//! | pin | does | remark |
+//! | --- | --- | --- |
+//! | PA15, PA1 | encoder A, B (TIM2, 32 bit) | both free on the board; PA0 has the button, PA5 the accelerometer |
+//! | PA4 | motor set value, 12 bit (DAC 1) | shared with the audio codec, which is held in reset |
+//! | PD4 | codec reset | low for good |
+//! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
+//! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ; read back |
+//! | PE4 | emergency stop: to ground while it may run | pulled up inside: a jumper where there is no stop |
+//! | PE5 | amplifier ready: low while it is | pulled up inside: a jumper where it has no such output |
+//! | PC2, PE6 | motor current, scaled as PA4 (ADC 2, channel 12); PE6 to ground where it is fitted | read at start-up |
+//! | PA5, PA6, PA7, PE3 | accelerometer: SCK, MISO, MOSI, select | on the board |
+//! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
+//! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
+//! | PA11, PA12 | USB | the micro-USB connector CN5 |
+//! | PD12 | green LED: running | on the board |
+
+use crate::chip::{
+    self, Begun, DriveLines, InclinometerPin, Line, Lines, OnChipDac, Own, Parts, Source, Statics, Wired,
+    Wiring,
+};
+use control_core::ceilings::Ceilings;
+use firmware::drive::{Drive, ParallelDac};
+use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
+use firmware::timing;
+use stm32f4xx_hal::gpio::{Analog, Output, PC1, PD7, PE3};
+use stm32f4xx_hal::pac;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
+
+/// This board.
+pub(crate) struct Discovery;
+
+impl Wiring for Discovery {
+    type Enable = PD7<Output>;
+    type Tilt = BoardTilt;
+
+    /// 10 N at a roller of 10 mm, the most that seed 002 asks for, and 0.6 m/s, half as fast again as the overspeed trip of a usual
+    /// encoder. Another motor is another image.
+    const CEILINGS: Ceilings = Ceilings::new(100, 600);
+
+    fn init(
+        core: cortex_m::Peripherals,
+        device: pac::Peripherals,
+        statics: &'static mut Statics,
+    ) -> Parts<Self> {
+        let mut begun = Begun::new(device.RCC, Source::Crystal);
+        let rcc = &mut begun.rcc;
+        let gpioa = device.GPIOA.split(rcc);
+        let gpiob = device.GPIOB.split(rcc);
+        let gpioc = device.GPIOC.split(rcc);
+        let gpiod = device.GPIOD.split(rcc);
+        let gpioe = device.GPIOE.split(rcc);
+
+        // The amplifier before anything else: off, then zero torque.
+        let mut enable = gpiod.pd7.into_push_pull_output();
+        enable.set_low();
+        gpiod.pd4.into_push_pull_output().set_low();
+        let lines = Lines::new((
+            gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
+        ));
+        let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
+        let drive = Drive::new(dac, ParallelDac(lines), enable);
+
+        let strap = gpiob.pb1.into_pull_down_input();
+        // Whatever charge the pin had, its pull has taken away by then.
+        cortex_m::asm::delay(timing::PULL_SETTLE_CYCLES);
+        let is_analogue = strap.is_high();
+        let tilt = if is_analogue {
+            let pin = InclinometerPin::new(device.ADC1, gpioc.pc1.into_analog(), rcc);
+            BoardTilt::Analogue(Inclinometer::new(pin))
+        } else {
+            let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
+            let pins = (Some(gpioa.pa5), Some(gpioa.pa6), Some(gpioa.pa7));
+            let bus = device.SPI1.spi(pins, mode, timing::TILT_SPI_HZ.Hz(), rcc);
+            BoardTilt::OnBoard(Accelerometer::new(bus, gpioe.pe3.into_push_pull_output()))
+        };
+
+        let drive_lines = DriveLines::new(
+            [Line::new(gpioe.pe4), Line::new(gpioe.pe5), Line::new(gpioe.pe6)],
+            Self::ENABLE,
+            (device.ADC2, gpioc.pc2.into_analog()),
+            rcc,
+        );
+        // PA15 is the debugger's JTDI out of reset (RM0090 8.3.2); from here on it is the timer's.
+        let encoder =
+            chip::encoder(device.TIM2, gpioa.pa15.into_pull_up_input(), gpioa.pa1.into_pull_up_input(), rcc);
+        gpiod.pd12.into_push_pull_output().set_high();
+
+        let own = Own {
+            flash: device.FLASH,
+            power: device.PWR,
+            external: device.EXTI,
+            usb: (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK),
+            usb_pins: (gpioa.pa11, gpioa.pa12),
+            tick_timer: device.TIM4,
+            watchdog: device.IWDG,
+            debug: device.DBGMCU,
+        };
+        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt }, statics)
+    }
+}
+
+/// Either tilt sensor.
+pub(crate) enum BoardTilt {
+    OnBoard(Accelerometer<Spi<pac::SPI1>, PE3<Output>>),
+    Analogue(Inclinometer<InclinometerPin<PC1<Analog>>>),
+}
+
+impl TiltSource for BoardTilt {
+    fn read(&mut self) -> Reading {
+        match self {
+            BoardTilt::OnBoard(accelerometer) => accelerometer.read(),
+            BoardTilt::Analogue(inclinometer) => inclinometer.read(),
+        }
+    }
+}

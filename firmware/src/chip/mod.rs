@@ -1,0 +1,96 @@
+//! The microcontroller: STM32F405/407 and STM32F42x/43x, one family under one manual, RM0090. Everything that its boards have in
+//! common is here; which pin does what is the board's (`crate::board`), but for pins that leave no choice: PA4 is the converter's
+//! output, PA11 and PA12 are USB.
+//!
+//! Nothing here may name a board.
+
+mod clock;
+mod encoder;
+mod flash;
+mod monitors;
+mod outputs;
+mod pin;
+mod start;
+mod supply;
+mod tick_timer;
+mod usb;
+mod watchdog;
+
+pub(crate) use clock::Source;
+pub(crate) use encoder::init as encoder;
+pub(crate) use monitors::{DriveLines, Line};
+pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac};
+pub(crate) use pin::{Pin, Placed};
+pub(crate) use start::{Begun, Own, Parts, Statics, Wired};
+pub(crate) use supply::Supply;
+
+use control_core::ceilings::Ceilings;
+use core::marker::PhantomData;
+use cortex_m::peripheral::DWT;
+use embedded_hal::digital::OutputPin;
+use firmware::drive::ParallelDac;
+use firmware::port::Board;
+use firmware::tilt::TiltSource;
+use stm32f4xx_hal::pac::{Interrupt, Peripherals};
+
+/// What a board with this microcontroller says of itself. The rest of [`Board`] is the microcontroller's.
+pub(crate) trait Wiring: 'static {
+    /// The amplifier's enable line: its pin.
+    type Enable: OutputPin + Placed;
+    /// The tilt sensors that may be there.
+    type Tilt: TiltSource;
+
+    /// What nobody configures this board for.
+    const CEILINGS: Ceilings;
+    /// The enable line past its owner.
+    const ENABLE: Pin = <Self::Enable as Placed>::PIN;
+
+    /// Sets everything up, the amplifier first, on interrupts that are masked.
+    fn init(core: cortex_m::Peripherals, device: Peripherals, statics: &'static mut Statics) -> Parts<Self>
+    where
+        Self: Sized;
+}
+
+/// A board with this microcontroller, wired as `W` says.
+pub(crate) struct Stm32F4<W>(PhantomData<W>);
+
+impl<W: Wiring> Board for Stm32F4<W> {
+    type Timer = tick_timer::TickTimer;
+    type Encoder = encoder::Encoder;
+    type Dac12 = OnChipDac;
+    type Dac8 = ParallelDac<Lines>;
+    type Enable = W::Enable;
+    type EncoderLines = encoder::EncoderLines;
+    type DriveLines = DriveLines;
+    type Supply = supply::SupplyLevel;
+    type Watchdog = watchdog::Watchdog;
+    type Tilt = W::Tilt;
+    type Serial = usb::Port;
+    type Flash = flash::Sectors;
+
+    fn cycles() -> u32 {
+        DWT::cycle_count()
+    }
+
+    fn wake_usb() {
+        rtic::pend(Interrupt::OTG_FS);
+    }
+
+    fn wake_telemetry() {
+        rtic::pend(Interrupt::USART2);
+    }
+
+    fn wake_tilt() {
+        rtic::pend(Interrupt::USART3);
+    }
+
+    fn allow_usb(allowed: bool) {
+        usb::allow_interrupt(allowed);
+    }
+}
+
+/// The converters to zero torque after a crash: nobody who owned them ever runs again.
+pub(crate) fn outputs_to_zero_torque() {
+    outputs::dac_to_zero_torque();
+    outputs::lines_to_zero_torque();
+}

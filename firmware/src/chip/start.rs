@@ -1,0 +1,190 @@
+//! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the amplifier first, then all that the
+//! microcontroller does by itself. Interrupts are masked meanwhile.
+
+use super::clock::{self, Source};
+use super::encoder::{Encoder, EncoderLines};
+use super::flash::Sectors;
+use super::monitors::DriveLines;
+use super::supply::{self, Supply, SupplyLevel};
+use super::tick_timer::TickTimer;
+use super::watchdog::Watchdog;
+use super::{Stm32F4, Wiring, usb};
+use crate::crash::LAST_WORDS;
+use control_core::ceilings::Ceilings;
+use control_core::event::Fault;
+use control_core::{Device, Patient, Plan};
+use firmware::reset::{ResetFlags, Said, cause};
+use firmware::store::{Store, Stored};
+use firmware::tasks::tick::BoardDrive;
+use firmware::timing;
+use link::device::Identity;
+use stm32f4xx_hal::gpio::{PA11, PA12};
+use stm32f4xx_hal::otg_fs::USB;
+use stm32f4xx_hal::pac;
+use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::signature::Uid;
+
+/// Memory that must outlive start-up.
+pub(crate) struct Statics {
+    usb: usb::Statics,
+}
+
+impl Statics {
+    /// Empty.
+    pub(crate) const fn new() -> Self {
+        Self { usb: usb::Statics::new() }
+    }
+}
+
+/// The first half is done: the clocks run.
+pub(crate) struct Begun {
+    /// For what the board switches on.
+    pub(crate) rcc: Rcc,
+    flags: ResetFlags,
+}
+
+impl Begun {
+    /// Waits for the board's clock.
+    pub(crate) fn new(rcc: pac::RCC, source: Source) -> Self {
+        let flags = clock::reset_flags(&rcc);
+        Self { rcc: clock::start(rcc, source), flags }
+    }
+}
+
+/// The peripherals that no board uses for anything else.
+pub(crate) struct Own {
+    pub(crate) flash: pac::FLASH,
+    pub(crate) power: pac::PWR,
+    pub(crate) external: pac::EXTI,
+    pub(crate) usb: (pac::OTG_FS_GLOBAL, pac::OTG_FS_DEVICE, pac::OTG_FS_PWRCLK),
+    pub(crate) usb_pins: (PA11, PA12),
+    pub(crate) tick_timer: pac::TIM4,
+    pub(crate) watchdog: pac::IWDG,
+    pub(crate) debug: pac::DBGMCU,
+}
+
+/// What the board has made of its pins.
+pub(crate) struct Wired<W: Wiring> {
+    pub(crate) encoder: (Encoder, EncoderLines),
+    pub(crate) drive: BoardDrive<Stm32F4<W>>,
+    pub(crate) drive_lines: DriveLines,
+    pub(crate) tilt: W::Tilt,
+}
+
+/// What the tasks get.
+pub(crate) struct Parts<W: Wiring> {
+    pub(crate) tick_timer: TickTimer,
+    pub(crate) encoder: Encoder,
+    pub(crate) encoder_lines: EncoderLines,
+    pub(crate) drive_lines: DriveLines,
+    pub(crate) drive: BoardDrive<Stm32F4<W>>,
+    pub(crate) tilt: W::Tilt,
+    pub(crate) serial: usb::Port,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) supply: Supply,
+    pub(crate) supply_level: SupplyLevel,
+    pub(crate) store: Store<Sectors>,
+    pub(crate) plan: Plan,
+    pub(crate) heat: u32,
+    pub(crate) identity: Identity,
+    pub(crate) reset_cause: Option<Fault>,
+}
+
+impl<W: Wiring> Parts<W> {
+    /// The second half: starts the clocks of the tick, the supervisor and the watchdog.
+    pub(crate) fn start(
+        begun: Begun,
+        mut core: cortex_m::Peripherals,
+        own: Own,
+        wired: Wired<W>,
+        statics: &'static mut Statics,
+    ) -> Self {
+        let Begun { mut rcc, flags } = begun;
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+        // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle counter counts on.
+        own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
+
+        let Said { crash, torque, heat } = LAST_WORDS.take();
+        let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
+        let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
+        let reset_cause = cause(flags, crash, torque).or(damage);
+        match crash {
+            Some(crash) => {
+                defmt::warn!("last run ended: kind {}, detail {=u32:#x}", crash.kind as u8, crash.detail)
+            }
+            None => defmt::info!("started; torque is off"),
+        }
+
+        let bus = USB::new(own.usb, own.usb_pins, &rcc.clocks);
+        let serial = usb::init(bus, serial_number(), &mut statics.usb);
+        let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
+        let mut systick = core.SYST;
+        systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
+        systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);
+        systick.clear_current();
+        systick.enable_counter();
+        systick.enable_interrupt();
+        let watchdog = Watchdog::start(own.watchdog, own.debug);
+        let (encoder, encoder_lines) = wired.encoder;
+        Self {
+            tick_timer: TickTimer::start(own.tick_timer, &mut rcc),
+            encoder,
+            encoder_lines,
+            drive_lines: wired.drive_lines,
+            drive: wired.drive,
+            tilt: wired.tilt,
+            serial,
+            watchdog,
+            supply,
+            supply_level,
+            store,
+            plan,
+            heat,
+            identity: Identity { serial: serial_number(), firmware: version(), ceilings: W::CEILINGS },
+            reset_cause,
+        }
+    }
+}
+
+/// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
+fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
+    let (device, lost_device) = device.or(Device::unknown());
+    let is_too_much = ceilings.check(&device).is_err();
+    let device = if is_too_much { Device::unknown() } else { device };
+    let (patient, lost_patient) = patient.or(Patient::default());
+    let fault = (lost_device || lost_patient || is_too_much).then_some(Fault::StoredConfig);
+    // A patient for another device leaves, and a device that may not be leaves the default.
+    let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
+    let parts = [(device, Patient::nobody()), (Device::unknown(), Patient::default())];
+    let plan = fitting.or_else(|_| {
+        let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
+        plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())
+    });
+    match plan {
+        Ok(plan) => plan,
+        Err(()) => panic!("the default configuration is refused"),
+    }
+}
+
+/// Version of this crate.
+fn version() -> [u8; 3] {
+    let number = |text: &str| text.parse().unwrap_or(u8::MAX);
+    [
+        number(env!("CARGO_PKG_VERSION_MAJOR")),
+        number(env!("CARGO_PKG_VERSION_MINOR")),
+        number(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+/// The microcontroller's unique number.
+fn serial_number() -> [u8; 12] {
+    let uid = Uid::get();
+    let mut serial = [0; 12];
+    serial[0..2].copy_from_slice(&uid.x().to_le_bytes());
+    serial[2..4].copy_from_slice(&uid.y().to_le_bytes());
+    serial[4] = uid.waf_num();
+    let lot = uid.lot_num().as_bytes();
+    serial[5..].iter_mut().zip(lot).for_each(|(place, &byte)| *place = byte);
+    serial
+}
