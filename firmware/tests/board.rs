@@ -1,5 +1,6 @@
-//! The board itself: `cargo xtask board-test`, with a debug probe and a board beside it. Wire PA4 to PC2 and PE6, PE4 and PE5 to
-//! ground, plug CN5 into a PC, and leave the amplifier off.
+//! The board itself: `cargo xtask board-test [--board NAME]`, with a debug probe and a board beside it. Wire PA4 to PC2, the emergency
+//! stop, the amplifier's ready line and the strap of the current monitor to ground (PE4, PE5, PE6; on the NUCLEO-F429ZI PF14, PF15,
+//! PF12), plug the board's own USB connector (CN5; CN13) into a PC, and leave the amplifier off.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 #![allow(unexpected_cfgs, reason = "the macro of embedded-test asks for one of its own")]
 
@@ -75,7 +76,7 @@ mod tests {
             parts.drive.apply(DacWidth::Bits12, &output);
             (0..3).for_each(|_| a_tick(&parts));
             let Some(DacCode(back)) = parts.drive_lines.read().current else {
-                panic!("PE6 is not wired to ground")
+                panic!("the strap of the current monitor is not wired to ground")
             };
             parts.watchdog.feed_for_test();
             assert!(back.abs_diff(code) < 25, "code {code} came back as {back}");
@@ -85,12 +86,10 @@ mod tests {
 
     #[test]
     fn the_supply_is_high_enough_and_the_lines_are_closed(parts: Parts) {
-        assert!(
-            !parts.supply_level.is_low(),
-            "the supply is below 2.66 V: is the board powered by CN5 alone?"
-        );
+        assert!(!parts.supply_level.is_low(), "the supply is below 2.66 V: see Power in docs/hardware.md");
         let readings = parts.drive_lines.read();
-        assert!(!readings.stop_open && readings.ready && !readings.enable_line, "PE4, PE5 or PD7");
+        assert!(!readings.stop_open && readings.ready, "a line is not wired to ground");
+        assert!(!readings.enable_line, "the enable line is high");
     }
 
     /// Cycles of the control law by state, over an insertion and a withdrawal.
@@ -129,7 +128,7 @@ mod tests {
         assert!(parts.store.save_device(&device).is_ok(), "saved again");
     }
 
-    /// CN5 in a PC: configured within five seconds. Prints the longest look at the core, which masks the tick at worst.
+    /// In a PC: configured within five seconds. Prints the longest look at the core, which masks the tick at worst.
     #[test]
     #[timeout(10)]
     fn usb_enumerates(mut parts: Parts) {
@@ -143,7 +142,7 @@ mod tests {
             cortex_m::asm::delay(timing::CORE_HZ / 1_000);
         }
         defmt::println!("longest look at the USB core: {} cycles", longest);
-        assert!(is_configured, "no PC has configured the device: is CN5 plugged in?");
+        assert!(is_configured, "no PC has configured the device: is it plugged in?");
         assert!(longest < timing::OUTPUT_CYCLES, "it masks the tick beyond its latch");
     }
 }

@@ -6,6 +6,7 @@
 
 pub mod board;
 pub mod browser;
+pub mod follow;
 pub mod laws;
 pub mod mechanism;
 pub mod needle;

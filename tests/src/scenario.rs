@@ -1,7 +1,7 @@
 //! Hands on the needle: the paths that several tests move it along.
 
 use crate::board::plant::{self, Nanos, PlantSide};
-use crate::board::{Board, Wiring, firmware_path};
+use crate::board::{Board, Wiring, image_for};
 
 /// Counts of the encoder for a millimetre of needle, at the default configuration's 10 mm roller
 /// and 4,000 counts a turn, rounded down.
@@ -54,12 +54,12 @@ pub fn board(plant: impl PlantSide + 'static) -> Board {
     board_wired(Wiring::default(), plant)
 }
 
-/// The board with the flash image on it.
+/// The board of this wiring with its flash image on it.
 ///
 /// # Panics
 ///
 /// When there is no image.
 #[must_use]
 pub fn board_wired(wiring: Wiring, plant: impl PlantSide + 'static) -> Board {
-    Board::on(&firmware_path(), wiring, plant).unwrap_or_else(|why| panic!("{why}"))
+    Board::on(&image_for(&wiring.pins), wiring, plant).unwrap_or_else(|why| panic!("{why}"))
 }

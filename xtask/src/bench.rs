@@ -6,7 +6,7 @@
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
 use crate::shell::{self, Failure, cargo};
-use crate::{firmware, setup, test};
+use crate::{boards, firmware, setup, test};
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_EXTENSION;
 use std::fmt::Write as _;
@@ -141,7 +141,7 @@ fn example(package: &str, name: &str) -> Result<Values, Failure> {
 
 fn test_program(name: &str, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
     let mut run = cargo();
-    run.env("FIRMWARE_ELF", firmware::path());
+    run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
     run.args(["test", "--release", "--quiet", ANY_RUST, "-p", "tests", "--test", name, "--", "--nocapture"]);
     // A test that fails its bound has printed what it measured.
     let output = run
@@ -186,7 +186,7 @@ fn packages() -> Result<Values, Failure> {
 }
 
 fn image() -> Result<Values, Failure> {
-    let (_, bytes) = Elf::read(&firmware::build()?)?.flash_image()?;
+    let (_, bytes) = Elf::read(&firmware::build(boards::DEFAULT)?)?.flash_image()?;
     Ok(Values::from([("firmware_flash_bytes".into(), bytes.len().to_string())]))
 }
 

@@ -1,34 +1,38 @@
 //! `cargo xtask board-test`: the tests of `firmware/tests/board.rs` on a real board, or the plain word that they did not run.
 
-use crate::setup::{self, TARGET};
+use crate::boards::Board;
 use crate::shell::{self, Failure};
+use crate::{firmware, setup};
 use std::process::Command;
 
 /// Runs them where a debug probe is plugged in.
-pub(crate) fn run() -> Result<(), Failure> {
+pub(crate) fn run(board: &Board) -> Result<(), Failure> {
     if let Some(why) = missing() {
         println!("board-test: DID NOT RUN: {why}");
         println!(
-            "It needs an STM32F4DISCOVERY on a debug probe, wired as firmware/tests/board.rs says; see docs/hardware.md."
+            "It needs a board, {}, on a debug probe, wired as firmware/tests/board.rs says; see docs/hardware.md.",
+            board.title
         );
         return Ok(());
     }
-    // The runner in .cargo/config.toml is probe-rs, which flashes and resets for each test.
-    shell::run(&mut command(&["--", "--test-threads", "1"]))
+    // The runner, probe-rs, flashes and resets for each test; the one in .cargo/config.toml is for the default board.
+    let runner = format!("probe-rs run --chip {}", board.chip);
+    let mut tests = command(board, &["--", "--test-threads", "1"]);
+    shell::run(tests.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUNNER", runner))
 }
 
 /// Builds them: what no machine without the board can do more of.
-pub(crate) fn build() -> Result<(), Failure> {
-    shell::run(&mut command(&["--no-run"]))
+pub(crate) fn build(board: &Board) -> Result<(), Failure> {
+    shell::run(&mut command(board, &["--no-run"]))
 }
 
-fn command(last: &[&str]) -> Command {
+fn command(board: &Board, last: &[&str]) -> Command {
     let toolchain = setup::toolchain();
     let mut cargo = match toolchain {
         Ok(toolchain) => setup::cargo_for_board(toolchain, "test"),
         Err(_) => shell::cargo(),
     };
-    cargo.args(["-p", "firmware", "--test", "board", "--profile", "firmware", "--target", TARGET]).args(last);
+    cargo.args(firmware::arguments(board)).args(["--test", "board"]).args(last);
     cargo
 }
 

@@ -1,40 +1,45 @@
-//! Flashes the board: through its debug probe, or over USB with the bootloader that every STM32F407 has in ROM.
+//! Flashes a board: through its debug probe, or over USB with the bootloader that every STM32F407 has in ROM.
 
+use crate::boards::{self, Board};
 use crate::elf::Elf;
 use crate::shell::{self, Failure};
 use crate::{firmware, setup};
 use std::fs;
 use std::process::Command;
 
-const CHIP: &str = "STM32F407VGTx";
 /// The bootloader's numbers on USB.
 const BOOTLOADER: &str = "0483:df11";
 
-/// `cargo xtask flash [--dfu]`.
+/// `cargo xtask flash [--board NAME] [--dfu]`.
 pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
-    match arguments {
-        [] => by_probe(),
-        [flag] if flag == "--dfu" => by_usb(),
-        [other, ..] => {
-            Err(Failure::usage(format!("`{other}` is not understood; `cargo xtask flash` takes only --dfu")))
-        }
+    let (board, rest) = boards::chosen(arguments)?;
+    match &rest[..] {
+        [] => by_probe(board),
+        [flag] if flag == "--dfu" && board.has_dfu => by_usb(board),
+        [flag] if flag == "--dfu" => Err(Failure::usage(format!(
+            "the {} is flashed through the debug probe on it; leave --dfu out",
+            board.title
+        ))),
+        [other, ..] => Err(Failure::usage(format!(
+            "`{other}` is not understood; `cargo xtask flash` takes only --board NAME and --dfu"
+        ))),
     }
 }
 
-fn by_probe() -> Result<(), Failure> {
-    let image = firmware::build()?;
+fn by_probe(board: &Board) -> Result<(), Failure> {
+    let image = firmware::build(board)?;
     if !shell::is_on_path("probe-rs") {
         return Err(Failure::new(
             "flashing needs probe-rs, which is not on the PATH; install it with `cargo install probe-rs-tools --locked`, or \
              flash without a probe with `cargo xtask flash --dfu`",
         ));
     }
-    shell::run(Command::new("probe-rs").args(["download", "--chip", CHIP]).arg(&image))?;
-    shell::run(Command::new("probe-rs").args(["reset", "--chip", CHIP]))
+    shell::run(Command::new("probe-rs").args(["download", "--chip", board.chip]).arg(&image))?;
+    shell::run(Command::new("probe-rs").args(["reset", "--chip", board.chip]))
 }
 
-fn by_usb() -> Result<(), Failure> {
-    let elf = firmware::build()?;
+fn by_usb(board: &Board) -> Result<(), Failure> {
+    let elf = firmware::build(board)?;
     let (start, bytes) = Elf::read(&elf)?.flash_image()?;
     let image = elf.with_extension("bin");
     fs::write(&image, bytes)

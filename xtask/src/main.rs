@@ -5,6 +5,7 @@
 
 mod bench;
 mod board_test;
+mod boards;
 mod elf;
 mod firmware;
 mod flash;
@@ -17,6 +18,7 @@ mod stack;
 mod test;
 mod wasm;
 
+use boards::Board;
 use shell::Failure;
 use std::process::ExitCode;
 
@@ -27,6 +29,7 @@ The project's chores.
                                 fmt clippy doc unit firmware wasm site board browser clients parquet fuzz prove
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
+                                both, and board-test, take --board: discovery (default), nucleo-f429zi
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask class             a class over Zenoh: its tests, and thirty devices measured; builds for minutes
@@ -51,13 +54,13 @@ fn main() -> ExitCode {
         "prove" => prove(rest),
         _ if asks_for_help => help(),
         "test" => test::run(rest),
-        "firmware" => no_more(rest).and_then(|()| firmware::report(&firmware::build()?)),
+        "firmware" => for_board(rest, |board| firmware::report(board, &firmware::build(board)?)),
         "flash" => flash::run(rest),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
         "class" => no_more(rest).and_then(|()| test::class()),
         "foxglove" => no_more(rest).and_then(|()| test::foxglove()),
-        "board-test" => no_more(rest).and_then(|()| board_test::run()),
+        "board-test" => for_board(rest, board_test::run),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
         other => Err(Failure::usage(format!(
@@ -86,6 +89,13 @@ fn no_more(rest: &[String]) -> Result<(), Failure> {
             Err(Failure::usage(format!("`{extra}` is not understood here; see `cargo xtask help`")))
         }
     }
+}
+
+/// Does a chore that takes a board and nothing else.
+fn for_board(rest: &[String], chore: impl Fn(&Board) -> Result<(), Failure>) -> Result<(), Failure> {
+    let (board, rest) = boards::chosen(rest)?;
+    no_more(&rest)?;
+    chore(board)
 }
 
 fn prove(rest: &[String]) -> Result<(), Failure> {

@@ -16,7 +16,7 @@ use thumb::{Body, Code};
 /// What the core puts on the stack for an interrupt, floating-point registers and alignment included.
 const EXCEPTION_FRAME: u32 = 108;
 /// Entries of the vector table before the interrupts: stack pointer, reset, faults, SysTick.
-const VECTORS: usize = 98;
+const EXCEPTIONS: usize = 16;
 
 /// What the analysis found.
 pub(crate) struct Stack {
@@ -86,7 +86,9 @@ pub(crate) fn analyse(elf: &Elf) -> Result<Stack, Failure> {
     let taken = code.addresses_taken(&bodies);
     let graph = Graph::new(&bodies, &taken);
 
-    let vectors = code.vectors(VECTORS);
+    let interrupts =
+        symbols.iter().find(|symbol| symbol.name == "__INTERRUPTS").map_or(0, |table| table.size / 4);
+    let vectors = code.vectors(EXCEPTIONS + interrupts as usize);
     let reset = vectors.get(1).copied().unwrap_or_default();
     let by_default = place("DefaultHandler")? & !1;
     let handlers: BTreeSet<u32> = vectors

@@ -1,8 +1,9 @@
 //! `cargo xtask test`: everything that passes or fails, set-up included, each step also by its own name.
 
-use crate::setup::{self, TARGET};
+use crate::boards::{self, Board};
+use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
-use crate::{board_test, firmware, setup::Toolchain, site, wasm};
+use crate::{board_test, firmware, site, wasm};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -39,13 +40,13 @@ enum Ended {
 /// In the order that finds the most for the least time.
 const STEPS: [Step; 13] = [
     Step { name: "fmt", shows: "the sources are formatted", run: fmt },
-    Step { name: "firmware", shows: "the flash image builds, without warnings, and fits", run: image },
+    Step { name: "firmware", shows: "the boards' flash images build, without warnings, and fit", run: image },
     Step { name: "clippy", shows: "no warning from the compiler or clippy", run: clippy },
     Step { name: "doc", shows: "the documentation builds without warnings, its examples run", run: doc },
     Step { name: "unit", shows: "the crates' tests", run: unit },
     Step { name: "wasm", shows: "what the page computes is built from its sources", run: page_wasm },
     Step { name: "site", shows: "the device in a browser gives the same bits as host-sim's", run: same_bits },
-    Step { name: "board", shows: "the flash image on the emulated board", run: board },
+    Step { name: "board", shows: "the flash images on the emulated boards", run: board },
     Step { name: "browser", shows: "the page in a real browser", run: browser },
     Step {
         name: "clients",
@@ -59,7 +60,7 @@ const STEPS: [Step; 13] = [
 
 /// What this does not run, and why.
 const NEVER_HERE: [(&str, &str); 3] = [
-    ("hardware", "flashing and running on a real STM32F4DISCOVERY: needs the board and a person beside it"),
+    ("hardware", "flashing and running on a real board: needs one and a person beside it"),
     ("class", "devices and instructor over Zenoh, which builds for minutes: run `cargo xtask class`"),
     ("foxglove", "Foxglove's live stream, whose build takes minutes: run `cargo xtask foxglove`"),
 ];
@@ -170,28 +171,21 @@ fn unit(clock: &Clock) -> Result<Ended, Failure> {
     passed(clock.run(tests().args(CRATES)))
 }
 
-/// The image, and the same warnings for it as for everything else.
+/// The image of every board, and the same warnings for it as for everything else.
 fn image(clock: &Clock) -> Result<Ended, Failure> {
-    firmware::report(&firmware::build()?)?;
-    board_test::build()?;
+    passed(boards::ALL.iter().try_for_each(|board| image_of(board, clock)))
+}
+
+fn image_of(board: &Board, clock: &Clock) -> Result<(), Failure> {
+    firmware::report(board, &firmware::build(board)?)?;
+    board_test::build(board)?;
     let toolchain = setup::toolchain()?;
     if toolchain == Toolchain::Debian {
         // Debian's compiler comes without clippy; the host's clippy has seen all but the tasks.
-        return Ok(Ended::Passed);
+        return Ok(());
     }
-    passed(clock.run(setup::cargo_for_board(toolchain, "clippy").args([
-        "-p",
-        "firmware",
-        "--bin",
-        "firmware",
-        "--profile",
-        "firmware",
-        "--target",
-        TARGET,
-        "--",
-        "-D",
-        "warnings",
-    ])))
+    let mut clippy = setup::cargo_for_board(toolchain, "clippy");
+    clock.run(clippy.args(firmware::arguments(board)).args(["--bin", "firmware", "--", "-D", "warnings"]))
 }
 
 fn page_wasm(_: &Clock) -> Result<Ended, Failure> {
@@ -204,7 +198,11 @@ fn same_bits(_: &Clock) -> Result<Ended, Failure> {
 }
 
 fn board(clock: &Clock) -> Result<Ended, Failure> {
-    let image = firmware::build()?;
+    // The tests find the other boards' beside the default one's.
+    for board in &boards::ALL {
+        firmware::build(board)?;
+    }
+    let image = firmware::path(boards::DEFAULT);
     let names = test_programs()?.into_iter().filter(|name| !is_for_browser(name));
     passed(clock.run(tests().env("FIRMWARE_ELF", image).args(["-p", "tests", "--lib"]).args(each(names))))
 }

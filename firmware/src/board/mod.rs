@@ -7,5 +7,10 @@ mod discovery;
 #[cfg(feature = "discovery")]
 pub(crate) use discovery::Discovery as Wires;
 
+#[cfg(feature = "nucleo-f429zi")]
+mod nucleo_f429zi;
+#[cfg(feature = "nucleo-f429zi")]
+pub(crate) use nucleo_f429zi::NucleoF429zi as Wires;
+
 /// The board of this image.
 pub(crate) type Current = crate::chip::Stm32F4<Wires>;

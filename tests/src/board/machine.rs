@@ -1,7 +1,7 @@
-//! The STM32F4DISCOVERY for the emulator: the part, its crystal and rail, the chips and the cable.
+//! A board for the emulator: the part, its clock and rail, the chips and the cable.
 //!
-//! The emulator's part is the STM32F427, which has everything of the STM32F407 that the firmware
-//! uses at the same addresses, and more memory; the image is linked for the smaller part.
+//! The emulator's part is the STM32F427: the STM32F429 without its display controller, and it has everything of the STM32F407
+//! that the firmware uses at the same addresses, and more memory than that image is linked for.
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate, Wired};
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::peripherals::adc;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::{Error, Gate, Window};
@@ -21,48 +22,44 @@ use super::Wiring;
 use super::dac::Dac;
 use super::exti::{self, Exti};
 use super::flash::Flash;
+use super::pins::{PartPin, Pins};
 use super::processor::{DAC, EXTI, OTG, Probe, Probed};
 use super::tilt::Accelerometer;
 use super::usb_port::{self, UsbPort};
 
-/// The crystal and the rail of the board.
-const CRYSTAL_HZ: u64 = 8_000_000;
+/// The clock that every board brings, and its rail.
+pub(super) const CLOCK_HZ: u64 = 8_000_000;
 pub(super) const RAIL_MILLIVOLTS: u32 = 3_300;
 /// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
 /// count a time.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(INSTRUCTIONS_PER_SECOND).expect("not zero");
 const MCU: &str = "stm32f407";
-/// The strap that says that an analogue inclinometer is fitted: PB1.
-const STRAP: (usize, u8) = (1, 1);
-
-/// PE4, the emergency stop's loop, PE5, the amplifier's ready output, and PE6, the strap of its current monitor.
-pub(super) const DRIVE_LINES: (usize, [u8; 3]) = (4, [4, 5, 6]);
-
 /// The board.
 #[derive(Debug)]
 pub(super) struct Machine {
     pub(super) mcu: Wired<Wired<Wired<Stm32f427, UsbPort>, Dac>, Exti>,
     probe: Probe,
     pub(super) flash: Flash,
+    pins: Pins,
 }
 
 impl Machine {
     pub(super) fn new(wiring: &Wiring, probe: Probe, flash: Flash) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
-        part.rcc.attach_crystals(CRYSTAL_HZ, 0);
         part.set_supply(wiring.supply);
         for converter in &mut part.adc {
             converter.set_reference(RAIL_MILLIVOLTS);
+            if wiring.inclinometer {
+                let channel =
+                    adc::Channel::new(wiring.pins.inclinometer).expect("a converter has sixteen pins");
+                converter.set_input(channel, RAIL_MILLIVOLTS / 2);
+            }
         }
         if let Some(model) = wiring.tilt {
             let select = Select { port: "GPIOE", pin: pin(3), active: Level::Low };
             part.spi[0].attach_selected(Accelerometer::new(model), select);
         }
-        // Where no strap holds it up, the pin is charged all the same until a pull has emptied it.
-        part.drive_port(VirtualNanos(0), STRAP.0, |gpio, registers, context| {
-            gpio.drive(pin(STRAP.1), Some(Level::High), registers, context);
-        });
         let size = |bytes| NonZeroU64::new(bytes).expect("not zero");
         let usb = Window::new("USB", OTG.2, size(OTG.1))
             .gated(Gate::by("RCC", "AHB2ENR", "OTGFSEN"))
@@ -71,23 +68,36 @@ impl Machine {
         let exti = Window::new("EXTI line 16", EXTI.2, size(EXTI.1)).raising(&exti::INTERRUPTS);
         let with_usb = Wired::new(part, usb, UsbPort::default())?;
         let with_dac = Wired::new(with_usb, dac, Dac::default())?;
-        Ok(Self { mcu: Wired::new(with_dac, exti, Exti::default())?, probe, flash })
+        let mcu = Wired::new(with_dac, exti, Exti::default())?;
+        let mut machine = Self { mcu, probe, flash, pins: wiring.pins };
+        // Where no strap holds it up, the pin is charged all the same until a pull has emptied it.
+        if let Some(strap) = wiring.pins.strap {
+            machine.drive(0, strap, Some(Level::High));
+        }
+        Ok(machine)
+    }
+
+    /// Drives a pin from outside, or lets it go.
+    pub(super) fn drive(&mut self, at: u64, place: PartPin, level: Option<Level>) {
+        self.part().drive_port(VirtualNanos(at), place.port, |gpio, registers, context| {
+            gpio.drive(pin(place.index), level, registers, context);
+        });
     }
 
     pub(super) fn part(&mut self) -> &mut Stm32f427 {
         &mut self.mcu.part.part.part
     }
 
-    /// Shorts the amplifier's enable line to the supply, which the part then reads back, or takes the short away.
-    pub(super) fn short_enable(&mut self, shorted: bool) {
-        self.probe.tally().enable_shorted = shorted;
+    /// Shorts an output to the supply, which the part then reads back, or takes the short away.
+    pub(super) fn short(&mut self, place: PartPin, shorted: bool) {
+        self.probe.tally().shorted = shorted.then_some(place);
     }
 
     /// The charge on the strap's pin has gone.
     pub(super) fn release_strap(&mut self, at: u64) {
-        self.part().drive_port(VirtualNanos(at), STRAP.0, |gpio, registers, context| {
-            gpio.drive(pin(STRAP.1), None, registers, context);
-        });
+        if let Some(strap) = self.pins.strap {
+            self.drive(at, strap, None);
+        }
     }
 
     pub(super) fn usb(&mut self) -> &mut UsbPort {

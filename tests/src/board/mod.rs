@@ -1,5 +1,5 @@
-//! The emulated board: the flash image, unmodified, on an STM32F407 with a plant on its pins, an
-//! accelerometer on SPI and a USB host on its cable.
+//! The emulated board: a flash image, unmodified, on an STM32F4 with a plant on its pins, a tilt sensor and a USB host on its
+//! cable. Which board: [`pins`].
 //!
 //! Everything that knows the emulator stays in this module; a test sees pins, a shaft, a cable and
 //! virtual time. The clock is one instruction a cycle at 168 MHz: it proves order, rates and
@@ -12,12 +12,15 @@ mod exti;
 pub mod flash;
 mod machine;
 pub mod otg;
+pub mod pins;
 pub mod plant;
 pub mod processor;
 mod record;
 mod rtt;
 mod run;
+mod stopped;
 pub mod tilt;
+mod tracks;
 mod usb_port;
 pub mod wires;
 
@@ -35,10 +38,12 @@ pub use amplifier::Amplifier;
 pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
 pub use processor::{Effect, HandlerRun, Probe, Upset};
-pub use run::{EncoderRead, Log, Output, Stopped};
+pub use run::{EncoderRead, Log, Output};
+pub use stopped::Stopped;
 pub use usb_port::UsbPort;
 
 use machine::Machine;
+use pins::Pins;
 use run::{Done, Order, PAINT, World};
 
 /// A millisecond of virtual time.
@@ -60,6 +65,15 @@ impl Timer {
         self.base() + 0x24
     }
 
+    /// The alternate function that leads from a pin to it (data sheet, alternate function mapping).
+    fn function(self) -> u64 {
+        match self {
+            Self::General(0) | Self::Advanced(0) => 1,
+            Self::General(_) => 2,
+            Self::Advanced(_) => 3,
+        }
+    }
+
     /// The address of its first register.
     fn base(self) -> u64 {
         match self {
@@ -78,7 +92,7 @@ pub enum SetValue {
     Lines,
 }
 
-/// What is soldered to the part. The default is what the firmware is written for.
+/// What is connected to the part. The default is the Discovery, with what is on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Wiring {
     /// The timer the encoder's tracks go to.
@@ -86,13 +100,13 @@ pub struct Wiring {
     /// The timer whose update is the tick, with the rate it counts at in hertz; without one no
     /// latency is measured.
     pub tick: Option<(Timer, u64)>,
-    /// The amplifier's enable line: port (0 is A), pin, and the level that enables.
-    pub enable: (usize, u8, bool),
+    /// Which pin goes where.
+    pub pins: Pins,
     /// Where the motor's set value comes from.
     pub set_value: SetValue,
     /// The accelerometer, if any.
     pub tilt: Option<tilt::Model>,
-    /// Whether the strap for an analogue inclinometer is there; its voltage is [`Stopped::set_analogue`].
+    /// Whether an analogue inclinometer is there, level until [`Stopped::set_analogue`] says otherwise, and its strap with it.
     pub inclinometer: bool,
     /// Whether the motor's current is measured.
     pub current_monitor: bool,
@@ -109,7 +123,7 @@ impl Default for Wiring {
         Self {
             encoder: Timer::General(0),
             tick: Some((Timer::General(2), 84_000_000)),
-            enable: (3, 7, true),
+            pins: pins::DISCOVERY,
             set_value: SetValue::OnChip,
             tilt: Some(tilt::Model::Lis3dsh),
             inclinometer: false,
@@ -118,6 +132,14 @@ impl Default for Wiring {
             plant_period: 20_000,
             commissioned: true,
         }
+    }
+}
+
+impl Wiring {
+    /// The NUCLEO-F429ZI, with the inclinometer that it needs.
+    #[must_use]
+    pub fn nucleo_f429zi() -> Self {
+        Self { pins: pins::NUCLEO_F429ZI, tilt: None, inclinometer: true, ..Self::default() }
     }
 }
 
@@ -139,6 +161,13 @@ pub fn firmware_path() -> PathBuf {
     const DEFAULT: &str = "target/thumbv7em-none-eabihf/firmware/firmware";
     std::env::var_os("FIRMWARE_ELF")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(DEFAULT), PathBuf::from)
+}
+
+/// Where the image for a board is: beside the default board's.
+#[must_use]
+pub fn image_for(pins: &Pins) -> PathBuf {
+    let default = firmware_path();
+    if *pins == pins::DISCOVERY { default } else { default.with_file_name(pins.image) }
 }
 
 /// Whether two addresses are in one memory of the part, the second as an end.

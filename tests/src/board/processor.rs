@@ -15,6 +15,7 @@ use rigless::time::VirtualNanos;
 
 use super::flash::{Flash, WRITABLE};
 use super::machine::INSTRUCTIONS_PER_SECOND;
+use super::pins::{PartPin, register};
 
 /// Where the manual puts the USB core, how much of it there is, and where its window is.
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
@@ -34,9 +35,6 @@ fn window(address: u64) -> u64 {
 
 /// The number the architecture gives external interrupt 0.
 pub const FIRST_EXTERNAL: u32 = 16;
-/// Where the part reads its enable line back.
-const GPIOD_IDR: u64 = 0x4002_0C10;
-const ENABLE_PIN: u32 = 7;
 const REGISTER_PC: usize = 15;
 const REGISTER_XPSR: usize = 16;
 
@@ -88,8 +86,8 @@ pub struct Tally {
     /// The most instructions between the two, and where they began.
     pub longest_masked: (u64, u32),
     masked_at: u32,
-    /// Whether the amplifier's enable line is shorted to the supply.
-    pub(super) enable_shorted: bool,
+    /// The output that is shorted to the supply, which the part reads back.
+    pub(super) shorted: Option<PartPin>,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -262,15 +260,9 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let enable_shorted = self.probe.tally().enable_shorted;
-        let mut bus = Rerouted {
-            bus,
-            flash: &flash,
-            stalled: self.stalled,
-            standstill: 0,
-            enable_shorted,
-            stepping: false,
-        };
+        let shorted = self.probe.tally().shorted;
+        let mut bus =
+            Rerouted { bus, flash: &flash, stalled: self.stalled, standstill: 0, shorted, stepping: false };
         self.settle_breakpoint();
         let watched = {
             let tally = self.probe.tally();
@@ -381,7 +373,7 @@ struct Rerouted<'a> {
     stalled: u64,
     /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
     standstill: u64,
-    enable_shorted: bool,
+    shorted: Option<PartPin>,
     /// Whether the core is looked at after every instruction.
     stepping: bool,
 }
@@ -410,8 +402,8 @@ impl CoreBus for Rerouted<'_> {
             access.virtual_time = self.bus.time(access.instruction_count);
         }
         let value = self.bus.access(access, from_code)?;
-        let is_enable = !written && access.address == GPIOD_IDR && self.enable_shorted;
-        Some(if is_enable { value | 1 << ENABLE_PIN } else { value })
+        let high = self.shorted.filter(|place| !written && access.address == place.register(register::INPUT));
+        Some(high.map_or(value, |place| value | 1 << place.index))
     }
 
     fn time(&self, instructions: u64) -> VirtualNanos {

@@ -4,19 +4,18 @@ use std::sync::mpsc::{Receiver, Sender};
 
 use rigless::device::Level;
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Stop};
-use rigless::session::{Reset, Session};
+use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::peripherals::adc;
-use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::time::VirtualNanos;
 
 use super::amplifier::Amplifier;
-use super::machine::{DRIVE_LINES, Machine, RAIL_MILLIVOLTS, pin};
-use super::plant::{Drive, Encoder, Nanos, PlantSide};
+use super::machine::{CLOCK_HZ, Machine, RAIL_MILLIVOLTS, pin};
+use super::pins::{Clock, register};
+use super::plant::{Drive, Nanos, PlantSide};
 use super::processor::DAC;
-use super::tilt::Accelerometer;
-use super::usb_port::UsbPort;
-use super::wires::Wires;
+use super::stopped::Stopped;
+use super::tracks::{PULL_SETTLES, Tracks};
 use super::{SetValue, Timer, Wiring, rtt};
 
 /// A code on its way to the motor.
@@ -75,140 +74,6 @@ pub(super) enum Order {
 /// What the emulator's thread answers once the order is done.
 pub(super) struct Done;
 
-/// The board between two instructions.
-pub struct Stopped<'a> {
-    /// Now.
-    pub at: Nanos,
-    pub(super) instruction: u64,
-    pub(super) world: &'a mut World,
-    pub(super) session: &'a mut Session<Machine>,
-    pub(super) host: &'a mut dyn Host,
-}
-
-impl Stopped<'_> {
-    /// The USB core and the host on its cable.
-    pub fn usb(&mut self) -> &mut UsbPort {
-        self.session.board_mut().usb()
-    }
-
-    /// The accelerometer, where the board has one.
-    pub fn tilt(&mut self) -> Option<&mut Accelerometer> {
-        self.session.board_mut().part().spi[0].chip_mut::<Accelerometer>(0)
-    }
-
-    /// Opens or closes the emergency stop's loop.
-    pub fn set_emergency_stop(&mut self, open: bool) {
-        self.drive_line(0, open);
-    }
-
-    /// Has the amplifier say that it is ready or not.
-    pub fn set_amplifier_ready(&mut self, ready: bool) {
-        self.drive_line(1, !ready);
-    }
-
-    fn drive_line(&mut self, line: usize, open: bool) {
-        self.world.closed[line] = !open;
-        self.world.drive_lines(self.session, self.at);
-    }
-
-    /// Changes what is wrong with the amplifier.
-    pub fn set_amplifier(&mut self, amplifier: Amplifier) {
-        self.world.amplifier = amplifier;
-        self.session.board_mut().short_enable(amplifier == Amplifier::LineHigh);
-        self.world.watch_enable(self.session, self.at);
-    }
-
-    /// Changes what becomes of the encoder's wires, from now on.
-    pub fn set_wires(&mut self, wires: Wires) {
-        self.world.wires = wires;
-        let levels = self.world.encoder.levels();
-        self.world.drive_encoder(self.session, self.at, levels);
-    }
-
-    /// The plant, to be exchanged.
-    pub fn set_plant(&mut self, plant: Box<dyn PlantSide>) {
-        self.world.plant = plant;
-    }
-
-    /// The logs so far; a test may empty them.
-    pub fn log(&mut self) -> &mut Log {
-        &mut self.world.log
-    }
-
-    /// What drives the plant.
-    #[must_use]
-    pub fn drive(&self) -> Drive {
-        Drive { code: self.world.code, enabled: self.world.enabled }
-    }
-
-    /// Every restart of the part, with its cause.
-    #[must_use]
-    pub fn resets(&self) -> Vec<Reset> {
-        self.session.resets().to_vec()
-    }
-
-    /// Sets the part's supply, which its voltage detector watches.
-    pub fn set_supply(&mut self, millivolts: u32) {
-        use rigless::mcu::Operate;
-        const PWR_CSR: u64 = 0x4000_7004;
-        const PVDO: u64 = 1 << 2;
-        let machine = self.session.board_mut();
-        machine.part().set_supply(millivolts);
-        let status = machine.mcu.peek(VirtualNanos(self.at), PWR_CSR, Width::W32).unwrap_or(0);
-        machine.exti().drive_detector(status & PVDO != 0);
-    }
-
-    /// Pulls the reset pin low for a moment, as a supply supervisor does in a dip.
-    pub fn reset_by_pin(&mut self) {
-        self.session.reset_by_pin(VirtualNanos(self.at), self.instruction, self.host);
-    }
-
-    /// Puts `millivolts` on channel `channel` of every converter.
-    pub fn set_analogue(&mut self, channel: u8, millivolts: u32) {
-        let channel = adc::Channel::new(channel).expect("a converter has sixteen pins");
-        for converter in &mut self.session.board_mut().part().adc {
-            converter.set_input(channel, millivolts);
-        }
-    }
-
-    /// The word at `address` of the firmware's memory.
-    #[must_use]
-    pub fn word(&mut self, address: u64) -> Option<u32> {
-        self.host.read(address, Width::W32).ok().map(|word| word as u32)
-    }
-
-    /// The register at `address`, without the effects that a read by the firmware may have.
-    #[must_use]
-    pub fn register(&mut self, address: u64) -> Option<u32> {
-        use rigless::mcu::Operate;
-        let at = VirtualNanos(self.at);
-        self.session.board_mut().mcu.peek(at, address, Width::W32).ok().map(|word| word as u32)
-    }
-
-    /// Overwrites the word at `address` of the firmware's RAM, as a stray write or an upset would.
-    pub fn set_word(&mut self, address: u64, value: u32) -> bool {
-        self.host.write(address, Width::W32, value.into()).is_ok()
-    }
-
-    /// What the firmware did that the manual does not describe.
-    #[must_use]
-    pub fn violations(&self) -> Vec<String> {
-        let machine = self.session.board();
-        let flash = machine.flash.array().violations.clone();
-        let dac = machine.dac().violations().iter().cloned();
-        dac.chain(flash).chain(self.world.violations.iter().cloned()).collect()
-    }
-
-    /// Accesses that no register answered, and accesses refused because a clock was off: each with
-    /// the program counter of the first.
-    #[must_use]
-    pub fn stray_accesses(&self) -> Vec<String> {
-        let mut all: Vec<String> = self.session.unmapped().iter().map(ToString::to_string).collect();
-        all.extend(self.session.refused().iter().map(|(at, fault)| format!("{at:#010x}: {fault}")));
-        all
-    }
-}
-
 /// What surrounds the part.
 pub(super) struct World {
     pub(super) wiring: Wiring,
@@ -216,43 +81,24 @@ pub(super) struct World {
     pub(super) plant: Box<dyn PlantSide>,
     pub(super) orders: Receiver<Order>,
     pub(super) done: Sender<Done>,
-    encoder: Encoder,
+    pub(super) tracks: Tracks,
     next_step: Nanos,
     next_drain: Nanos,
     target: Nanos,
-    enabled: bool,
-    code: Option<u16>,
+    pub(super) enabled: bool,
+    pub(super) code: Option<u16>,
     latch_at: Option<Nanos>,
     /// When the charge on the strap's pin has gone, which its pull-down takes away.
     strap_settles: Option<Nanos>,
-    amplifier: Amplifier,
+    pub(super) amplifier: Amplifier,
     /// Which of the drive's lines are connected to ground.
-    closed: [bool; 3],
+    pub(super) closed: [bool; 3],
     /// What the firmware did that a data sheet forbids.
-    violations: Vec<String>,
-    wires: Wires,
-    /// While a glitch is on the encoder's pins: until when.
-    glitch_ends: Option<Nanos>,
-    /// The charge that a pin without a wire still keeps, and until when.
-    floating: [Option<bool>; 2],
-    floating_until: Option<Nanos>,
-    /// Where pins without a wire have been pulled to.
-    settled: [bool; 2],
+    pub(super) violations: Vec<String>,
     busy: bool,
     painted: bool,
-    log: Log,
+    pub(super) log: Log,
 }
-
-/// The port and the pins of the encoder's tracks A and B: PA15 and PA1.
-const TRACK_PINS: (usize, [u8; 2]) = (0, [15, 1]);
-/// `GPIOA_PUPDR`.
-const TRACK_PULLS: u64 = 0x4002_000C;
-
-/// How long a pull of 40 kΩ (data sheet DS8626, I/O static characteristics) takes to empty a pin with a wire on it: 100 pF
-/// through the level at which the input changes, with a margin.
-const STRAP_SETTLES: Nanos = 10_000;
-/// The strap's pull: `GPIOB_PUPDR`, pin 1, and its pull-down.
-const STRAP_PULL: (u64, u32, u64) = (0x4002_040C, 2, 0b10);
 
 /// How often the RTT terminal is emptied.
 const DRAIN_EVERY: Nanos = 1_000_000;
@@ -273,7 +119,7 @@ impl World {
             plant,
             orders,
             done,
-            encoder: Encoder::new(),
+            tracks: Tracks::new(&wiring),
             next_step: 0,
             next_drain: 0,
             target: 0,
@@ -284,11 +130,6 @@ impl World {
             amplifier: Amplifier::default(),
             closed: [true, true, wiring.current_monitor],
             violations: Vec::new(),
-            wires: Wires::default(),
-            glitch_ends: None,
-            floating: [None; 2],
-            floating_until: None,
-            settled: [true; 2],
             busy: false,
             painted: false,
             log: Log::default(),
@@ -296,64 +137,11 @@ impl World {
     }
 
     /// Connects the drive's lines to ground or lets them go.
-    fn drive_lines(&self, session: &mut Session<Machine>, at: Nanos) {
-        for (index, closed) in DRIVE_LINES.1.into_iter().zip(self.closed) {
+    pub(super) fn drive_lines(&self, session: &mut Session<Machine>, at: Nanos) {
+        for (place, closed) in self.wiring.pins.drive_lines.into_iter().zip(self.closed) {
             let level = closed.then_some(Level::Low);
-            let part = session.board_mut().part();
-            part.drive_port(VirtualNanos(at), DRIVE_LINES.0, |gpio, registers, context| {
-                gpio.drive(pin(index), level, registers, context);
-            });
+            session.board_mut().drive(at, place, level);
         }
-    }
-
-    /// Puts the tracks' levels on the pins, as the wires bring them, and the pins' levels on the timer.
-    fn drive_encoder(&mut self, session: &mut Session<Machine>, at: Nanos, levels: (bool, bool)) {
-        let (at, part) = (VirtualNanos(at), session.board_mut().part());
-        let drive = self.wires.drive(levels, self.glitch_ends.is_some());
-        for (channel, level, held, index) in [
-            (1, drive[0], self.floating[0], TRACK_PINS.1[0]),
-            (2, drive[1], self.floating[1], TRACK_PINS.1[1]),
-        ] {
-            let channel = Channel::new(channel).expect("a channel");
-            // A pin without a wire keeps its charge until its pull has taken it away.
-            let driven = level.or(held).map(Level::from);
-            part.drive_port(at, TRACK_PINS.0, |gpio, registers, context| {
-                gpio.drive(pin(index), driven, registers, context);
-            });
-            let level = driven.unwrap_or_else(|| {
-                let (gpio, registers) = part.port(TRACK_PINS.0);
-                gpio.level(pin(index), registers)
-            });
-            match self.wiring.encoder {
-                Timer::Advanced(n) => part
-                    .drive_advanced_timer(at, n, |tim, regs, ctx| tim.drive_input(channel, level, regs, ctx)),
-                Timer::General(n) => {
-                    part.drive_timer(at, n, |tim, regs, ctx| tim.drive_input(channel, level, regs, ctx));
-                }
-            }
-        }
-    }
-
-    /// The pulls of the encoder's pins have changed: what floats follows in a while.
-    fn hold_floating(&mut self, session: &mut Session<Machine>, at: Nanos) {
-        let drive = self.wires.drive(self.encoder.levels(), false);
-        if drive.iter().all(Option::is_some) {
-            return;
-        }
-        for (track, level) in drive.into_iter().enumerate() {
-            self.floating[track] = level.is_none().then_some(self.settled[track]);
-        }
-        self.floating_until = Some(at + STRAP_SETTLES);
-        self.drive_encoder(session, at, self.encoder.levels());
-        self.pause(session);
-    }
-
-    /// What floats has gone where it is pulled.
-    fn settle_floating(&mut self, session: &mut Session<Machine>, at: Nanos) {
-        (self.floating_until, self.floating) = (None, [None; 2]);
-        self.drive_encoder(session, at, self.encoder.levels());
-        let (gpio, registers) = session.board_mut().part().port(TRACK_PINS.0);
-        self.settled = TRACK_PINS.1.map(|index| gpio.level(pin(index), registers) == Level::High);
     }
 
     fn paint_stack(&mut self, host: &mut dyn Host) {
@@ -368,35 +156,25 @@ impl World {
     /// The next instant the world itself needs.
     fn due(&self) -> Nanos {
         let next = self.next_step.min(self.next_drain).min(self.target);
-        let next = self.glitch_ends.map_or(next, |ends| next.min(ends));
-        self.encoder.due().map_or(next, |edge| next.min(edge))
+        self.tracks.due().map_or(next, |due| next.min(due))
     }
 
     /// Does everything due at `at`.
     fn step(&mut self, session: &mut Session<Machine>, host: &mut dyn Host, at: Nanos) {
-        while self.encoder.due().is_some_and(|due| due <= at) {
-            let levels = self.encoder.edge();
-            self.drive_encoder(session, at, levels);
-        }
-        if self.glitch_ends.is_some_and(|ends| ends <= at) {
-            self.glitch_ends = None;
-            self.drive_encoder(session, at, self.encoder.levels());
-        }
+        self.tracks.step(session, at);
         if self.next_step <= at {
-            if let Some(width) = self.wires.glitches {
-                self.glitch_ends = Some(at + width);
-                self.drive_encoder(session, at, self.encoder.levels());
-            }
+            self.tracks.glitch(session, at);
             self.next_step = at + self.wiring.plant_period;
             let asked = Drive { code: self.code, enabled: self.enabled };
             let drive = self.amplifier.drive(asked);
             if self.wiring.current_monitor {
                 let millivolts = self.amplifier.monitor(asked, RAIL_MILLIVOLTS);
-                let channel = adc::Channel::new(MONITOR_CHANNEL).expect("a converter has sixteen pins");
+                let channel =
+                    adc::Channel::new(self.wiring.pins.monitor).expect("a converter has sixteen pins");
                 session.board_mut().part().adc[1].set_input(channel, millivolts);
             }
             let angle = self.plant.step(at, drive);
-            self.encoder.aim(at, angle, self.wiring.plant_period);
+            self.tracks.encoder.aim(at, angle, self.wiring.plant_period);
         }
         if self.next_drain <= at {
             self.next_drain = at + DRAIN_EVERY;
@@ -406,11 +184,11 @@ impl World {
         }
     }
 
-    fn watch_enable(&mut self, session: &mut Session<Machine>, at: Nanos) {
-        let (port, index, active) = self.wiring.enable;
-        let (gpio, registers) = session.board_mut().part().port(port);
+    pub(super) fn watch_enable(&mut self, session: &mut Session<Machine>, at: Nanos) {
+        let place = self.wiring.pins.enable;
+        let (gpio, registers) = session.board_mut().part().port(place.port);
         // The external pull-down holds the line while the pin doesn't drive it.
-        let level = gpio.level(pin(index), registers) == Level::from(active);
+        let level = gpio.level(pin(place.index), registers) == Level::High;
         let level = self.amplifier.line(level);
         if level != self.enabled {
             self.enabled = level;
@@ -486,8 +264,9 @@ const MMS_COMPARE_1: u64 = 0b100;
 const ADC_CR2: u64 = 0x4001_2008;
 const ADC2_CR2: u64 = 0x4001_2108;
 const ADC_CCR: u64 = 0x4001_2304;
-/// PC2 on the second one: the amplifier's current monitor.
-const MONITOR_CHANNEL: u8 = 12;
+const RCC_CR: u64 = 0x4002_3800;
+const HSEON: u64 = 1 << 16;
+const HSEBYP: u64 = 1 << 18;
 const RCC_AHB2RSTR: u64 = 0x4002_3814;
 const OTGFSRST: u64 = 1 << 7;
 
@@ -507,24 +286,19 @@ impl Driver<Machine> for World {
                         self.latch_at = self.trigger_due(session, at);
                         self.pause(session);
                     }
-                    address
-                        if write
-                            && address == STRAP_PULL.0
-                            && !self.wiring.inclinometer
-                            && (value >> STRAP_PULL.1) & 0b11 == STRAP_PULL.2 =>
-                    {
-                        self.strap_settles = Some(at + STRAP_SETTLES);
-                        self.pause(session);
-                    }
-                    TRACK_PULLS if write => self.hold_floating(session, at),
                     GPIO_FIRST..=GPIO_LAST if write => {
+                        let address = access.address;
+                        self.watch_strap(at, address, value);
+                        self.tracks.register_written(session, at, address);
                         self.watch_enable(session, at);
                         self.watch_output(session, at);
+                        self.pause(session);
                     }
                     address if !write && address == self.wiring.encoder.count_address() => {
                         self.log.encoder.push(EncoderRead { at, value: value as u32 });
                     }
                     ADC_CR2 | ADC2_CR2 if write && value & 1 != 0 => self.watch_converter(session, at),
+                    RCC_CR if write && value & HSEON != 0 => self.start_clock(session, value),
                     RCC_AHB2RSTR if write && value & OTGFSRST != 0 => {
                         session.board_mut().usb().core = super::otg::Core::default();
                     }
@@ -534,7 +308,7 @@ impl Driver<Machine> for World {
             Settled::Stop(stop) => {
                 if !self.painted {
                     self.paint_stack(host);
-                    self.drive_encoder(session, stop.at.0, self.encoder.levels());
+                    self.tracks.drive(session, stop.at.0);
                     self.drive_lines(session, stop.at.0);
                 }
                 if self.latch_at.is_some_and(|due| due <= stop.at.0) {
@@ -546,9 +320,7 @@ impl Driver<Machine> for World {
                     self.strap_settles = None;
                     session.board_mut().release_strap(stop.at.0);
                 }
-                if self.floating_until.is_some_and(|due| due <= stop.at.0) {
-                    self.settle_floating(session, stop.at.0);
-                }
+                self.tracks.settle(session, stop.at.0);
                 self.pause(session);
                 let resets = session.resets();
                 if resets.last().is_some_and(|reset| reset.at == stop.at) {
@@ -601,9 +373,26 @@ impl World {
         }
     }
 
+    /// The oscillator is switched on: it swings only where it is what the board's clock needs (RM0090 7.2.1). One that does not gives
+    /// the PLL nothing.
+    fn start_clock(&self, session: &mut Session<Machine>, control: u64) {
+        let is_bypassed = control & HSEBYP != 0;
+        let fits = is_bypassed == (self.wiring.pins.clock == Clock::Elsewhere);
+        session.board_mut().part().rcc.attach_crystals(if fits { CLOCK_HZ } else { 0 }, 0);
+    }
+
+    /// Where no strap is, its pin's pull-down begins to take the charge away.
+    fn watch_strap(&mut self, at: Nanos, address: u64, value: u64) {
+        const PULL_DOWN: u64 = 0b10;
+        let Some(strap) = self.wiring.pins.strap.filter(|_| !self.wiring.inclinometer) else { return };
+        if address == strap.register(register::PULLS) && value >> (2 * strap.index) & 0b11 == PULL_DOWN {
+            self.strap_settles = Some(at + PULL_SETTLES);
+        }
+    }
+
     /// Stops the core at the next instant that a register has set.
     fn pause(&self, session: &mut Session<Machine>) {
-        let due = self.latch_at.into_iter().chain(self.strap_settles).chain(self.floating_until).min();
+        let due = self.latch_at.into_iter().chain(self.strap_settles).chain(self.tracks.floating_until).min();
         session.pause_at(due.map(VirtualNanos));
     }
 
@@ -612,8 +401,7 @@ impl World {
         self.watch_enable(session, at);
         self.watch_output(session, at);
         self.latch_at = None;
-        let levels = self.encoder.levels();
-        self.drive_encoder(session, at, levels);
+        self.tracks.restarted(session, at);
         self.drive_lines(session, at);
     }
 }

@@ -1,0 +1,86 @@
+//! Which pin of the part goes where: one value for each board that there is an image for, read from its manual and from
+//! `docs/hardware.md`, not from the firmware.
+
+/// A pin of the part: its port, 0 for A, and its number in the port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PartPin {
+    /// The port.
+    pub port: usize,
+    /// The number.
+    pub index: u8,
+}
+
+/// Registers of a port, by their offsets (RM0090 8.4.11).
+pub(super) mod register {
+    pub(in super::super) const MODE: u64 = 0x00;
+    pub(in super::super) const PULLS: u64 = 0x0C;
+    pub(in super::super) const INPUT: u64 = 0x10;
+    pub(in super::super) const FUNCTION_LOW: u64 = 0x20;
+    pub(in super::super) const FUNCTION_HIGH: u64 = 0x24;
+}
+
+impl PartPin {
+    /// The pin by its name in the manuals.
+    const fn new(port: char, index: u8) -> Self {
+        Self { port: port as usize - 'A' as usize, index }
+    }
+
+    /// The address of a register of its port.
+    pub(super) fn register(self, offset: u64) -> u64 {
+        0x4002_0000 + 0x400 * self.port as u64 + offset
+    }
+}
+
+/// What is on the part's clock input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    /// A crystal, which needs the oscillator (RM0090 7.2.1: `HSEBYP` clear).
+    Crystal,
+    /// A clock from elsewhere, which needs the oscillator bypassed (`HSEBYP` set).
+    Elsewhere,
+}
+
+/// A board's pins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pins {
+    /// The name of the board's image in cargo's folder.
+    pub image: &'static str,
+    /// 8 MHz, and from where.
+    pub clock: Clock,
+    /// The amplifier's enable line, high is on.
+    pub enable: PartPin,
+    /// Tracks A and B of the encoder.
+    pub tracks: [PartPin; 2],
+    /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to ground.
+    pub drive_lines: [PartPin; 3],
+    /// The strap that says that an analogue inclinometer is fitted, where it is a matter of choice.
+    pub strap: Option<PartPin>,
+    /// The inclinometer's channel of the converters.
+    pub inclinometer: u8,
+    /// The current monitor's channel of the second converter.
+    pub monitor: u8,
+}
+
+/// STM32F4DISCOVERY.
+pub const DISCOVERY: Pins = Pins {
+    image: "firmware",
+    clock: Clock::Crystal,
+    enable: PartPin::new('D', 7),
+    tracks: [PartPin::new('A', 15), PartPin::new('A', 1)],
+    drive_lines: [PartPin::new('E', 4), PartPin::new('E', 5), PartPin::new('E', 6)],
+    strap: Some(PartPin::new('B', 1)),
+    inclinometer: 11,
+    monitor: 12,
+};
+
+/// NUCLEO-F429ZI.
+pub const NUCLEO_F429ZI: Pins = Pins {
+    image: "nucleo-f429zi",
+    clock: Clock::Elsewhere,
+    enable: PartPin::new('F', 13),
+    tracks: [PartPin::new('A', 5), PartPin::new('B', 3)],
+    drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],
+    strap: None,
+    inclinometer: 10,
+    monitor: 12,
+};
