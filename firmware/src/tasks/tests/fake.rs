@@ -1,0 +1,281 @@
+//! A board made of memory, and the tasks' ends on it.
+
+use super::super::queues::{Queues, SmallOrder, TelemetryEnds, TickEnds, UsbEnds};
+use super::super::shared::Shared;
+use super::super::tick::Tick;
+use crate::drive::{Drive, MotorDac};
+use crate::lines::{Pull, PulledLines};
+use crate::monitor::Readings;
+use crate::port::{self, Board, WouldBlock};
+use crate::reset::LastWords;
+use crate::store::{ConfigFlash, Slot, StoreError};
+use crate::tilt::{Reading, TiltSource};
+use crate::timing;
+use control_core::config::DacWidth;
+use control_core::units::{Counts, DacCode};
+use control_core::{Device, Patient, Plan};
+use core::cell::{Cell, RefCell};
+use core::convert::Infallible;
+use core::sync::atomic::Ordering::Relaxed;
+use embedded_hal::digital::{ErrorType, OutputPin};
+use link::device::Waiting;
+use std::boxed::Box;
+use std::collections::VecDeque;
+use std::thread_local;
+use std::vec::Vec;
+
+/// What a test sets and sees of the board; each test has a thread, and so a board, of its own.
+#[derive(Default)]
+pub(super) struct World {
+    pub(super) cycles: Cell<u32>,
+    pub(super) since_edge: Cell<u32>,
+    pub(super) edge_waits: Cell<bool>,
+    pub(super) count: Cell<i32>,
+    pub(super) codes: RefCell<Vec<u16>>,
+    pub(super) enabled: Cell<bool>,
+    pub(super) readings: Cell<Readings>,
+    pub(super) supply_low: Cell<bool>,
+    pub(super) wire_off: Cell<bool>,
+    pub(super) fed: Cell<u32>,
+    pub(super) stops_on_debug: Cell<bool>,
+    pub(super) tilt: Cell<Option<Reading>>,
+    pub(super) woken: Cell<[u32; 3]>,
+    pub(super) usb_allowed: Cell<bool>,
+    pub(super) configured: Cell<bool>,
+    pub(super) open: Cell<bool>,
+    pub(super) incoming: RefCell<VecDeque<Vec<u8>>>,
+    pub(super) outgoing: RefCell<Vec<Vec<u8>>>,
+    pub(super) room: Cell<usize>,
+    pub(super) flash_fails: Cell<bool>,
+}
+
+thread_local! {
+    static WORLD: &'static World = Box::leak(Box::default());
+}
+
+pub(super) fn world() -> &'static World {
+    WORLD.with(|world| *world)
+}
+
+pub(super) struct Fake;
+pub(super) struct Part;
+
+impl Board for Fake {
+    type Timer = Part;
+    type Encoder = Part;
+    type Dac12 = Part;
+    type Dac8 = Eight;
+    type Enable = Part;
+    type EncoderLines = Lines;
+    type DriveLines = Part;
+    type Supply = Part;
+    type Watchdog = Part;
+    type Tilt = Part;
+    type Serial = Part;
+    type Flash = Words;
+
+    fn cycles() -> u32 {
+        world().cycles.get()
+    }
+
+    fn wake_usb() {
+        wake(0);
+    }
+
+    fn wake_telemetry() {
+        wake(1);
+    }
+
+    fn wake_tilt() {
+        wake(2);
+    }
+
+    fn allow_usb(allowed: bool) {
+        world().usb_allowed.set(allowed);
+    }
+}
+
+fn wake(task: usize) {
+    let mut woken = world().woken.get();
+    woken[task] += 1;
+    world().woken.set(woken);
+}
+
+impl port::TickTimer for Part {
+    fn acknowledge(&self) {
+        world().edge_waits.set(false);
+    }
+
+    fn edge_waits(&self) -> bool {
+        world().edge_waits.get()
+    }
+
+    fn cycles_since_edge(&self) -> u32 {
+        world().since_edge.get()
+    }
+}
+
+impl port::Encoder for Part {
+    fn count(&self) -> Counts {
+        Counts(world().count.get())
+    }
+}
+
+impl MotorDac for Part {
+    const WIDTH: DacWidth = DacWidth::Bits12;
+
+    fn put(&mut self, code: DacCode) {
+        world().codes.borrow_mut().push(code.0);
+    }
+}
+
+pub(super) struct Eight;
+
+impl MotorDac for Eight {
+    const WIDTH: DacWidth = DacWidth::Bits8;
+
+    fn put(&mut self, _code: DacCode) {}
+}
+
+impl ErrorType for Part {
+    type Error = Infallible;
+}
+
+impl OutputPin for Part {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        world().enabled.set(false);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        world().enabled.set(true);
+        Ok(())
+    }
+}
+
+pub(super) struct Lines(pub(super) Pull);
+
+impl PulledLines for Lines {
+    fn high(&mut self) -> u8 {
+        if world().wire_off.get() { u8::from(self.0 == Pull::Up) } else { 0 }
+    }
+
+    fn pull(&mut self, pull: Pull) {
+        self.0 = pull;
+    }
+
+    fn settle(&mut self) {}
+}
+
+impl port::ReadDrive for Part {
+    fn read(&self) -> Readings {
+        world().readings.get()
+    }
+}
+
+impl port::SupplyLevel for Part {
+    fn is_low(&self) -> bool {
+        world().supply_low.get()
+    }
+}
+
+impl port::Watchdog for Part {
+    fn feed(&mut self) {
+        world().fed.set(world().fed.get() + 1);
+    }
+
+    fn stop_on_debug(&mut self, stop: bool) {
+        world().stops_on_debug.set(stop);
+    }
+}
+
+impl TiltSource for Part {
+    fn read(&mut self) -> Reading {
+        world().tilt.get().unwrap_or(Reading::Unchanged)
+    }
+}
+
+impl port::SerialPort for Part {
+    fn poll(&mut self) {}
+
+    fn is_configured(&self) -> bool {
+        world().configured.get()
+    }
+
+    fn is_open(&self) -> bool {
+        world().open.get()
+    }
+
+    fn read(&mut self, packet: &mut [u8]) -> Result<usize, WouldBlock> {
+        let bytes = world().incoming.borrow_mut().pop_front().ok_or(WouldBlock)?;
+        packet[..bytes.len()].copy_from_slice(&bytes);
+        Ok(bytes.len())
+    }
+
+    fn write(&mut self, packet: &[u8]) -> Result<(), WouldBlock> {
+        let left = world().room.get().checked_sub(1).ok_or(WouldBlock)?;
+        world().room.set(left);
+        world().outgoing.borrow_mut().push(packet.into());
+        Ok(())
+    }
+}
+
+pub(super) struct Words(pub(super) [Vec<u32>; 2]);
+
+impl ConfigFlash for Words {
+    const CELLS: usize = 8;
+
+    fn word(&self, slot: Slot, index: usize) -> u32 {
+        self.0[slot as usize][index]
+    }
+
+    fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
+        if world().flash_fails.get() {
+            return Err(StoreError::Flash);
+        }
+        self.0[slot as usize][index] &= word;
+        Ok(())
+    }
+
+    fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
+        self.0[slot as usize].fill(u32::MAX);
+        Ok(())
+    }
+}
+
+pub(super) fn plan() -> Plan {
+    Plan::new(&Device::default(), &Patient::default()).unwrap()
+}
+
+pub(super) fn shared() -> &'static Shared {
+    let words: &'static LastWords = Box::leak(Box::new(LastWords::new()));
+    Box::leak(Box::new(Shared::new(words)))
+}
+
+/// The ends of queues that live as long as the test's process.
+pub(super) fn ends() -> (TickEnds, UsbEnds, (TelemetryEnds, &'static mut Waiting)) {
+    let queues: &'static mut Queues = Box::leak(Box::new(Queues::new()));
+    let ends = queues.split();
+    (ends.tick, ends.usb, ends.telemetry)
+}
+
+/// A tick with its far ends; nothing has run yet.
+pub(super) fn tick() -> (Tick<Fake>, &'static Shared, TelemetryEnds) {
+    let shared = shared();
+    let (tick_ends, _, (telemetry, _)) = ends();
+    let drive = Drive::new(Part, Eight, Part);
+    (Tick::new(shared, (Part, Part, drive), &plan(), 0, tick_ends), shared, telemetry)
+}
+
+/// Runs `tick` as often, with the clock and a supervisor that is alive.
+pub(super) fn run(tick: &mut Tick<Fake>, shared: &Shared, ticks: u32) {
+    for _ in 0..ticks {
+        world().cycles.set(world().cycles.get().wrapping_add(timing::TICK_CYCLES));
+        shared.supervised_ms.fetch_add(1, Relaxed);
+        tick.run();
+    }
+}
+
+pub(super) fn order(telemetry: &mut TelemetryEnds, order: SmallOrder) {
+    assert!(telemetry.orders.enqueue(order).is_ok());
+}

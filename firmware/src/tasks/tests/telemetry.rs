@@ -1,0 +1,172 @@
+//! Telemetry.
+
+use super::super::queues::{Packet, SmallOrder, TickEnds, Ticked, UsbEnds};
+use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
+use super::super::telemetry::Telemetry;
+use super::fake::{Fake, Words, ends, plan, shared, world};
+use crate::store::{CELL_WORDS, ConfigFlash, Store};
+use control_core::controller::TickInput;
+use control_core::event::{Fault, State};
+use control_core::interlock::Interlock;
+use control_core::{Controller, Device};
+use core::sync::atomic::Ordering::Relaxed;
+use link::Command;
+use link::codec::MAX_FRAME;
+use link::device::Identity;
+use link::frames::{DeviceFrame, EventKind, PROTOCOL_VERSION, Rejection, SaveFailure};
+use link::host::{Commands, Reception};
+use std::vec::Vec;
+
+/// Telemetry with a PC at the far ends of its queues.
+struct Desk {
+    telemetry: Telemetry<Fake>,
+    shared: &'static Shared,
+    tick: TickEnds,
+    usb: UsbEnds,
+    commands: Commands,
+    reception: Reception,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let shared = shared();
+        let (tick, usb, telemetry_ends) = ends();
+        let identity = Identity { firmware: [1, 2, 3], ..Identity::VIRTUAL };
+        let blank = || std::vec![u32::MAX; Words::CELLS * CELL_WORDS];
+        let (store, ..) = Store::open(Words([blank(), blank()]));
+        let telemetry = Telemetry::new(shared, (identity, &plan(), None), store, telemetry_ends);
+        shared.link.store(LINK_CONFIGURED | LINK_READY, Relaxed);
+        Self { telemetry, shared, tick, usb, commands: Commands::default(), reception: Reception::default() }
+    }
+
+    fn in_session() -> Self {
+        let mut desk = Self::new();
+        desk.say(Command::Hello { version: PROTOCOL_VERSION });
+        assert!(desk.turn().iter().any(|frame| matches!(frame, DeviceFrame::Hello(_))));
+        while desk.tick.orders.dequeue().is_some() {}
+        desk
+    }
+
+    fn say(&mut self, command: Command) -> u32 {
+        let mut bytes = [0; MAX_FRAME];
+        let (id, length) = self.commands.encode(command, &mut bytes).unwrap();
+        for packet in bytes[..length].chunks(64) {
+            assert!(self.usb.from_pc.enqueue(Packet::from_slice(packet).unwrap()).is_ok());
+        }
+        id
+    }
+
+    /// One run of the task, and what it said.
+    fn turn(&mut self) -> Vec<DeviceFrame> {
+        self.telemetry.run();
+        let packets: Vec<Packet> = core::iter::from_fn(|| self.usb.to_pc.dequeue()).collect();
+        packets.iter().flatten().filter_map(|&byte| self.reception.push(byte)).collect()
+    }
+
+    fn answer(&mut self, command: Command) -> Result<(), Rejection> {
+        let id = self.say(command);
+        let mut acks = self.turn().into_iter().filter_map(|frame| match frame {
+            DeviceFrame::Ack(ack) if ack.id == id => Some(ack.result),
+            _ => None,
+        });
+        acks.next_back().unwrap()
+    }
+}
+
+#[test]
+fn a_start_reaches_the_tick_with_its_session() {
+    let mut desk = Desk::new();
+    assert_eq!(desk.answer(Command::Start), Err(Rejection::NoSession));
+    let mut desk = Desk::in_session();
+    desk.shared.session.store(3, Relaxed);
+    let unknown = Err(Rejection::Interlocked(Interlock::NotZeroed));
+    assert_eq!(desk.answer(Command::Start), unknown, "nobody has said where depth 0 is");
+    assert_eq!(desk.answer(Command::Zero), Ok(()));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Zero)));
+    assert_eq!(desk.answer(Command::Start), Ok(()));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Start(3))));
+    desk.shared.conditions.set(Interlock::AmplifierNotReady, true);
+    let refused = Err(Rejection::Interlocked(Interlock::AmplifierNotReady));
+    assert_eq!(desk.answer(Command::Start), refused);
+    assert!(world().usb_allowed.get(), "there is room again");
+}
+
+#[test]
+fn what_was_under_way_when_the_pc_went_is_thrown_away() {
+    for gone in [0, LINK_CONFIGURED] {
+        let mut desk = Desk::in_session();
+        let session = desk.shared.session.load(Relaxed);
+        desk.shared.powered.store(true, Relaxed);
+        desk.say(Command::Zero);
+        desk.say(Command::Start);
+        desk.shared.link.store(gone, Relaxed);
+        assert!(desk.turn().is_empty(), "nobody listens");
+        assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Stop)));
+        assert!(desk.tick.orders.dequeue().is_none(), "the start is gone");
+        assert_eq!(desk.shared.session.load(Relaxed), session.wrapping_add(1));
+        assert_eq!(desk.shared.trips.take(), Some(Fault::LinkLost));
+        assert!(desk.shared.discard.load(Relaxed));
+    }
+}
+
+#[test]
+fn a_configuration_is_saved_without_torque_and_a_failure_is_told() {
+    let mut config = Device::default();
+    config.limits.fade_in_ms = 444;
+    let mut desk = Desk::in_session();
+    // The tick has not stopped yet: the link does not know, telemetry does.
+    desk.shared.powered.store(true, Relaxed);
+    desk.answer(Command::ConfigureDevice(config)).unwrap();
+    assert!(desk.tick.orders.dequeue().is_none(), "it waits");
+    desk.shared.powered.store(false, Relaxed);
+    desk.turn();
+    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Large(_))));
+    assert!(desk.tick.large_orders.dequeue().is_some());
+    assert!(!desk.shared.conditions.get().contains(Interlock::Saving));
+    world().flash_fails.set(true);
+    config.limits.fade_in_ms = 445;
+    desk.say(Command::ConfigureDevice(config));
+    let frames: Vec<DeviceFrame> = (0..3).flat_map(|_| desk.turn()).collect();
+    let wanted = EventKind::NotSaved { cause: SaveFailure::Flash };
+    assert!(
+        frames.iter().any(|frame| matches!(frame, DeviceFrame::Event(event) if event.kind == wanted)),
+        "{frames:?}"
+    );
+    assert!(desk.tick.large_orders.dequeue().is_some(), "it is in force all the same");
+}
+
+#[test]
+fn samples_become_blocks_and_a_gap_is_counted() {
+    let mut desk = Desk::in_session();
+    let mut controller = Controller::new(plan());
+    let mut streamed = Vec::new();
+    // Numbers 100 to 103 are missing.
+    for tick in (0..200_u32).filter(|tick| !(100..104).contains(tick)) {
+        let output = controller.tick(TickInput::default());
+        assert!(desk.tick.outputs.enqueue(Ticked { tick, output }).is_ok());
+        for frame in desk.turn() {
+            if let DeviceFrame::Samples(block) = frame {
+                streamed.extend((block.first_tick..).take(block.samples.len()));
+                assert!(block.samples.iter().all(|sample| sample.state == State::Idle as u8));
+            }
+        }
+    }
+    assert!(streamed.windows(2).all(|pair| pair[1] == pair[0] + 1 || (pair[0], pair[1]) == (99, 104)));
+    assert!(streamed.contains(&99) && streamed.contains(&104) && !streamed.contains(&101));
+    assert_eq!(desk.reception.counts().lost_samples, 4);
+}
+
+#[test]
+fn orders_that_the_tick_has_no_room_for_wait() {
+    let mut desk = Desk::in_session();
+    for _ in 0..4 {
+        for _ in 0..6 {
+            desk.say(Command::Heartbeat);
+        }
+        desk.turn();
+    }
+    let taken = core::iter::from_fn(|| desk.tick.orders.dequeue()).count();
+    desk.turn();
+    let later = core::iter::from_fn(|| desk.tick.orders.dequeue()).count();
+    assert!(taken == 15 && later > 0, "{taken}, then {later}");
+}

@@ -1,0 +1,124 @@
+//! The control tick.
+
+use super::super::queues::{SmallOrder, TelemetryEnds, Ticked};
+use super::fake::{order, run, tick, world};
+use crate::timing;
+use control_core::config::DacWidth;
+use control_core::event::Fault;
+use control_core::interlock::Interlock;
+use control_core::{Device, Patient, Plan};
+use core::sync::atomic::Ordering::Relaxed;
+use std::vec::Vec;
+
+#[test]
+fn the_tick_starts_for_the_session_that_is_there_and_for_no_other() {
+    let (mut tick, shared, mut telemetry) = tick();
+    shared.session.store(7, Relaxed);
+    order(&mut telemetry, SmallOrder::Start(6));
+    run(&mut tick, shared, 3);
+    assert!(!world().enabled.get() && !shared.is_powered(), "of a PC that is gone");
+    order(&mut telemetry, SmallOrder::Start(7));
+    run(&mut tick, shared, 2);
+    assert!(world().enabled.get() && shared.is_powered());
+    order(&mut telemetry, SmallOrder::Stop);
+    run(&mut tick, shared, 2);
+    assert!(!world().enabled.get() && !shared.is_powered());
+    assert_eq!(world().codes.borrow().last(), Some(&2048));
+}
+
+#[test]
+fn the_tick_does_not_start_under_an_interlock_and_says_why() {
+    let (mut tick, shared, mut telemetry) = tick();
+    shared.conditions.set(Interlock::EmergencyStop, true);
+    order(&mut telemetry, SmallOrder::Start(0));
+    run(&mut tick, shared, 2);
+    assert!(!world().enabled.get());
+    let tripped = core::iter::from_fn(|| telemetry.outputs.dequeue()).find_map(|t: Ticked| t.output.tripped);
+    assert_eq!(tripped, Some(Fault::EmergencyStop));
+}
+
+#[test]
+fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
+    let (mut tick, shared, mut telemetry) = tick();
+    let eight = Device { dac: DacWidth::Bits8, ..Device::default() };
+    let eight = Plan::new(&eight, &Patient::default()).unwrap();
+    let configure = |telemetry: &mut TelemetryEnds| {
+        assert!(telemetry.large_orders.enqueue(control_core::Order::Configure(eight.clone())).is_ok());
+        order(telemetry, SmallOrder::Large(0));
+    };
+    order(&mut telemetry, SmallOrder::Start(0));
+    run(&mut tick, shared, 2);
+    configure(&mut telemetry);
+    run(&mut tick, shared, 2);
+    assert_eq!(tick.width(), DacWidth::Bits12, "torque is on");
+    shared.trips.raise(Fault::Tilt);
+    run(&mut tick, shared, 1);
+    assert!(!world().enabled.get());
+    configure(&mut telemetry);
+    run(&mut tick, shared, 2);
+    assert_eq!(tick.width(), DacWidth::Bits8);
+}
+
+#[test]
+fn the_tick_misses_its_supervisor() {
+    let (mut tick, shared, mut telemetry) = tick();
+    order(&mut telemetry, SmallOrder::Start(0));
+    run(&mut tick, shared, 2);
+    for silent in 1..=timing::SUPERVISOR_SILENCE_TICKS {
+        assert!(world().enabled.get(), "after {silent} ticks");
+        world().cycles.set(world().cycles.get().wrapping_add(timing::TICK_CYCLES));
+        tick.run();
+    }
+    run(&mut tick, shared, 1);
+    assert!(!world().enabled.get());
+}
+
+#[test]
+fn a_tick_that_comes_late_is_counted_and_takes_torque_away() {
+    let (mut tick, shared, mut telemetry) = tick();
+    run(&mut tick, shared, 3);
+    assert_eq!(shared.missed_ticks.load(Relaxed), 0, "the first has none before it");
+    // Three periods later: two are missing.
+    world().cycles.set(world().cycles.get() + 2 * timing::TICK_CYCLES);
+    run(&mut tick, shared, 1);
+    assert_eq!((shared.missed_ticks.load(Relaxed), shared.trips.is_empty()), (2, true), "torque is off");
+    order(&mut telemetry, SmallOrder::Start(0));
+    run(&mut tick, shared, 2);
+    world().cycles.set(world().cycles.get() + timing::TICK_CYCLES);
+    run(&mut tick, shared, 1);
+    assert_eq!((shared.missed_ticks.load(Relaxed), shared.trips.take()), (3, Some(Fault::Overrun)));
+    shared.conditions.set(Interlock::Saving, true);
+    world().cycles.set(world().cycles.get() + 10 * timing::TICK_CYCLES);
+    run(&mut tick, shared, 1);
+    assert_eq!(shared.missed_ticks.load(Relaxed), 3, "an erasure stops the processor");
+}
+
+/// After 119 hours the number of ticks begins again; a tick that is missed then is missed.
+#[test]
+fn the_number_of_ticks_wraps_without_a_word() {
+    let (mut tick, shared, mut telemetry) = tick();
+    tick.set_number(u32::MAX - 1);
+    run(&mut tick, shared, 2);
+    world().cycles.set(world().cycles.get().wrapping_add(timing::TICK_CYCLES));
+    run(&mut tick, shared, 1);
+    assert_eq!(shared.missed_ticks.load(Relaxed), 1);
+    let numbers: Vec<u32> = core::iter::from_fn(|| telemetry.outputs.dequeue()).map(|t| t.tick).collect();
+    assert_eq!(numbers, [u32::MAX - 1, u32::MAX, 0]);
+}
+
+#[test]
+fn the_tick_leaves_word_of_its_torque_and_of_the_motors_heat() {
+    let (mut tick, shared, mut telemetry) = tick();
+    // A needle 2 mm deep, that a wall pushes out.
+    world().count.set(127);
+    order(&mut telemetry, SmallOrder::Start(0));
+    for second in 0..20_000 {
+        world().count.set(127 + [0, 1, 2, 1][second / 250 % 4]);
+        order(&mut telemetry, SmallOrder::Heartbeat);
+        run(&mut tick, shared, 1);
+        let _ = telemetry.outputs.dequeue();
+    }
+    let said = shared.last_words.take();
+    assert!(said.torque && said.heat > 0, "{said:?}");
+    assert!(shared.given().0 < 2048 - 100, "{:?}", shared.given());
+}
