@@ -11,7 +11,7 @@
 //! 0.2 mm further out. Noise of a milliradian therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
 use crate::event::{Transitions, VesselState};
-use crate::math::{reciprocal, scaled, sine};
+use crate::math::{reciprocal, sine, truncating_product};
 use crate::tissue::{MAX_LAYERS, Tissue};
 use crate::units::{Millimetres, Milliradians};
 use fixed::types::{I2F30, I8F24, I16F16};
@@ -75,28 +75,30 @@ pub(crate) struct Anatomy {
     pub(crate) skin_tilt: i16,
 }
 
-/// The angle to the skin.
+/// The angle to the skin at which the layers are met.
 #[derive(Clone, Copy, Debug)]
 struct Angle {
     taken: Milliradians,
-    /// Milliradians, Q16.
-    smoothed: i32,
     /// 1/sin of what is taken: length along the needle for each length perpendicular to the skin.
     path_per_depth: I8F24,
     /// Its sine, the other way round.
     depth_per_path: I2F30,
 }
 
-impl Angle {
-    fn new(angle: Milliradians) -> Self {
-        let sine = sine(angle);
-        Self {
-            taken: angle,
-            smoothed: i32::from(angle.0) << 16,
-            path_per_depth: reciprocal(sine),
-            depth_per_path: sine,
-        }
-    }
+/// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the longest of all.
+#[derive(Clone, Copy, Debug, Default)]
+enum Turning {
+    /// The angle that was taken over holds.
+    #[default]
+    Done,
+    /// The needle has turned to this angle.
+    To(Milliradians),
+    /// And this is its sine.
+    Sine(Milliradians, I2F30),
+    /// All that there is to know of it.
+    Whole(Angle),
+    /// And the layers begin at [`Insertion::next_tops`] then.
+    Placed(Angle),
 }
 
 /// Where the tip is among the layers. It comes through layers and walls in their order, so that two numbers say which it has
@@ -106,10 +108,10 @@ pub(crate) struct Insertion {
     angle: Angle,
     /// The next look takes the tilt over as it is.
     is_new: bool,
-    /// Where the needle has turned to: reckoned in one of the next ticks, and taken over in another one, for both in one with
-    /// the look would be long.
-    turned: Option<Milliradians>,
-    next_angle: Option<Angle>,
+    /// Milliradians, Q16.
+    smoothed: i32,
+    turning: Turning,
+    next_tops: [I16F16; MAX_LAYERS],
     /// Of each layer, where it begins along the needle.
     tops: [I16F16; MAX_LAYERS],
     /// Of each wall, where the tip began to push it in.
@@ -130,11 +132,13 @@ pub(crate) struct Insertion {
 impl Insertion {
     /// Outside, at the angle of the next tick.
     pub(crate) fn new(anatomy: &Anatomy) -> Self {
+        let straight = Angle { taken: LARGEST_ANGLE, path_per_depth: I8F24::ONE, depth_per_path: I2F30::ONE };
         let mut insertion = Self {
-            angle: Angle::new(LARGEST_ANGLE),
+            angle: straight,
             is_new: true,
-            turned: None,
-            next_angle: None,
+            smoothed: i32::from(LARGEST_ANGLE.0) << 16,
+            turning: Turning::To(LARGEST_ANGLE),
+            next_tops: [I16F16::ZERO; MAX_LAYERS],
             tops: [I16F16::ZERO; MAX_LAYERS],
             origins: [I16F16::ZERO; MAX_LAYERS],
             carried: [I16F16::ZERO; MAX_LAYERS],
@@ -145,7 +149,7 @@ impl Insertion {
             beside: I16F16::MAX,
             vessel: VesselState::Outside,
         };
-        insertion.place(anatomy);
+        insertion.turn_at_once(anatomy);
         insertion
     }
 
@@ -205,7 +209,7 @@ impl Insertion {
     /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
     pub(crate) fn begin(&mut self) {
         self.is_new = true;
-        (self.turned, self.next_angle) = (None, None);
+        self.turning = Turning::Done;
     }
 
     /// Whether the tilt is to be looked at without waiting for its turn.
@@ -227,61 +231,63 @@ impl Insertion {
     #[inline(never)]
     pub(crate) fn look_anew(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
         self.look(anatomy, tilt);
-        self.reckon_angle();
-        self.take_angle(anatomy);
+        self.turn_at_once(anatomy);
     }
 
-    /// Follows the tilt, every [`LOOK_TICKS`]; [`Self::reckon_angle`] and [`Self::take_angle`] come before the next look.
+    fn turn_at_once(&mut self, anatomy: &Anatomy) {
+        while !matches!(self.turning, Turning::Done) {
+            self.turn(anatomy);
+        }
+    }
+
+    /// Follows the tilt, every [`LOOK_TICKS`].
     #[inline(never)]
     pub(crate) fn look(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
         let measured = i32::from(anatomy.angle(tilt).0) << 16;
-        let smoothed = if core::mem::take(&mut self.is_new) {
+        self.smoothed = if core::mem::take(&mut self.is_new) {
             measured
         } else {
-            self.angle.smoothed + ((measured - self.angle.smoothed) >> SMOOTHING)
+            self.smoothed + ((measured - self.smoothed) >> SMOOTHING)
         };
-        self.angle.smoothed = smoothed;
-        let off = smoothed - (i32::from(self.angle.taken.0) << 16);
-        if off.unsigned_abs() > DEAD_BAND {
-            self.turned = Some(Milliradians(((smoothed + (1 << 15)) >> 16) as i16));
+        let off = self.smoothed - (i32::from(self.angle.taken.0) << 16);
+        if off.unsigned_abs() > DEAD_BAND && matches!(self.turning, Turning::Done) {
+            self.turning = Turning::To(Milliradians(((self.smoothed + (1 << 15)) >> 16) as i16));
         }
     }
 
-    /// The second part of a look.
+    /// The next part of taking over an angle, if one is on its way: three times in [`LOOK_TICKS`], so that it is there 3 ms after the
+    /// look.
     #[inline(never)]
-    pub(crate) fn reckon_angle(&mut self) {
-        if let Some(turned) = self.turned.take() {
-            self.next_angle = Some(Angle { smoothed: self.angle.smoothed, ..Angle::new(turned) });
-        }
+    pub(crate) fn turn(&mut self, anatomy: &Anatomy) {
+        self.turning = match self.turning {
+            Turning::Done => Turning::Done,
+            Turning::To(angle) => Turning::Sine(angle, sine(angle)),
+            Turning::Sine(taken, sine) => {
+                Turning::Whole(Angle { taken, path_per_depth: reciprocal(sine), depth_per_path: sine })
+            }
+            Turning::Whole(angle) => {
+                for (top, layer) in self.next_tops.iter_mut().zip(&anatomy.layers) {
+                    *top = angle.along(layer.depth);
+                }
+                Turning::Placed(angle)
+            }
+            Turning::Placed(angle) => {
+                self.meet_at(anatomy, angle);
+                Turning::Done
+            }
+        };
     }
 
-    /// The third part of a look.
-    #[inline(never)]
-    pub(crate) fn take_angle(&mut self, anatomy: &Anatomy) {
-        if let Some(next) = self.next_angle.take() {
-            self.angle = next;
-            self.place(anatomy);
-        }
-    }
-
-    /// Along the needle, for a depth perpendicular to the skin of up to 2,000 mm.
-    fn along(&self, depth: Millimetres) -> I16F16 {
-        I16F16::from_bits(scaled(depth.0.to_bits(), self.angle.path_per_depth.to_bits(), 24))
-    }
-
-    /// Finds where the layers are met at a new angle.
-    fn place(&mut self, anatomy: &Anatomy) {
-        let mut tops = self.tops;
-        for (top, layer) in tops.iter_mut().zip(&anatomy.layers) {
-            *top = self.along(layer.depth);
-        }
-        self.tops = tops;
+    /// Takes over `angle` and where the layers begin at it.
+    fn meet_at(&mut self, anatomy: &Anatomy, angle: Angle) {
+        self.angle = angle;
+        self.tops = self.next_tops;
         for ((origin, carried), wall) in self.origins.iter_mut().zip(self.carried).zip(&anatomy.walls) {
-            let top = tops.get(wall.layer).copied().unwrap_or(I16F16::MAX);
+            let top = self.tops.get(wall.layer).copied().unwrap_or(I16F16::MAX);
             *origin = top.saturating_add(carried);
         }
         if let Some(Vessel::Beside { depth }) = anatomy.vessel {
-            self.beside = self.along(depth);
+            self.beside = angle.along(depth);
         }
     }
 
@@ -292,7 +298,7 @@ impl Insertion {
         let before = wall.relieved.saturating_sub(self.travel(last, depth).max(wall.puncture));
         let before = before.max(I16F16::ZERO);
         // At most what the wall was pushed in.
-        I16F16::from_bits(scaled(before.to_bits(), wall.indented_per_mm.to_bits(), 16))
+        I16F16::from_bits(truncating_product(before.to_bits(), wall.indented_per_mm.to_bits(), 16))
     }
 
     /// The layer that the tip touches or leaves; a wall is whole again once the tip has left its layer.
@@ -371,6 +377,13 @@ impl Insertion {
     fn is_past(&self, anatomy: &Anatomy, index: usize) -> bool {
         let layer = anatomy.layers.get(index);
         layer.is_some_and(|layer| self.touched > index && (!layer.has_wall || self.given > layer.walls_above))
+    }
+}
+
+impl Angle {
+    /// Along the needle, for a depth perpendicular to the skin of up to 2,000 mm.
+    fn along(&self, depth: Millimetres) -> I16F16 {
+        I16F16::from_bits(truncating_product(depth.0.to_bits(), self.path_per_depth.to_bits(), 24))
     }
 }
 

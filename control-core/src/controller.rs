@@ -6,10 +6,10 @@ use crate::compensation::Gains;
 use crate::compensation::feedforward::{Feedforward, Here};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
-use crate::kinematics::{SpeedEstimator, moved};
-use crate::law::{Memory, Response};
-use crate::math::scaled;
-use crate::passivity::Observer;
+use crate::kinematics::{SpeedEstimator, Withdrawal, moved};
+use crate::law::{Memory, Motion, Response};
+use crate::math::{saturating_multiply, truncating_product};
+use crate::passivity::{Elements, Observer};
 use crate::plan::Plan;
 use crate::runaway::{self, LOOK_TICKS};
 use crate::safety::Limiter;
@@ -113,6 +113,7 @@ pub struct Controller {
     origin: Counts,
     previous: Option<Counts>,
     speed: SpeedEstimator,
+    withdrawal: Withdrawal,
     insertion: Insertion,
     memory: Memory,
     observer: Observer,
@@ -156,6 +157,7 @@ impl Controller {
         feedforward.set_gains(plan.device().compensation.gains);
         Self {
             speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
+            withdrawal: Withdrawal::default(),
             insertion: Insertion::new(&plan.anatomy),
             memory: plan.law.memory(),
             plan,
@@ -254,9 +256,10 @@ impl Controller {
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
         self.turn = (self.turn + 1) % anatomy::LOOK_TICKS;
-        let (transitions, tissue) = self.meet(input.tilt, depth, speed);
+        let (transitions, tissue) = self.meet(input.tilt, count, depth, speed);
         self.watch_host();
-        let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed) {
+        let has_given_way = transitions.puncture != 0;
+        let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed, has_given_way) {
             Some((wanted, limits)) => {
                 let limits = if tissue.estimated { limits.with(Limits::ESTIMATED) } else { limits };
                 let (wanted, limits) = if self.feedforward.is_on() {
@@ -297,7 +300,7 @@ impl Controller {
             tripped: self.tripped.take(),
             depth,
             speed,
-            force: tissue.force,
+            force: tissue.force.total(),
             angle: self.insertion.angle(),
             vessel: self.insertion.vessel(),
             lateral: tissue.lateral,
@@ -311,8 +314,8 @@ impl Controller {
             0 => return self.winding.warm(&self.plan.thermal),
             2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
             5 => self.runaway.look(&self.plan.runaway),
-            6 => self.runaway.judge(&self.plan.runaway),
-            7 => self.runaway.count_turns(),
+            6 => return self.runaway.compare(),
+            7 => self.runaway.judge(&self.plan.runaway),
             _ => return,
         };
         if let Some(fault) = fault
@@ -328,6 +331,7 @@ impl Controller {
     fn meet(
         &mut self,
         tilt: Milliradians,
+        count: Counts,
         depth: Millimetres,
         speed: MillimetresPerSecond,
     ) -> (Transitions, Response) {
@@ -338,14 +342,14 @@ impl Controller {
         match self.turn {
             _ if self.insertion.is_new() => self.insertion.look_anew(&self.plan.anatomy, tilt),
             3 => self.insertion.look(&self.plan.anatomy, tilt),
-            9 => self.insertion.reckon_angle(),
-            11 => self.insertion.take_angle(&self.plan.anatomy),
+            1 | 9 | 11 => self.insertion.turn(&self.plan.anatomy),
             _ => {}
         }
         let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
         let response = {
             let (law, plan) = (&self.plan.config.patient.law, &self.plan.law);
-            self.memory.tick(law, plan, &self.insertion, depth, speed)
+            let withdraws = self.withdrawal.tick(&self.plan.scale, count, speed);
+            self.memory.tick(law, plan, &self.insertion, Motion { depth, speed, withdraws })
         };
         transitions.barrier = response.barrier;
         (transitions, response)
@@ -398,7 +402,8 @@ impl Controller {
         if !self.mode.is_powered() {
             return;
         }
-        self.silent_ticks = self.silent_ticks.saturating_add(1);
+        // It never wraps: what follows turns torque off long before.
+        self.silent_ticks = self.silent_ticks.wrapping_add(1);
         if self.silent_ticks > self.plan.heartbeat_ticks {
             self.trip(Fault::HostSilent);
         }
@@ -414,20 +419,23 @@ impl Controller {
     /// Motor torque that the law or the excitation asks for; none where torque is off. N times mm is mN·m.
     fn wanted_torque(
         &mut self,
-        force: Newtons,
+        mut force: Elements,
         depth: Millimetres,
         speed: MillimetresPerSecond,
+        has_given_way: bool,
     ) -> Option<(MillinewtonMetres, Limits)> {
         let radius = self.plan.config.device.roller_radius;
         match self.mode {
             Mode::Running => {
-                let damping = scaled(speed.0.to_bits(), self.plan.damping.to_bits(), 30);
-                let resisting = Newtons(force.0.saturating_add(I16F16::from_bits(damping)));
-                let (given, damped) = self.observer.tick(self.plan.bounce_damping, depth, resisting);
+                let damping = truncating_product(speed.0.to_bits(), self.plan.damping.to_bits(), 30);
+                force.friction.0 = force.friction.0.saturating_add(I16F16::from_bits(damping));
+                let (given, damped) =
+                    self.observer.tick(self.plan.bounce_damping, depth, force, has_given_way);
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
                 // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
-                let torque = I16F16::from_bits(-scaled(given.0.to_bits(), self.plan.lever.to_bits(), 16));
-                let before = self.limiter.given().0 - self.feedforward.fed();
+                // Were it ever more, it would be too much, and not the other way.
+                let torque = saturating_multiply(given.0, self.plan.lever).saturating_neg();
+                let before = self.limiter.given().0.saturating_sub(self.feedforward.fed());
                 Some((MillinewtonMetres(self.runaway.steady(torque, before)), limits))
             }
             Mode::Exciting => {
@@ -472,6 +480,10 @@ impl Controller {
             limits = limits.with(thermal).with(torque);
         }
         let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(held));
+        let missing = torque.0.saturating_sub(wanted.0);
+        if missing != I16F16::ZERO {
+            self.observer.held_back(saturating_multiply(missing, self.plan.per_lever));
+        }
         (torque, in_force.with(limits))
     }
 }

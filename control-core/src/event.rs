@@ -214,7 +214,8 @@ pub struct Transitions {
 impl Transitions {
     /// Whether nothing changed.
     pub fn is_empty(self) -> bool {
-        self == Self::default()
+        // As one number: compared field by field it takes three times as long.
+        (self.contact | self.puncture | self.exit | u8::from(self.flashback) | u8::from(self.barrier)) == 0
     }
 }
 

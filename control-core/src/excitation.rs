@@ -5,7 +5,7 @@
 //! follow: it plays the same [`Reference`].
 
 use crate::TICK_HZ;
-use crate::math::{multiply, scaled, times};
+use crate::math::{saturating_multiply, saturating_times, truncating_product};
 use crate::plan::Plan;
 use crate::refusal::{Field, Refusal, within};
 use crate::sine::sine;
@@ -339,7 +339,7 @@ const PHASE_PER_HZ_Q8: u64 = (1 << 40) / TICK_HZ as u64;
 
 fn multisine<'a>(lines: impl Iterator<Item = &'a mut Line>, torque: I16F16) -> I16F16 {
     lines.fold(I16F16::ZERO, |sum, line| {
-        let value = scaled(torque.to_bits(), sine(line.phase).to_bits(), 30);
+        let value = truncating_product(torque.to_bits(), sine(line.phase).to_bits(), 30);
         line.phase = line.phase.wrapping_add(line.phase_per_tick);
         sum.saturating_add(I16F16::from_bits(value))
     })
@@ -378,8 +378,9 @@ impl Player {
         let behind = self.begin.0.saturating_add(target.position.0).saturating_sub(depth.0);
         let slower = target.speed.0.saturating_sub(speed.0);
         let damping = I2F30::saturating_from_num(self.servo.damping.0);
-        let force = multiply(behind, self.servo.stiffness.0).saturating_add(times(slower, damping));
-        Some(MillinewtonMetres(multiply(force, roller_radius.0).saturating_add(target.torque.0)))
+        let force = saturating_multiply(behind, self.servo.stiffness.0)
+            .saturating_add(saturating_times(slower, damping));
+        Some(MillinewtonMetres(saturating_multiply(force, roller_radius.0).saturating_add(target.torque.0)))
     }
 
     /// Whether the motor is further from the beginning than allowed.

@@ -1,6 +1,6 @@
 //! Friction along the needle inside tissue (seed 001, eq. 2): as printed, and as a clamped proxy that holds.
 
-use crate::math::{exp, multiply, scaled};
+use crate::math::{exp, saturating_multiply, saturating_product, truncating_product};
 use crate::proxy::Anchor;
 use crate::units::{Millimetres, Newtons, Stiffness};
 use fixed::types::{I2F30, I16F16};
@@ -36,19 +36,19 @@ impl Law {
             Law::Paper { per_level_length, level_cap, follow, stiffness, limit } => {
                 anchor.follow(depth.0, *follow);
                 // 1/S_f1 is at most 1.
-                let levels = scaled(inserted.0.to_bits(), per_level_length.to_bits(), 30);
+                let levels = truncating_product(inserted.0.to_bits(), per_level_length.to_bits(), 30);
                 let level = exp(I16F16::from_bits(levels)).min(*level_cap);
                 // A metre, further than the needle is long: with levels up to 32 and slopes up to 7 N/mm all fits.
                 let stretch = anchor.stretch(depth).to_bits().clamp(-1 << 26, (1 << 26) - 1);
-                let levelled = scaled(stretch, level.to_bits(), 16);
-                let force = I16F16::from_bits(scaled(levelled, stiffness.0.to_bits(), 16));
+                let levelled = saturating_product(stretch, level.to_bits(), 16);
+                let force = I16F16::from_bits(saturating_product(levelled, stiffness.0.to_bits(), 16));
                 Newtons(force.min(limit.0).max(-limit.0))
             }
             Law::Cone { stiffness, inverse_stiffness } => {
                 let limit = limit();
-                let reach = multiply(limit.0, *inverse_stiffness);
+                let reach = saturating_multiply(limit.0, *inverse_stiffness);
                 anchor.drag(depth, reach, reach);
-                Newtons(multiply(anchor.stretch(depth), stiffness.0).min(limit.0).max(-limit.0))
+                Newtons(saturating_multiply(anchor.stretch(depth), stiffness.0).min(limit.0).max(-limit.0))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::TICK_HZ;
 use crate::config::SpeedMethod;
-use crate::math::{product, saturate};
+use crate::math::{saturate, saturating_product};
 use crate::units::{Counts, Millimetres, MillimetresPerSecond};
 use fixed::types::{I2F30, I8F24, I16F16, U14F18};
 
@@ -39,12 +39,16 @@ impl Scale {
 
     /// Depth of `counts` past the zero.
     pub(crate) fn depth(&self, counts: Counts) -> Millimetres {
-        Millimetres(I16F16::from_bits(product(counts.0, self.mm_per_count.to_bits(), 14)))
+        Millimetres(I16F16::from_bits(saturating_product(counts.0, self.mm_per_count.to_bits(), 14)))
     }
 
     /// Speed of `counts` in a window.
     fn window_speed(&self, counts: i32) -> MillimetresPerSecond {
-        MillimetresPerSecond(I16F16::from_bits(product(counts, self.window_speed_per_count.to_bits(), 8)))
+        MillimetresPerSecond(I16F16::from_bits(saturating_product(
+            counts,
+            self.window_speed_per_count.to_bits(),
+            8,
+        )))
     }
 
     /// Speed of `counts` in `ticks`.
@@ -52,6 +56,34 @@ impl Scale {
         let in_a_tick_q18 = u64::from(counts.unsigned_abs()) * u64::from(self.tick_speed_per_count.to_bits());
         let magnitude = quotient(in_a_tick_q18 >> 2, ticks);
         MillimetresPerSecond(I16F16::from_bits(if counts < 0 { -magnitude } else { magnitude }))
+    }
+}
+
+/// Slower than this the needle rests. 1 mm/s.
+pub(crate) const REST_SPEED: I16F16 = I16F16::from_bits(1 << 16);
+
+/// Whether the needle is being drawn out: fast enough, and by two counts at the least. The speed alone says less, for one count in a
+/// window is faster than [`REST_SPEED`] already, and a needle at rest between two counts shows now one and now the other.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Withdrawal {
+    /// Where it last rested or went inwards.
+    deepest: Counts,
+    is_on: bool,
+}
+
+impl Withdrawal {
+    /// Follows the tip, a tick later.
+    pub(crate) fn tick(&mut self, scale: &Scale, count: Counts, speed: MillimetresPerSecond) -> bool {
+        if self.is_on {
+            // Slower than half a count in a window is rest again.
+            self.is_on = speed.0.to_bits() < -(scale.window_speed_per_count.to_bits() >> 9);
+        } else {
+            if speed.0 >= -REST_SPEED {
+                self.deepest = count;
+            }
+            self.is_on = moved(count, self.deepest).0 >= 2;
+        }
+        self.is_on
     }
 }
 

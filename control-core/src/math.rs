@@ -12,7 +12,7 @@ const EXP2_Q30: [i32; 6] = [1_073_741_824, 744_261_118, 257_941_248, 59_597_086,
 /// e^x for 0 ≤ x ≤ 8 (clamped to it), relative error below 5e-5.
 pub(crate) fn exp(x: I16F16) -> I16F16 {
     let x = x.clamp(I16F16::ZERO, I16F16::from_bits(8 << 16));
-    let power = scaled(x.to_bits(), LOG2_E.to_bits(), 30);
+    let power = truncating_product(x.to_bits(), LOG2_E.to_bits(), 30);
     // Round(x·log2(e)), 0 to 12; what is left of it lies in [−0.5, 0.5).
     let whole = (power + (1 << 15)) >> 16;
     let fraction_q32 = (power - (whole << 16)) << 16;
@@ -48,15 +48,15 @@ pub(crate) fn reciprocal(x: I2F30) -> I8F24 {
     let x = x.to_bits().max(85_899_346);
     // 12 bits and more by the division of 32 bits, twice as many after a step of Newton's.
     let rough_q16 = ((1_u32 << 31) / (x >> 15) as u32) as i32;
-    let error_q30 = (1 << 30) - scaled(x, rough_q16, 16);
-    I8F24::from_bits((rough_q16 << 8) + scaled(rough_q16, error_q30, 22))
+    let error_q30 = (1 << 30) - truncating_product(x, rough_q16, 16);
+    I8F24::from_bits((rough_q16 << 8) + truncating_product(rough_q16, error_q30, 22))
 }
 
 /// e^−x for 0 ≤ x, to 1.2e-5: the last place of x·log2(e).
 pub(crate) fn exp_negative(x: I16F16) -> I2F30 {
     // Beyond 21 nothing is left in 30 bits.
     let x = x.clamp(I16F16::ZERO, I16F16::from_bits(21 << 16));
-    let power = -scaled(x.to_bits(), LOG2_E.to_bits(), 30);
+    let power = -truncating_product(x.to_bits(), LOG2_E.to_bits(), 30);
     let whole = (power + (1 << 15)) >> 16;
     let mantissa_q30 = exp2_q30((power - (whole << 16)) << 16);
     I2F30::from_bits(mantissa_q30 >> -whole)
@@ -78,22 +78,26 @@ pub(crate) fn share(part: i32, whole: i32) -> i32 {
 }
 
 /// `a · b`, saturating, with `b` in [−2, 2) and fine steps.
-pub(crate) fn times(a: I16F16, b: I2F30) -> I16F16 {
-    I16F16::from_bits(product(a.to_bits(), b.to_bits(), 30))
+pub(crate) fn saturating_times(a: I16F16, b: I2F30) -> I16F16 {
+    I16F16::from_bits(saturating_product(a.to_bits(), b.to_bits(), 30))
 }
 
-/// `a · b`, saturating.
-pub(crate) fn multiply(a: I16F16, b: I16F16) -> I16F16 {
-    I16F16::from_bits(product(a.to_bits(), b.to_bits(), 16))
+/// `a · b`, towards −∞; where it does not fit, a number of the same sign less than 1 from the largest there is: half the
+/// instructions of the nearest.
+pub(crate) fn saturating_multiply(a: I16F16, b: I16F16) -> I16F16 {
+    let wide = i64::from(a.to_bits()) * i64::from(b.to_bits());
+    let whole = ((wide >> 32) as i32).clamp(-1 << 15, (1 << 15) - 1);
+    I16F16::from_bits(whole << 16 | (wide >> 16) as i32 & 0xFFFF)
 }
 
 /// `a · b` without its last `places` bits, towards −∞; saturating.
-pub(crate) fn product(a: i32, b: i32, places: u32) -> i32 {
+pub(crate) fn saturating_product(a: i32, b: i32, places: u32) -> i32 {
     saturate((i64::from(a) * i64::from(b)) >> places)
 }
 
-/// `a · b` without its last `places` bits, towards −∞, where it is known to fit: half the instructions of [`product`].
-pub(crate) fn scaled(a: i32, b: i32, places: u32) -> i32 {
+/// `a · b` without its last `places` bits, towards −∞, where it is known to fit: half the instructions of [`saturating_product`].
+/// Where it did not fit it could have the other sign: what becomes the motor's torque is a product that saturates.
+pub(crate) fn truncating_product(a: i32, b: i32, places: u32) -> i32 {
     let wide = (i64::from(a) * i64::from(b)) >> places;
     debug_assert!(i32::try_from(wide).is_ok(), "{a} · {b} >> {places}");
     wide as i32
@@ -168,7 +172,20 @@ mod tests {
             for places in [0, 1, 16, 30] {
                 let exact = (i128::from(a) * i128::from(b)) >> places;
                 let nearest = exact.clamp(i32::MIN.into(), i32::MAX.into());
-                assert_eq!(i128::from(product(a, b, places)), nearest, "{a} · {b} >> {places}");
+                assert_eq!(i128::from(saturating_product(a, b, places)), nearest, "{a} · {b} >> {places}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_in_q16_is_exact_or_large_with_its_own_sign() {
+        let edges = [i32::MIN, i32::MIN + 1, -65_536, -3, -1, 0, 1, 2, 65_535, 1 << 30, i32::MAX];
+        for (a, b) in edges.iter().flat_map(|&a| edges.map(|b| (a, b))) {
+            let exact = (i64::from(a) * i64::from(b)) >> 16;
+            let got = saturating_multiply(I16F16::from_bits(a), I16F16::from_bits(b)).to_bits();
+            match i32::try_from(exact) {
+                Ok(exact) => assert_eq!(got, exact, "{a} · {b}"),
+                Err(_) => assert!(saturate(exact).abs_diff(got) < 1 << 16, "{a} · {b} is {got}"),
             }
         }
     }

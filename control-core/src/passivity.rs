@@ -1,14 +1,18 @@
-//! Watches the energy that goes in and out through the needle. A virtual wall that gives back more than it was given is
-//! active and rings; then damping takes the surplus away (time-domain passivity control, Hannaford and Ryu 2002). It may
-//! reduce the force that pushes out and never turns it round.
+//! Watches the energy that goes in and out through the needle, of walls and of friction apart. An element that gives back
+//! more than it was given is active and rings; then damping takes the surplus away from its force (time-domain passivity
+//! control, Hannaford and Ryu 2002). It may reduce a force that pushes the needle along and never turns it round.
+//!
+//! Apart, because friction takes energy all the way in and gives none of it back: counted with the walls it would be a credit
+//! that they could spend for seconds. What a wall has stored is gone when it gives way; of what friction took no more can come
+//! back than its hold stores. What counts is the force that the motor gave, after every limit.
 
 use crate::TICK_HZ;
-use crate::math::product;
+use crate::math::{saturating_product, truncating_product};
 use crate::units::{Damping, Millimetres, Newtons};
-use fixed::types::{I8F24, I16F16, I32F32, U16F16};
+use fixed::types::{I8F24, I16F16};
 
-/// Below this the tissue stores nothing worth counting, and a new count begins: 5 mN.
-const NOTHING: U16F16 = U16F16::from_bits(328);
+/// Below this an element stores nothing worth counting, and a new count begins: 5 mN.
+const NOTHING: i32 = 328;
 /// Ticks over which the speed of a bounce is taken: 0.8 ms, for the speed window is too slow for it.
 const BOUNCE_TICKS: usize = 8;
 
@@ -27,12 +31,58 @@ impl BounceDamping {
     }
 }
 
+/// The most that a hold of friction stores: 1 N at 1 N/mm.
+const FRICTION_STORE: Energy = Energy(1 << (ENERGY_PLACES - 1));
+/// No further than this the needle goes in a tick, a step less than 1 mm: that would be 10 m/s, which is a fault.
+const LARGEST_WAY: i32 = (1 << 16) - 1;
+/// Binary places of an [`Energy`].
+const ENERGY_PLACES: u32 = 20;
+
+/// Energy in mJ, in Q20: steps of a nanojoule, up to 2 J.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Energy(i32);
+
+impl Energy {
+    /// With the work of `force` over `way`, which is at most [`LARGEST_WAY`].
+    fn with_work(self, force: Newtons, way: i32) -> Self {
+        // Q16 times Q16; 256 N over 1 mm fit.
+        let work = truncating_product(force.0.to_bits(), way, 32 - ENERGY_PLACES);
+        Self(self.0.saturating_add(work))
+    }
+
+    fn is_negative(self) -> bool {
+        self.0 < 0
+    }
+}
+
+/// The force of the tissue by what makes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Elements {
+    /// Of walls, which give back what they have stored.
+    pub(crate) walls: Newtons,
+    /// Of friction, cutting and damping.
+    pub(crate) friction: Newtons,
+}
+
+impl Elements {
+    /// Of nothing.
+    pub(crate) const NONE: Self = Self { walls: Newtons(I16F16::ZERO), friction: Newtons(I16F16::ZERO) };
+
+    /// All together.
+    pub(crate) fn total(self) -> Newtons {
+        Newtons(self.walls.0.saturating_add(self.friction.0))
+    }
+}
+
 /// The observer with its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observer {
-    /// Energy that went in and has not come out, in mJ.
-    energy: I32F32,
-    force: Newtons,
+    /// What went into the walls and has not come out.
+    walls: Energy,
+    /// The same of friction, at most [`FRICTION_STORE`].
+    friction: Energy,
+    /// The forces of the tick before, as the motor gave them.
+    given: Elements,
     depth: Millimetres,
     depths: [Millimetres; BOUNCE_TICKS],
     next: usize,
@@ -44,31 +94,43 @@ impl Observer {
         Self { depth, depths: [depth; BOUNCE_TICKS], ..Self::default() }
     }
 
-    /// One tick: the force to give instead of `wanted`, and whether damping was added.
+    /// One tick in which a wall may have given way: the force to give instead of `wanted`, and whether damping was added.
     pub(crate) fn tick(
         &mut self,
         damping: BounceDamping,
         depth: Millimetres,
-        wanted: Newtons,
+        wanted: Elements,
+        has_given_way: bool,
     ) -> (Newtons, bool) {
-        self.count_energy(depth, wanted);
+        self.count_energy(depth, wanted, has_given_way);
         let moved = self.moved_in_a_bounce(depth);
-        let is_pushed_along = moved != I16F16::ZERO && wanted.0.is_negative() != moved.is_negative();
-        let reduces = self.energy < I32F32::ZERO && is_pushed_along && damping.newtons_per_mm > I8F24::ZERO;
-        let given = if reduces { reduced(damping, moved, wanted) } else { wanted };
-        self.force = given;
-        (given, reduces)
+        self.given = wanted;
+        let is_active = self.walls.is_negative() || self.friction.is_negative();
+        if is_active && moved != I16F16::ZERO && damping.newtons_per_mm > I8F24::ZERO {
+            self.damp(damping, moved);
+            return (self.given.total(), self.given != wanted);
+        }
+        (wanted.total(), false)
     }
 
-    /// What the force of the tick before did over the way since then.
-    fn count_energy(&mut self, depth: Millimetres, wanted: Newtons) {
-        let way = depth.0.saturating_sub(self.depth.0);
+    /// The motor gave so much less than the force of the tick, N, because of a limit: the walls gave it the less.
+    pub(crate) fn held_back(&mut self, missing: I16F16) {
+        let walls = self.given.walls.0;
+        let left = walls.saturating_sub(missing);
+        let (least, most) = if walls.is_negative() { (walls, I16F16::ZERO) } else { (I16F16::ZERO, walls) };
+        self.given.walls = Newtons(left.clamp(least, most));
+    }
+
+    /// What the forces of the tick before did over the way since then.
+    fn count_energy(&mut self, depth: Millimetres, wanted: Elements, has_given_way: bool) {
+        let way = depth.0.saturating_sub(self.depth.0).to_bits().clamp(-LARGEST_WAY - 1, LARGEST_WAY);
         self.depth = depth;
-        self.energy = if wanted.0.unsigned_abs() < NOTHING {
-            I32F32::ZERO
-        } else {
-            self.energy.saturating_add(self.force.0.wide_mul(way))
-        };
+        self.walls = counted(self.walls, self.given.walls, wanted.walls, way);
+        if has_given_way {
+            // What it had stored has gone into its tearing.
+            self.walls = self.walls.min(Energy::default());
+        }
+        self.friction = counted(self.friction, self.given.friction, wanted.friction, way).min(FRICTION_STORE);
     }
 
     fn moved_in_a_bounce(&mut self, depth: Millimetres) -> I16F16 {
@@ -78,6 +140,29 @@ impl Observer {
         *oldest = depth;
         moved
     }
+
+    /// Reduces what an active element gives along the needle's way.
+    #[inline(never)]
+    fn damp(&mut self, damping: BounceDamping, moved: I16F16) {
+        let damped = |force: Newtons| {
+            let is_pushed_along = force.0.is_negative() != moved.is_negative();
+            if is_pushed_along { reduced(damping, moved, force) } else { force }
+        };
+        if self.walls.is_negative() {
+            self.given.walls = damped(self.given.walls);
+        }
+        if self.friction.is_negative() {
+            self.given.friction = damped(self.given.friction);
+        }
+    }
+}
+
+/// `energy` after `given` has acted over `way`; where next to nothing is wanted a new count begins.
+fn counted(energy: Energy, given: Newtons, wanted: Newtons, way: i32) -> Energy {
+    // From −NOTHING to NOTHING, both left out, in one comparison.
+    let is_nothing =
+        wanted.0.to_bits().wrapping_add(NOTHING - 1).cast_unsigned() < (2 * NOTHING - 1).cast_unsigned();
+    if is_nothing { Energy::default() } else { energy.with_work(given, way) }
 }
 
 /// What the compensation has put into the mechanism, less what the friction that was found there has taken out of it, in
@@ -118,7 +203,7 @@ impl Account {
 
 /// `wanted` without what damping takes, towards zero.
 fn reduced(damping: BounceDamping, moved: I16F16, wanted: Newtons) -> Newtons {
-    let surplus = product(moved.saturating_abs().to_bits(), damping.newtons_per_mm.to_bits(), 24);
+    let surplus = saturating_product(moved.saturating_abs().to_bits(), damping.newtons_per_mm.to_bits(), 24);
     let left = wanted.0.saturating_abs().saturating_sub(I16F16::from_bits(surplus)).max(I16F16::ZERO);
     Newtons(if wanted.0 < I16F16::ZERO { -left } else { left })
 }
@@ -150,13 +235,17 @@ mod tests {
         }
     }
 
-    /// A force that pushes the needle before it from the first tick on gives energy that nobody put in.
+    fn wall(newtons: f64) -> Elements {
+        Elements { walls: n(newtons), ..Elements::NONE }
+    }
+
+    /// A wall that pushes the needle before it from the first tick on gives energy that nobody put in.
     #[expect(clippy::float_arithmetic, reason = "a test")]
     fn pushed(force: f64, from: f64, step: f64, ticks: i32) -> (Observer, usize) {
         let mut observer = Observer::new(mm(from));
         let reduced = (1..=ticks).filter(|&tick| {
             let depth = mm(from + step * f64::from(tick));
-            observer.tick(damping(), depth, n(force)).1
+            observer.tick(damping(), depth, wall(force), false).1
         });
         let reduced = reduced.count();
         (observer, reduced)
@@ -177,7 +266,7 @@ mod tests {
         let off = BounceDamping::new(Damping::default());
         for tick in 1..20 {
             let depth = mm(5.0 - 0.01 * f64::from(tick));
-            assert_eq!(observer.tick(off, depth, n(1.0)), (n(1.0), false));
+            assert_eq!(observer.tick(off, depth, wall(1.0), false), (n(1.0), false));
         }
     }
 
@@ -186,7 +275,7 @@ mod tests {
         let (mut observer, _) = pushed(1.0, 5.0, 0.01, 20);
         let back = (0..18).filter(|&tick| {
             let depth = mm(5.2 - 0.01 * f64::from(tick));
-            observer.tick(damping(), depth, n(1.0)).1
+            observer.tick(damping(), depth, wall(1.0), false).1
         });
         assert_eq!(back.count(), 0);
     }
@@ -194,11 +283,85 @@ mod tests {
     #[test]
     fn a_force_next_to_nothing_begins_a_new_count() {
         let (mut observer, _) = pushed(1.0, 5.0, -0.01, 20);
-        assert!(observer.energy < I32F32::ZERO);
-        observer.tick(damping(), mm(4.8), n(0.006));
-        assert!(observer.energy < I32F32::ZERO, "6 mN are something");
-        observer.tick(damping(), mm(4.8), n(0.004));
-        assert_eq!(observer.energy, I32F32::ZERO);
+        assert!(observer.walls.is_negative());
+        observer.tick(damping(), mm(4.8), wall(0.006), false);
+        assert!(observer.walls.is_negative(), "6 mN are something");
+        observer.tick(damping(), mm(4.8), wall(0.004), false);
+        assert_eq!(observer.walls, Energy::default());
+    }
+
+    /// Where the needle is `tick` ticks into its way from `from`.
+    #[expect(clippy::float_arithmetic, reason = "a test")]
+    fn at(from: f64, step: f64, tick: i32) -> Millimetres {
+        mm(from + step * f64::from(tick))
+    }
+
+    /// 1 N of friction over 5 mm, and then a wall that gives what nobody put into it.
+    #[test]
+    fn what_friction_took_is_no_credit_of_a_wall() {
+        let mut observer = Observer::new(mm(0.0));
+        for tick in 1..=500 {
+            let rubbed = Elements { friction: n(1.0), ..Elements::NONE };
+            assert_eq!(observer.tick(damping(), at(0.0, 0.01, tick), rubbed, false), (n(1.0), false));
+        }
+        let both = Elements { walls: n(1.0), friction: n(0.2) };
+        let reduced = (1..=20).filter(|&tick| observer.tick(damping(), at(5.0, -0.01, tick), both, false).1);
+        assert!(reduced.count() > 15);
+    }
+
+    #[test]
+    fn friction_gives_back_no_more_than_its_hold_stores() {
+        let mut observer = Observer::new(mm(0.0));
+        let rubbed = Elements { friction: n(1.0), ..Elements::NONE };
+        for tick in 1..=500 {
+            observer.tick(damping(), at(0.0, 0.01, tick), rubbed, false);
+        }
+        // Half a millijoule: 50 steps of 0.01 mm under 1 N, and one that has not acted yet.
+        let back = (1..=200).filter(|&tick| !observer.tick(damping(), at(5.0, -0.01, tick), rubbed, false).1);
+        assert_eq!(back.count(), 50);
+    }
+
+    #[test]
+    fn a_wall_that_gives_way_keeps_no_credit() {
+        for has_given_way in [false, true] {
+            let (mut observer, _) = pushed(1.0, 5.0, 0.01, 20);
+            observer.tick(damping(), mm(5.2), wall(1.0), has_given_way);
+            let back =
+                (1..18).filter(|&tick| observer.tick(damping(), at(5.2, -0.01, tick), wall(1.0), false).1);
+            assert_eq!(back.count() > 0, has_given_way);
+        }
+    }
+
+    /// A wall that was pressed in while a limit left a tenth of its force has stored a tenth.
+    #[test]
+    fn what_a_limit_held_back_is_no_credit() {
+        let mut observer = Observer::new(mm(5.0));
+        for tick in 1..=20 {
+            observer.tick(damping(), at(5.0, 0.01, tick), wall(1.0), false);
+            observer.held_back(I16F16::from_num(0.9));
+        }
+        let back = (1..18).filter(|&tick| observer.tick(damping(), at(5.2, -0.01, tick), wall(1.0), false).1);
+        assert!(back.count() > 10);
+    }
+
+    #[test]
+    fn what_is_missing_of_a_force_is_the_walls() {
+        let held_back = |walls: f64, missing: f64| {
+            let given = Elements { walls: n(walls), friction: n(0.5) };
+            let mut observer = Observer { given, ..Observer::default() };
+            observer.held_back(I16F16::from_num(missing));
+            (observer.given.walls, observer.given.friction)
+        };
+        for (walls, missing, left) in [
+            (2.0, 0.0, 2.0),
+            (2.0, 1.5, 0.5),
+            (2.0, 2.5, 0.0),
+            (-2.0, -0.5, -1.5),
+            (-2.0, -9.0, 0.0),
+            (2.0, -1.0, 2.0),
+        ] {
+            assert_eq!(held_back(walls, missing), (n(left), n(0.5)));
+        }
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub struct Plan {
     pub(crate) law: law::Plan,
     /// Length by which a force of the law becomes the torque that is given: the roller's radius at the declared scale.
     pub(crate) lever: I16F16,
+    /// 1/lever, 1/mm.
+    pub(crate) per_lever: I16F16,
     pub(crate) torque_limits: TorqueLimits,
     /// Torque under which a motor that is not held moves.
     pub(crate) frozen_torque: U16F16,
@@ -70,12 +72,14 @@ impl Plan {
         };
         let law = law::Plan::new(&patient.law, &ground)?;
         let anatomy = layers::plan(config, &met);
+        let lever = device.roller_radius.0.saturating_mul(patient.scale);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;
         Ok(Self {
             scale,
             anatomy,
             law,
-            lever: device.roller_radius.0.saturating_mul(patient.scale),
+            lever,
+            per_lever: I16F16::ONE.saturating_div(lever.max(I16F16::DELTA)),
             torque_limits: TorqueLimits {
                 torque: largest_torque(config),
                 slew_per_tick: config.device.limits.slew_per_tick.0,

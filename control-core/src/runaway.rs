@@ -19,7 +19,7 @@
 use crate::TICK_HZ;
 use crate::event::Fault;
 use crate::units::MillimetresPerSecond;
-use fixed::types::{I2F30, I16F16};
+use fixed::types::{I2F30, I16F16, U16F16};
 
 /// Ticks from one look to the next: 0.8 ms.
 pub(crate) const LOOK_TICKS: u32 = 8;
@@ -92,7 +92,7 @@ impl Bounds {
     }
 
     /// Whether `against`, counts that a span has gained against `torque`, are what a needle without a hand gains.
-    fn is_driven(&self, against: i32, torque: I16F16) -> bool {
+    fn is_driven(&self, against: i32, torque: U16F16) -> bool {
         // Torques stay below 512 mN·m, counts of them below 2^24.
         let counts = |per_mnm_q8: i32| ((i64::from(torque.to_bits()) * i64::from(per_mnm_q8)) >> 24) as i32;
         against >= self.least && against <= counts(self.per_mnm_q8.0) && against >= counts(self.per_mnm_q8.1)
@@ -109,6 +109,10 @@ pub(crate) struct Watch {
     next: usize,
     /// Counts that the last span has more than the one before it.
     gained: i32,
+    /// The same against the motor; nought where a wall has just given way.
+    gained_against: i32,
+    /// The torque under which it was gained.
+    gained_under: U16F16,
     /// Looks in a row at which the needle went as its motor would drive it the wrong way.
     driven_looks: u32,
     turns: u32,
@@ -172,6 +176,8 @@ impl Watch {
         if let (Some(last), Some(given)) = (self.counts.get_mut(place), self.torques.get_mut(place)) {
             (*last, *given) = (count, torque);
         }
+        // A look that a puncture keeps from being looked at is not judged by the one before it.
+        (self.gained, self.gained_against) = (0, 0);
     }
 
     fn count(&self, looks_ago: usize) -> i32 {
@@ -182,7 +188,7 @@ impl Watch {
         self.torques.get(self.next.wrapping_sub(looks_ago) % LOOKS).copied().unwrap_or_default()
     }
 
-    /// Too fast. What the needle has gained is kept for [`Self::judge`].
+    /// Too fast. What the needle has gained is kept for [`Self::compare`].
     pub(crate) fn look(&mut self, bounds: &Bounds) -> Option<Fault> {
         let middle = self.count(SPAN_LOOKS);
         let speed = self.count(0).wrapping_sub(middle);
@@ -207,23 +213,25 @@ impl Watch {
         I16F16::from_bits((early >> 2) + (middle >> 1) + (late >> 2))
     }
 
-    /// Against the motor.
-    pub(crate) fn judge(&mut self, bounds: &Bounds) -> Option<Fault> {
-        // Taken, so that a look which a puncture kept from being looked at is not judged by the one before it.
-        let gained = core::mem::take(&mut self.gained);
+    /// What the needle gained against the motor, and under which torque; [`Self::judge`] says what comes of it.
+    pub(crate) fn compare(&mut self) {
+        let gained = self.gained;
         let torque = self.mean_torque();
-        let strength = torque.saturating_abs();
-        let (last, before) = (self.torque(0).saturating_abs(), self.torque(2 * SPAN_LOOKS).saturating_abs());
-        let against = if torque.is_negative() { gained } else { gained.wrapping_neg() };
+        let (last, before) = (self.torque(0).unsigned_abs(), self.torque(2 * SPAN_LOOKS).unsigned_abs());
         // A wall that has just given way: three quarters.
         let has_fallen = last < before - (before >> 2);
-        let is_driven = !has_fallen && bounds.is_driven(against, strength);
-        self.driven_looks = if is_driven { self.driven_looks.saturating_add(1) } else { 0 };
-        (self.driven_looks >= DRIVEN_LOOKS).then_some(Fault::WrongWay)
+        let against = if torque.is_negative() { gained } else { gained.wrapping_neg() };
+        self.gained_against = if has_fallen { 0 } else { against };
+        self.gained_under = torque.unsigned_abs();
     }
 
-    /// The look's last part: to and fro.
-    pub(crate) fn count_turns(&mut self) -> Option<Fault> {
+    /// The look's last part: looks in a row at which the needle was driven, and to and fro.
+    pub(crate) fn judge(&mut self, bounds: &Bounds) -> Option<Fault> {
+        let is_driven = bounds.is_driven(self.gained_against, self.gained_under);
+        self.driven_looks = if is_driven { self.driven_looks.saturating_add(1) } else { 0 };
+        if self.driven_looks >= DRIVEN_LOOKS {
+            return Some(Fault::WrongWay);
+        }
         if self.turns > TURNS {
             return Some(Fault::EncoderChannel);
         }
@@ -263,8 +271,8 @@ mod tests {
             let fault = is_look.then(|| {
                 watch.take(count, I16F16::from_num(torque));
                 let fast = watch.look(&bounds);
-                let driven = watch.judge(&bounds);
-                fast.or(driven).or(watch.count_turns())
+                watch.compare();
+                fast.or(watch.judge(&bounds))
             });
             fault.flatten().map(|fault| (time, fault))
         })
@@ -375,7 +383,7 @@ mod tests {
             given = torque.to_num();
             let fault = (tick % LOOK_TICKS == 0).then(|| {
                 watch.take(count, torque);
-                watch.count_turns()
+                watch.judge(&bounds())
             });
             fault.flatten().map(|fault| (f64::from(tick) / 1e4, fault))
         })
@@ -402,7 +410,7 @@ mod tests {
             let torque = watch.steady(I16F16::from_num(-5 - count), I16F16::from_num(-6 + count));
             let fault = (tick % 8 == 0).then(|| {
                 watch.take(count, torque);
-                watch.look(&bounds).or(watch.count_turns())
+                watch.look(&bounds).or(watch.judge(&bounds))
             });
             fault.flatten().map(|fault| (tick, fault))
         });

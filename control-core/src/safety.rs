@@ -2,7 +2,7 @@
 
 use crate::config::Device;
 use crate::event::Limits;
-use crate::math::scaled;
+use crate::math::truncating_product;
 use crate::units::{DacCode, MillinewtonMetres};
 use fixed::types::{I2F30, I16F16};
 
@@ -43,7 +43,7 @@ impl Limiter {
         let mut torque = wanted.0;
         if self.faded < I2F30::ONE {
             self.faded = self.faded.saturating_add(limits.fade_per_tick).min(I2F30::ONE);
-            torque = I16F16::from_bits(scaled(torque.to_bits(), self.faded.to_bits(), 30));
+            torque = I16F16::from_bits(truncating_product(torque.to_bits(), self.faded.to_bits(), 30));
             in_force = in_force.with(Limits::FADE_IN);
         }
         let lowest = self.given.saturating_sub(limits.slew_per_tick);

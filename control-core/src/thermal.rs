@@ -2,7 +2,7 @@
 //! torque is reached the torque limit falls to the continuous torque; that is a limit in force, not a fault.
 
 use crate::TICK_HZ;
-use crate::math::{product, scaled};
+use crate::math::{saturating_product, truncating_product};
 use crate::units::MillinewtonMetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
@@ -95,8 +95,9 @@ impl Winding {
         }
         // At most 180² (mN·m)².
         let left_q16 = ((limits.allowed - self.heat).max(I32F32::ZERO).to_bits() >> 16) as i32;
-        let share = I2F30::from_bits(product(left_q16, limits.per_blend.to_bits(), 16)).min(I2F30::ONE);
-        let more = scaled(most.saturating_sub(limits.continuous).to_bits(), share.to_bits(), 30);
+        let share =
+            I2F30::from_bits(saturating_product(left_q16, limits.per_blend.to_bits(), 16)).min(I2F30::ONE);
+        let more = truncating_product(most.saturating_sub(limits.continuous).to_bits(), share.to_bits(), 30);
         limits.continuous.saturating_add(I16F16::from_bits(more))
     }
 }

@@ -1,7 +1,7 @@
 //! The jog effect of a wall (seed 001, eq. 1): it resists along a rising parabola, gives way, and relieves along a
 //! falling one that is felt only while the tip cuts on.
 
-use crate::math::{product, scaled, upper_half};
+use crate::math::{saturating_product, truncating_product, upper_half};
 use crate::tissue::{self, MAX_LAYERS};
 use crate::units::{Millimetres, Newtons};
 use fixed::types::{I9F23, I16F16};
@@ -34,8 +34,8 @@ impl Parabola {
     pub(crate) fn force(&self, travel: Millimetres) -> Newtons {
         let from_vertex = self.past_vertex(travel.0);
         // Q16 · Q23 to Q22, whose square is Q44, to Q16.
-        let root_q22 = product(from_vertex.to_bits(), self.inverse_root_compliance.to_bits(), 17);
-        let rise = I16F16::from_bits(product(root_q22, root_q22, 28));
+        let root_q22 = saturating_product(from_vertex.to_bits(), self.inverse_root_compliance.to_bits(), 17);
+        let rise = I16F16::from_bits(saturating_product(root_q22, root_q22, 28));
         Newtons(rise.saturating_add(self.base))
     }
 
@@ -46,7 +46,7 @@ impl Parabola {
     /// [`Self::force`] so far from the vertex, where the wall is felt: [`crate::plan`] has seen to it that the rise is
     /// below 256 N there.
     fn force_felt(&self, from_vertex: I16F16) -> Newtons {
-        let root_q22 = scaled(from_vertex.to_bits(), self.inverse_root_compliance.to_bits(), 17);
+        let root_q22 = truncating_product(from_vertex.to_bits(), self.inverse_root_compliance.to_bits(), 17);
         let rise = I16F16::from_bits(upper_half(root_q22 << 2, root_q22 << 2));
         Newtons(rise.saturating_add(self.base))
     }

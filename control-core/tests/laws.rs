@@ -143,6 +143,31 @@ fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
 }
 
 #[test]
+fn one_count_to_and_fro_is_no_withdrawal() {
+    for speed in [SpeedMethod::Window, SpeedMethod::EdgeTiming] {
+        let mut c = started(&Config { device: Device { speed, ..Device::default() }, ..Config::default() });
+        let mut at = 0.0;
+        travel(&mut c, &mut at, 7.7, 10.0, |_| ());
+        hold(&mut c, at, 0.1);
+        let count = (at / c.plan().mm_per_count().to_num::<f64>()).round() as i32;
+        let mut labels = Vec::new();
+        // Slower than a dead channel's flicker, which is a fault.
+        for period in [90, 150, 400] {
+            labels.extend((0..4_000).map(|tick| tick_at(&mut c, count - tick / period % 2).sample.state));
+        }
+        labels.sort_unstable();
+        labels.dedup();
+        assert_eq!(labels, [State::Friction as u8], "{speed:?}");
+        // Nor does a count end one: drawn out at 2 mm/s, counts come in twos and ones.
+        let mm = at - 2.0;
+        labels.clear();
+        travel(&mut c, &mut at, mm, 2.0, |out| labels.push(out.sample.state));
+        let changes = labels.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        assert_eq!((changes, labels.last()), (1, Some(&(State::Withdrawal as u8))), "{speed:?}");
+    }
+}
+
+#[test]
 fn friction_opposes_withdrawal() {
     for law in [cone(), paper()] {
         let mut c = started(&Config {

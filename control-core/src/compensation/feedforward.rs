@@ -5,7 +5,7 @@
 
 use super::{Compensation, Gains, Wave};
 use crate::config::Device;
-use crate::math::{scaled, sine, upper_half};
+use crate::math::{sine, truncating_product, upper_half};
 use crate::passivity::Account;
 use crate::units::{MillimetresPerSecond, Milliradians};
 use fixed::types::{I2F30, I16F16};
@@ -116,8 +116,7 @@ impl Feedforward {
     }
 
     /// One tick: the torque to ask for instead of `wanted`, and whether the passivity observer has held some of it back.
-    /// Out of line and out of the way: a tick that feeds nothing forward is not to pay for it.
-    #[cold]
+    /// Out of line: a tick that feeds nothing forward is not to pay for it. Not `cold`: that costs such a tick five instructions.
     #[inline(never)]
     pub(crate) fn tick(
         &mut self,
@@ -159,7 +158,7 @@ impl Feedforward {
         }
         let [_, _, weight, drive] = self.gains;
         let sine = sine(Milliradians(tilt.0.saturating_abs()));
-        let pulls = I16F16::from_bits(scaled(found.weight.0.to_bits(), sine.to_bits(), 30));
+        let pulls = I16F16::from_bits(truncating_product(found.weight.0.to_bits(), sine.to_bits(), 30));
         let pulls = if tilt.0 < 0 { -pulls } else { pulls };
         self.steady = -at_gain(pulls, weight) - at_gain(found.offset.0, drive);
     }
@@ -173,8 +172,8 @@ impl Feedforward {
         }
         let reach = width + width;
         let within = asked.min(reach).max(-reach);
-        let share = I16F16::from_bits(scaled(within.to_bits(), ready.per_deadband.to_bits(), 16));
-        at_gain(I16F16::from_bits(scaled(width.to_bits(), share.to_bits(), 16)), drive)
+        let share = I16F16::from_bits(truncating_product(within.to_bits(), ready.per_deadband.to_bits(), 16));
+        at_gain(I16F16::from_bits(truncating_product(width.to_bits(), share.to_bits(), 16)), drive)
     }
 }
 
@@ -198,15 +197,16 @@ fn rubbing(found: &Compensation, ready: &Ready, speed: MillimetresPerSecond) -> 
     if above <= I16F16::ZERO {
         return Rubbing { found: dry, given_back: I16F16::ZERO, moves_outwards: None };
     }
-    let force = dry.saturating_add(I16F16::from_bits(scaled(magnitude.to_bits(), viscous.to_bits(), 30)));
+    let force =
+        dry.saturating_add(I16F16::from_bits(truncating_product(magnitude.to_bits(), viscous.to_bits(), 30)));
     let given_back = if above >= found.full_speed.0.saturating_sub(found.rest_speed.0) {
         force
     } else {
         // t²·(3 − 2t), t in Q30.
-        let part = scaled(above.to_bits(), ready.per_blend.to_bits(), 16);
+        let part = truncating_product(above.to_bits(), ready.per_blend.to_bits(), 16);
         let smooth = upper_half(upper_half(part, part), (3 << 29) - part);
         // Q28 times Q29 without 32 places.
-        I16F16::from_bits(scaled(force.to_bits(), smooth, 25))
+        I16F16::from_bits(truncating_product(force.to_bits(), smooth, 25))
     };
     let given_back = if is_outwards { -given_back } else { given_back };
     Rubbing { found: force, given_back, moves_outwards: Some(is_outwards) }
@@ -229,7 +229,7 @@ fn released(before: I16F16, Rubbing { found, given_back, moves_outwards }: Rubbi
 
 /// `force·gain`, with a gain below 1.
 fn at_gain(force: I16F16, gain: I16F16) -> I16F16 {
-    I16F16::from_bits(scaled(force.to_bits(), gain.to_bits(), 16))
+    I16F16::from_bits(truncating_product(force.to_bits(), gain.to_bits(), 16))
 }
 
 /// The sum of waves at a rotor's angle of which 2^32 are a turn.

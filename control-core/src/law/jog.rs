@@ -1,14 +1,15 @@
 //! The law of seed 001: the jog effect of each wall and the friction between them.
 
-use super::{Ground, Met, Response, WITHDRAWAL_SPEED, follow_share};
+use super::{Ground, Met, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
 use crate::friction;
-use crate::math::{reciprocal, scaled, sine, times};
+use crate::math::{reciprocal, saturating_product, saturating_times, sine, truncating_product};
+use crate::passivity::Elements;
 use crate::proxy::Anchor;
 use crate::refusal::{Field, Refusal, milli, within};
 use crate::tissue::{Layer, MAX_LAYERS};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Stiffness};
+use crate::units::{Millimetres, Newtons, Stiffness};
 use crate::wall::{self, Cut};
 use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
@@ -116,27 +117,26 @@ struct Walls {
 }
 
 impl Memory {
-    /// One tick with the tip at `depth` along the needle, where `met` says what it has met.
+    /// One tick with a needle that moves so, where `met` says what it has met.
     pub(crate) fn tick(
         &mut self,
         _: &FrictionLaw,
         forces: &Plan,
         met: &Insertion,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
+        Motion { depth, withdraws, .. }: Motion,
     ) -> Response {
         self.heal(met.given());
         let walls = self.walls(forces, met, depth);
         let friction = self.friction(forces, met, depth);
         let state = match friction {
-            Some(_) if speed.0 < -WITHDRAWAL_SPEED => State::Withdrawal,
+            Some(_) if withdraws => State::Withdrawal,
             _ if walls.pressing => State::Elastic,
             Some(_) if walls.past_vertex < I16F16::ZERO => State::Puncture,
             Some(_) => State::Friction,
             None => State::Approach,
         };
-        let force = walls.force.saturating_add(friction.unwrap_or_default().0);
-        Response { force: Newtons(force), state, ..Response::NONE }
+        let force = Elements { walls: Newtons(walls.force), friction: friction.unwrap_or_default() };
+        Response { force, state, ..Response::NONE }
     }
 
     /// Walls that the tip has left are whole again. It leaves one a tick.
@@ -186,12 +186,12 @@ fn limit(forces: &Plan, met: &Insertion, depth: Millimetres) -> Newtons {
     let index = met.innermost(depth);
     let Some(rub) = forces.rubs.get(index) else { return Newtons::default() };
     let inside = depth.0.saturating_sub(met.top(index));
-    Newtons(times(inside, rub.per_mm).saturating_add(stretched(rub.above.0, met.path_per_depth())))
+    Newtons(saturating_times(inside, rub.per_mm).saturating_add(stretched(rub.above.0, met.path_per_depth())))
 }
 
-/// What layers that are passed at an angle add up to, where it is known to fit: it is below the motor's force.
+/// What layers that are passed at an angle add up to.
 fn stretched(straight: I16F16, path_per_depth: I8F24) -> I16F16 {
-    I16F16::from_bits(scaled(straight.to_bits(), path_per_depth.to_bits(), 24))
+    I16F16::from_bits(saturating_product(straight.to_bits(), path_per_depth.to_bits(), 24))
 }
 
 fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
@@ -247,7 +247,7 @@ fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
 /// The same with layers met at `stretch` times their depth.
 fn check_at(ground: &Ground, stretch: I8F24) -> Result<(), Refusal> {
     let (travel, limit) = (ground.travel, ground.largest);
-    let along = |depth: I16F16| I16F16::from_bits(scaled(depth.to_bits(), stretch.to_bits(), 24));
+    let along = |depth: I16F16| I16F16::from_bits(truncating_product(depth.to_bits(), stretch.to_bits(), 24));
     let (mut friction, mut at, mut per_mm, mut deepest) = (I16F16::ZERO, I16F16::ZERO, I16F16::ZERO, 0);
     for Met { number, layer } in ground.layers {
         let top = along(layer.depth.0);

@@ -4,15 +4,23 @@
 
 use crate::anatomy::Insertion;
 use crate::event::State;
-use crate::math::scaled;
+use crate::math::truncating_product;
+use crate::passivity::Elements;
 use crate::refusal::Refusal;
 use crate::tissue::Layer;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I2F30, I16F16};
 use serde::{Deserialize, Serialize};
 
-/// Slower than this the needle rests; faster outwards it is being withdrawn. 1 mm/s.
-const WITHDRAWAL_SPEED: I16F16 = I16F16::from_bits(1 << 16);
+/// How the needle moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion {
+    /// Of the tip along the needle.
+    pub(crate) depth: Millimetres,
+    pub(crate) speed: MillimetresPerSecond,
+    /// It is being drawn out.
+    pub(crate) withdraws: bool,
+}
 
 /// A layer as the needle meets it.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +48,8 @@ pub(crate) struct Ground<'a> {
 /// What a law makes of where the tip is and how it moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Response {
-    pub(crate) force: Newtons,
+    /// Along the needle, positive against insertion.
+    pub(crate) force: Elements,
     pub(crate) state: State,
     /// Across the needle: computed and told, for this device cannot push sideways.
     pub(crate) lateral: Newtons,
@@ -53,7 +62,7 @@ pub(crate) struct Response {
 impl Response {
     /// Of no tissue.
     pub(crate) const NONE: Self = Self {
-        force: Newtons(I16F16::ZERO),
+        force: Elements::NONE,
         state: State::Approach,
         lateral: Newtons(I16F16::ZERO),
         barrier: false,
@@ -70,7 +79,7 @@ fn follow_share(tau_ms: u16) -> I2F30 {
 
 /// A stiffness of `slope` N/mm makes `force` N over this many mm, given `1/slope`.
 fn reach(force: I16F16, inverse_slope: I16F16) -> I16F16 {
-    I16F16::from_bits(scaled(force.to_bits(), inverse_slope.to_bits(), 16))
+    I16F16::from_bits(truncating_product(force.to_bits(), inverse_slope.to_bits(), 16))
 }
 
 macro_rules! laws {
@@ -111,19 +120,17 @@ macro_rules! laws {
         }
 
         impl Memory {
-            /// One tick of `law`, of which `plan` was made, with the tip at `depth` along the needle, where `met` says what it
-            /// has met.
+            /// One tick of `law`, of which `plan` was made, with a needle that moves so, where `met` says what it has met.
             pub(crate) fn tick(
                 &mut self,
                 law: &Law,
                 plan: &Plan,
                 met: &Insertion,
-                depth: Millimetres,
-                speed: MillimetresPerSecond,
+                motion: Motion,
             ) -> Response {
                 match (self, plan, law) {
                     $((Memory::$name(memory), Plan::$name(plan), Law::$name(config)) => {
-                        memory.tick(config, plan, met, depth, speed)
+                        memory.tick(config, plan, met, motion)
                     })+
                     // A memory is made by its plan, and a plan by its law.
                     _ => Response::NONE,

@@ -8,10 +8,12 @@
 //! LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s − F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped
 //! implicitly over the tick's own travel Δx, `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
 
-use super::{Ground, Met, Response, WITHDRAWAL_SPEED, follow_share, reach};
+use super::{Ground, Met, Motion, Response, follow_share, reach};
 use crate::anatomy::Insertion;
 use crate::event::State;
-use crate::math::{exp_negative, scaled, share};
+use crate::kinematics::REST_SPEED;
+use crate::math::{exp_negative, saturating_multiply, share, truncating_product};
+use crate::passivity::Elements;
 use crate::proxy::Anchor;
 use crate::refusal::{Field, Refusal, count, milli, within};
 use crate::tissue::MAX_LAYERS;
@@ -163,8 +165,7 @@ impl Memory {
         config: &Sparte,
         plan: &Plan,
         met: &Insertion,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
+        Motion { depth, speed, withdraws }: Motion,
     ) -> Response {
         let step =
             depth.0.to_bits().wrapping_sub(self.last_depth.0.to_bits()).clamp(-LARGEST_STEP, LARGEST_STEP);
@@ -176,23 +177,24 @@ impl Memory {
             self.entry = None;
             self.is_beyond = false;
             let state = if pressed.is_some() { State::Elastic } else { State::Approach };
-            return Response { force: Newtons(pressed.unwrap_or_default()), state, ..Response::NONE };
+            let force = Elements { walls: Newtons(pressed.unwrap_or_default()), ..Elements::NONE };
+            return Response { force, state, ..Response::NONE };
         }
         let elastic = pressed.unwrap_or_default();
         let cut = plan.cuts.get(met.innermost(depth)).copied().unwrap_or_default();
         let (cutting, is_full) = self.track(config, plan, cut, elastic, depth, speed);
         let friction = self.rub(&plan.rub, step, speed);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
-        let state = if speed.0 < -WITHDRAWAL_SPEED {
+        let state = if withdraws {
             State::Withdrawal
         } else if pressed.is_some() {
             State::Elastic
-        } else if !is_full && speed.0 > WITHDRAWAL_SPEED {
+        } else if !is_full && speed.0 > REST_SPEED {
             State::Puncture
         } else {
             State::Friction
         };
-        let force = Newtons(elastic.saturating_add(cutting).saturating_add(friction));
+        let force = Elements { walls: Newtons(elastic), friction: Newtons(cutting.saturating_add(friction)) };
         Response { force, state, lateral, barrier, ..Response::NONE }
     }
 
@@ -212,14 +214,14 @@ impl Memory {
         self.wall.drag(depth, inwards, reach(cut.outwards.0, plan.inverse_tracking));
         let stretch = self.wall.stretch(depth);
         let held = reach(plan.rub.sliding, plan.inverse_tracking);
-        if speed.0.unsigned_abs() < WITHDRAWAL_SPEED.unsigned_abs()
+        if speed.0.unsigned_abs() < REST_SPEED.unsigned_abs()
             && stretch.unsigned_abs() > held.unsigned_abs()
         {
             let held = if stretch < I16F16::ZERO { -held } else { held };
             self.wall.follow(depth.0.saturating_sub(held), plan.relax);
         }
-        let force = scaled(self.wall.stretch(depth).to_bits(), config.tracking.0.to_bits(), 16);
-        (I16F16::from_bits(force), is_full)
+        let force = saturating_multiply(self.wall.stretch(depth), config.tracking.0);
+        (force, is_full)
     }
 
     /// LuGre over a step of `step` mm, in Q16.
@@ -228,18 +230,18 @@ impl Memory {
             speed.0.clamp(I16F16::from_bits(-LARGEST_SPEED), I16F16::from_bits(LARGEST_SPEED)).to_bits();
         let level = rub.level(speed);
         if step != 0 {
-            let stretched = scaled(step.abs(), rub.stiffness.to_bits(), 16);
+            let stretched = truncating_product(step.abs(), rub.stiffness.to_bits(), 16);
             let moved = self.bristles.to_bits() + (step << 8);
-            let lost = scaled(moved, share(stretched, level + stretched), 28);
+            let lost = truncating_product(moved, share(stretched, level + stretched), 28);
             self.bristles = I8F24::from_bits(moved - lost);
         }
-        let held = scaled(self.bristles.to_bits(), rub.stiffness.to_bits(), 24);
+        let held = truncating_product(self.bristles.to_bits(), rub.stiffness.to_bits(), 24);
         // σ₁ż with ż = v − |v|·σ₀z/g: at rest and while sliding steadily, nothing.
         let ratio = share(held.abs().min(level), level);
         let ratio = if held < 0 { -ratio } else { ratio };
-        let bristle_speed = speed - scaled(speed.abs(), ratio, 28);
-        let damped = scaled(bristle_speed, rub.damping.to_bits(), 30);
-        let viscous = scaled(speed, rub.viscous.to_bits(), 30);
+        let bristle_speed = speed - truncating_product(speed.abs(), ratio, 28);
+        let damped = truncating_product(bristle_speed, rub.damping.to_bits(), 30);
+        let viscous = truncating_product(speed, rub.viscous.to_bits(), 30);
         I16F16::from_bits(held + damped + viscous)
     }
 
@@ -261,10 +263,10 @@ impl Rub {
     /// g(v), N in Q16; `speed` in mm/s, Q16.
     fn level(&self, speed: i32) -> i32 {
         // v/v_s, at most 4 of them: beyond that nothing sticks.
-        let ratio = scaled(speed.abs(), self.per_speed.to_bits(), 24).min(4 << 16);
-        let square = scaled(ratio, ratio, 16);
+        let ratio = truncating_product(speed.abs(), self.per_speed.to_bits(), 24).min(4 << 16);
+        let square = truncating_product(ratio, ratio, 16);
         let sticking = exp_negative(I16F16::from_bits(square));
-        self.sliding.to_bits() + scaled(self.sticking.to_bits(), sticking.to_bits(), 30)
+        self.sliding.to_bits() + truncating_product(self.sticking.to_bits(), sticking.to_bits(), 30)
     }
 }
 

@@ -2,10 +2,11 @@
 //! between its knots and level beyond them. The paper says nothing of a needle that rests or is drawn back: there the force is
 //! held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it outwards.
 
-use super::{Ground, Response, WITHDRAWAL_SPEED, reach};
+use super::{Ground, Motion, Response, reach};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
-use crate::math::scaled;
+use crate::math::{saturating_multiply, truncating_product};
+use crate::passivity::Elements;
 use crate::proxy::Anchor;
 use crate::refusal::{Field, Refusal, count, milli, within};
 use crate::units::{Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
@@ -128,7 +129,7 @@ impl Plan {
     /// Where a depth below the skin lies among the table's, which are evenly apart.
     fn depth(&self, depth: i32) -> Place {
         // At most 500 mm, 20 knots in each.
-        let knots = scaled(depth, self.per_depth, 24);
+        let knots = truncating_product(depth, self.per_depth, 24);
         let (index, last) = ((knots >> 16) as usize, self.depths.saturating_sub(1));
         if index >= last {
             return Place { index: last, next: last, share: 0 };
@@ -158,12 +159,12 @@ impl Plan {
         };
         let (slow, fast) = (across(speed.index, true), across(speed.next, speed.share > 0));
         // mN in Q12 to N in Q16: by 16/1000, 0.016 in Q26.
-        (I16F16::from_bits(scaled(between(slow, fast, speed.share), 1_073_742, 26)), measured)
+        (I16F16::from_bits(truncating_product(between(slow, fast, speed.share), 1_073_742, 26)), measured)
     }
 }
 
 fn between(from: i32, to: i32, share_q16: i32) -> i32 {
-    from + scaled(to - from, share_q16, 16)
+    from + truncating_product(to - from, share_q16, 16)
 }
 
 /// What the needle has done so far.
@@ -180,24 +181,23 @@ impl Memory {
         table: &ForceTable,
         plan: &Plan,
         met: &Insertion,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
+        Motion { depth, speed, withdraws }: Motion,
     ) -> Response {
         if depth.0 < met.top(0) {
             self.anchor.release(depth);
             return Response::NONE;
         }
         let inside = depth.0.saturating_sub(met.top(0)).to_bits();
-        let inside = scaled(inside, met.depth_per_path().to_bits(), 30);
+        let inside = truncating_product(inside, met.depth_per_path().to_bits(), 30);
         let angle = i32::from(met.angle().0) << 16;
         let (most, measured) = plan.force(table, inside, speed.0.saturating_abs().to_bits(), angle);
         let is_inside = met.given() >= plan.walls_that_close;
         // A wall that has not given way pushes back and does not hold.
         let share = if is_inside { table.withdrawal } else { I16F16::ZERO };
-        let least = I16F16::from_bits(scaled(most.to_bits(), share.to_bits(), 16));
+        let least = I16F16::from_bits(truncating_product(most.to_bits(), share.to_bits(), 16));
         self.anchor.drag(depth, reach(most, plan.inverse_stiffness), reach(least, plan.inverse_stiffness));
-        let force = scaled(self.anchor.stretch(depth).to_bits(), table.stiffness.0.to_bits(), 16);
-        let state = if is_inside && speed.0 < -WITHDRAWAL_SPEED {
+        let force = saturating_multiply(self.anchor.stretch(depth), table.stiffness.0);
+        let state = if is_inside && withdraws {
             State::Withdrawal
         } else if met.presses() {
             State::Elastic
@@ -206,7 +206,12 @@ impl Memory {
         } else {
             State::Approach
         };
-        Response { force: Newtons(I16F16::from_bits(force)), state, estimated: !measured, ..Response::NONE }
+        let force = if is_inside {
+            Elements { friction: Newtons(force), ..Elements::NONE }
+        } else {
+            Elements { walls: Newtons(force), ..Elements::NONE }
+        };
+        Response { force, state, estimated: !measured, ..Response::NONE }
     }
 }
 
