@@ -56,11 +56,27 @@ pub(crate) struct Wall {
     pub(crate) indented_per_mm: I16F16,
 }
 
+/// What has to have happened for the tip to be past the wall of a layer, or in the layer where it has none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passage {
+    /// The layer.
+    pub(crate) layer: usize,
+    /// How many walls have given way.
+    pub(crate) given: usize,
+}
+
+impl Passage {
+    /// Past layer number `layer`, which is `met`.
+    pub(crate) fn of(layer: usize, met: &Layer) -> Self {
+        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 } }
+    }
+}
+
 /// A vessel among the layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Vessel {
-    /// Layers of its near and of its far wall.
-    Met { near: usize, far: Option<usize> },
+    /// Its near and its far wall.
+    Met { near: Passage, far: Option<Passage> },
     /// The needle passes beside it from this depth on, perpendicular to the skin.
     Beside { depth: Millimetres },
 }
@@ -327,6 +343,7 @@ impl Insertion {
     }
 
     /// A wall that was carried along is pushed in from here; any other from where it lies.
+    #[inline(never)]
     fn touch(&mut self, layer: &Layer, depth: Millimetres) {
         let top = self.top(self.touched);
         self.touched += 1;
@@ -357,12 +374,12 @@ impl Insertion {
             Some(Vessel::Beside { .. }) => VesselState::Outside,
             Some(Vessel::Met { .. }) if transitions.is_empty() => return,
             Some(Vessel::Met { near, far }) => {
-                let is_past = |index: usize| self.is_past(anatomy, index);
+                let is_past = |wall: Passage| self.touched > wall.layer && self.given >= wall.given;
                 if far.is_some_and(is_past) {
                     VesselState::Through
                 } else if is_past(near) {
                     VesselState::InLumen
-                } else if self.touched > near {
+                } else if self.touched > near.layer {
                     VesselState::Touching
                 } else {
                     VesselState::Outside
@@ -371,12 +388,6 @@ impl Insertion {
         };
         transitions.flashback = state == VesselState::InLumen && self.vessel != VesselState::InLumen;
         self.vessel = state;
-    }
-
-    /// Whether the tip is past the wall of layer `index`, or in the layer where it has none.
-    fn is_past(&self, anatomy: &Anatomy, index: usize) -> bool {
-        let layer = anatomy.layers.get(index);
-        layer.is_some_and(|layer| self.touched > index && (!layer.has_wall || self.given > layer.walls_above))
     }
 }
 

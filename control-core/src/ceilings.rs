@@ -128,6 +128,7 @@ mod tests {
         gentler.limits.heartbeat_ms = 100;
         gentler.limits.fade_in_ms = 444;
         gentler.skin_tilt.0 = 70;
+        gentler.mechanism.dry_friction.0 *= 2;
         assert_eq!(changed(&before, &gentler), None);
         assert_eq!(changed(&gentler, &before), Some(Field::TorqueLimit), "not back again");
     }

@@ -3,8 +3,8 @@
 
 use crate::compensation::Compensation;
 use crate::units::{
-    Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians, Newtons,
-    Stiffness,
+    Damping, FrictionPerMillimetre, Grams, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
+    Newtons, Stiffness,
 };
 use fixed::types::I16F16;
 use heapless::Vec;
@@ -60,10 +60,34 @@ pub struct Device {
     pub damping: Damping,
     /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
     pub passivity_damping: Damping,
+    /// What moves, which decides how stiff a wall may be.
+    pub mechanism: Mechanism,
     /// What of its own forces the device takes away from the hand.
     pub compensation: Compensation,
     /// What stands above was found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
     pub commissioned: bool,
+}
+
+/// What moves with the roller, and how late the motor follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mechanism {
+    /// Of rotor, roller and needle, as felt along the needle, 1–1,000 g.
+    pub mass: Grams,
+    /// Dry friction along the needle, 0–10 N.
+    pub dry_friction: Newtons,
+    /// From the reading of the encoder to the torque at the shaft, beside the time for which a code is held, 20–1,000 µs.
+    pub delay_us: u16,
+}
+
+impl Default for Mechanism {
+    /// What the design notes reckon with: 30 g, 0.06 N, and a tick for converter and amplifier.
+    fn default() -> Self {
+        Self {
+            mass: Grams(I16F16::from_bits(30 << 16)),
+            dry_friction: Newtons(I16F16::from_bits(3_932)),
+            delay_us: 100,
+        }
+    }
 }
 
 /// Whom the needle goes into: tissue, its law of force, and limits of its own, which may be narrower than the device's and
@@ -124,7 +148,7 @@ pub struct SafetyConfig {
     pub max_counts_per_tick: u16,
     /// Largest depth; beyond it is a fault. 1–500 mm.
     pub travel: Millimetres,
-    /// Largest slope of any force law, at most 7 N/mm: the limit with one tick of delay (30 g, 0.02 N·s/m, 0.06 N dry).
+    /// Largest slope of any force law: at most what [`Mechanism`] bears, and 7 N/mm.
     pub stiffness: Stiffness,
     /// Largest silence of the PC while powered, 20–5,000 ms.
     pub heartbeat_ms: u16,
@@ -169,6 +193,7 @@ impl Default for Device {
             damping: Damping::default(),
             // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
+            mechanism: Mechanism::default(),
             compensation: Compensation::NONE,
             commissioned: true,
         }

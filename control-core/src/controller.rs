@@ -257,6 +257,7 @@ impl Controller {
         let speed = self.speed.tick(&self.plan.scale, count);
         self.turn = (self.turn + 1) % anatomy::LOOK_TICKS;
         let (transitions, tissue) = self.meet(input.tilt, count, depth, speed);
+        let angle = self.insertion.angle();
         self.watch_host();
         let has_given_way = transitions.puncture != 0;
         let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed, has_given_way) {
@@ -277,7 +278,7 @@ impl Controller {
             self.runaway.take(count.0, torque.0);
         } else if transitions.is_empty() {
             // A tick in which a layer is touched, gives way or is left is long enough.
-            self.take_turn();
+            self.take_turn(input.tilt);
         }
         let codes = self.plan.dac.codes(torque);
         let state = match self.mode {
@@ -301,21 +302,25 @@ impl Controller {
             depth,
             speed,
             force: tissue.force.total(),
-            angle: self.insertion.angle(),
+            angle,
             vessel: self.insertion.vessel(),
             lateral: tissue.lateral,
         }
     }
 
-    /// What is slow enough to be done in one tick of eight, each in another one.
-    fn take_turn(&mut self) {
+    /// What is slow enough to be done in one tick of eight or sixteen, each in another one.
+    #[inline(never)]
+    fn take_turn(&mut self, tilt: Milliradians) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
-        let fault = match self.turn % 8 {
-            0 => return self.winding.warm(&self.plan.thermal),
-            2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
-            5 => self.runaway.look(&self.plan.runaway),
-            6 => return self.runaway.compare(),
-            7 => self.runaway.judge(&self.plan.runaway),
+        const { assert!(anatomy::LOOK_TICKS == 16, "the turns below") };
+        let fault = match self.turn {
+            0 | 8 => return self.winding.warm(&self.plan.thermal),
+            2 | 10 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
+            3 => return self.insertion.look(&self.plan.anatomy, tilt),
+            1 | 9 | 11 => return self.insertion.turn(&self.plan.anatomy),
+            5 | 13 => self.runaway.look(&self.plan.runaway),
+            6 | 14 => return self.runaway.compare(),
+            7 | 15 => self.runaway.judge(&self.plan.runaway),
             _ => return,
         };
         if let Some(fault) = fault
@@ -338,12 +343,8 @@ impl Controller {
         if self.mode == Mode::Exciting {
             return (Transitions::default(), Response::NONE);
         }
-        const { assert!(anatomy::LOOK_TICKS == 16, "the turns below, which `take_turn` leaves free") };
-        match self.turn {
-            _ if self.insertion.is_new() => self.insertion.look_anew(&self.plan.anatomy, tilt),
-            3 => self.insertion.look(&self.plan.anatomy, tilt),
-            1 | 9 | 11 => self.insertion.turn(&self.plan.anatomy),
-            _ => {}
+        if self.insertion.is_new() {
+            self.insertion.look_anew(&self.plan.anatomy, tilt);
         }
         let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
         let response = {
@@ -394,7 +395,7 @@ impl Controller {
     fn is_frozen(&mut self, step: i32) -> bool {
         let is_still = step == 0 || self.runaway.is_back(step);
         let is_frozen = is_still && self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
-        self.frozen_ticks = if is_frozen { self.frozen_ticks.saturating_add(1) } else { 0 };
+        self.frozen_ticks = if is_frozen { self.frozen_ticks.wrapping_add(1) } else { 0 };
         self.frozen_ticks > FROZEN_TICKS
     }
 

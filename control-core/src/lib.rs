@@ -36,6 +36,7 @@ mod refusal;
 mod runaway;
 pub mod safety;
 mod sine;
+mod stability;
 mod thermal;
 mod tissue;
 pub mod units;
@@ -44,6 +45,7 @@ mod wall;
 pub use config::{Config, Device, Patient};
 pub use controller::{Controller, Order, TickInput, TickOutput};
 pub use plan::{Plan, Refusal};
+pub use stability::stiffest;
 
 /// Ticks of the control law in a second.
 pub const TICK_HZ: u32 = 10_000;

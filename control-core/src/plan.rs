@@ -14,12 +14,11 @@ pub use crate::refusal::{Field, Refusal};
 use crate::refusal::{milli, within};
 use crate::runaway;
 use crate::safety::{DacScale, TorqueLimits};
+use crate::stability;
 use crate::thermal::ThermalLimits;
 use crate::units::Newtons;
 use fixed::types::{I2F30, I16F16, U16F16};
 
-/// 7 N/mm: the stiffness limit with one tick of delay.
-const LARGEST_STIFFNESS: I16F16 = I16F16::from_bits(7 << 16);
 /// 0.0005 N·s/mm: with 30 g and the speed estimate's 6 ms of delay, more would itself ring.
 const LARGEST_DAMPING_BITS: i32 = 8_389;
 /// Torque at which an encoder without a count counts as dead: an eighth of the limit, several times the dry friction of motor
@@ -177,7 +176,7 @@ pub(crate) fn check_device(device: &Device) -> Result<(), Refusal> {
         milli(1_000_000),
     )?;
     within(Field::Travel, limits.travel.0, milli(1_000), milli(500_000))?;
-    within(Field::StiffnessLimit, limits.stiffness.0, milli(50), LARGEST_STIFFNESS)?;
+    check_stiffness(device)?;
     within(
         Field::HeartbeatMs,
         I16F16::from_num(limits.heartbeat_ms.min(30_000)),
@@ -200,6 +199,22 @@ pub(crate) fn check_device(device: &Device) -> Result<(), Refusal> {
     let passivity = I16F16::saturating_from_num(device.passivity_damping.0);
     within(Field::PassivityDamping, passivity, I16F16::ZERO, milli(20))?;
     check::check(device, device.compensation.gains)
+}
+
+/// The stiffness that the device allows is one that its mechanism bears.
+fn check_stiffness(device: &Device) -> Result<(), Refusal> {
+    let (mechanism, stiffness) = (&device.mechanism, device.limits.stiffness.0);
+    within(Field::MovingMass, mechanism.mass.0, milli(1_000), milli(1_000_000))?;
+    within(Field::MechanismFriction, mechanism.dry_friction.0, I16F16::ZERO, milli(10_000))?;
+    within(
+        Field::DriveDelayUs,
+        I16F16::from_num(mechanism.delay_us.min(30_000)),
+        milli(20_000),
+        milli(1_000_000),
+    )?;
+    within(Field::StiffnessLimit, stiffness, milli(50), stability::STEEPEST)?;
+    let limit = stability::stiffest(device).0;
+    if stiffness > limit { Err(Refusal::WouldRing { stiffness, limit }) } else { Ok(()) }
 }
 
 /// No patient asks for more than the device's torque ceiling.

@@ -101,6 +101,13 @@ pub enum Refusal {
         /// What is stable, in N/mm.
         limit: I16F16,
     },
+    /// The stiffness that the device allows would ring with its friction, mass and delay.
+    WouldRing {
+        /// What the device allows, in N/mm.
+        stiffness: I16F16,
+        /// What is stable, in N/mm.
+        limit: I16F16,
+    },
 }
 
 /// A value of the configuration that has a range.
@@ -180,6 +187,9 @@ pub enum Field {
     EncoderSign,
     MotorSign,
     Converter,
+    MovingMass,
+    MechanismFriction,
+    DriveDelayUs,
 }
 
 impl fmt::Display for Refusal {
@@ -238,6 +248,10 @@ impl fmt::Display for Refusal {
             Refusal::CompensationUnstable { stiffness, limit } => write!(
                 f,
                 "with this compensation more than {limit:.3} N/mm would ring and the device allows {stiffness:.3} N/mm; lower its gains or the device's stiffness"
+            ),
+            Refusal::WouldRing { stiffness, limit } => write!(
+                f,
+                "with this friction, mass and delay more than {limit:.3} N/mm would ring and the device allows {stiffness:.3} N/mm; lower the device's stiffness"
             ),
             Refusal::Empty => f.write_str("there is no layer; add one"),
         }

@@ -50,6 +50,11 @@ quantity!(
     "N/mm"
 );
 quantity!(
+    /// Mass in g.
+    Grams(I16F16),
+    "g"
+);
+quantity!(
     /// Viscous damping in N·s/mm; 0.02 N·s/m is 0.000 02 here.
     Damping(I8F24),
     "N·s/mm"

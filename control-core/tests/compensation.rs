@@ -391,10 +391,10 @@ fn too_strong_and_unstable_compensations_are_refused() {
     assert_eq!(refused(|device| device.compensation.weight.0 = q(12.0)), None);
     let strong = refused(|device| device.compensation.weight.0 = q(12.2));
     assert!(matches!(strong, Some(Refusal::CompensationTooStrong { .. })), "{strong:?}");
-    // 7 − 6·0.5 N/mm, less 0.5·(0.5·1 + 0.8·14)/100.
+    // Half of 0.06 N, late by 150 µs: 6.06 N/mm, less 0.5·(0.5·1 + 0.8·14)/100.
     let allowed = |stiffness: f64| refused(|device| device.limits.stiffness.0 = q(stiffness));
-    assert_eq!(allowed(3.9), None);
-    assert!(matches!(allowed(3.96), Some(Refusal::CompensationUnstable { .. })), "{:?}", allowed(3.96));
+    assert_eq!(allowed(5.98), None);
+    assert!(matches!(allowed(6.03), Some(Refusal::CompensationUnstable { .. })), "{:?}", allowed(6.03));
     // Without friction there is none to take away.
     let without = |device: &mut Device| {
         device.limits.stiffness.0 = q(6.9);

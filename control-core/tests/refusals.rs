@@ -3,8 +3,8 @@
 use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 use control_core::plan::Field;
 use control_core::units::{
-    Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
-    Newtons, Stiffness,
+    Counts, Damping, FrictionPerMillimetre, Grams, JogCompliance, Millimetres, MillinewtonMetres,
+    Milliradians, Newtons, Stiffness,
 };
 use control_core::{Config, Controller, Order, Patient, Plan, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
@@ -40,6 +40,9 @@ type ChangedLaw = fn(&mut FrictionLaw);
 /// A tissue that asks for next to nothing, so that what is tested is alone in being refused.
 fn weak(config: &mut Config) {
     config.device.limits.stiffness = Stiffness(q(2.0));
+    // So much friction and mass that any encoder and any drive bears it.
+    config.device.mechanism.dry_friction = Newtons(q(3.0));
+    config.device.mechanism.mass = Grams(q(100.0));
     config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) });
     config.patient.layers = [layer(0.0, None)].into_iter().collect();
 }
@@ -81,7 +84,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
         change(&mut law);
         config.patient.law = Law::Jog(law);
     };
-    let ranges: [Range; 17] = [
+    let ranges: [Range; 20] = [
         (Field::RollerRadius, [4.0, 3.99], [25.0, 25.01], |c, v| c.device.roller_radius.0 = q(v)),
         (Field::CountsPerTurn, [256.0, 255.0], [65_535.0, f64::NAN], |c, v| {
             c.device.counts_per_turn = v as u16
@@ -109,6 +112,13 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
         (Field::DacZero, [-127.0, -128.0], [127.0, 128.0], |c, v| c.device.dac_zero = v as i16),
         (Field::LargestForce, [0.011, 0.009], [2.87, f64::NAN], |c, v| {
             c.patient.largest_force = Some(Newtons(q(v)));
+        }),
+        (Field::MovingMass, [1.0, 0.99], [1_000.0, 1_000.1], |c, v| c.device.mechanism.mass.0 = q(v)),
+        (Field::MechanismFriction, [0.02, -0.01], [10.0, 10.01], |c, v| {
+            c.device.mechanism.dry_friction.0 = q(v)
+        }),
+        (Field::DriveDelayUs, [20.0, 19.0], [1_000.0, 1_001.0], |c, v| {
+            c.device.mechanism.delay_us = v as u16
         }),
         (Field::PassivityDamping, [0.0, -0.001], [0.0199, 0.0201], |c, v| {
             c.device.passivity_damping = Damping(I8F24::from_num(v));

@@ -62,6 +62,22 @@ fn a_device_that_is_right_is_measured() {
     );
     assert!((found.mechanism.inertia / inertia - 1.0).abs() < 0.1, "{} kg·m²", found.mechanism.inertia);
     assert!((found.mechanism.dry / dry - 1.0).abs() < 0.1, "{} N·m", found.mechanism.dry);
+    let along = device.mechanism;
+    let (mass, friction) = (along.mass.0.to_num::<f64>(), along.dry_friction.0.to_num::<f64>());
+    assert!((mass * 1e-3 * (RADIUS_MM * 1e-3).powi(2) / inertia - 1.0).abs() < 0.1, "{mass} g");
+    assert!((friction * RADIUS_MM * 1e-3 / dry - 1.0).abs() < 0.1, "{friction} N");
+    assert!(!found.stiffness_lowered, "{}", device.limits.stiffness);
+}
+
+#[test]
+fn with_little_friction_the_device_allows_less_stiffness() {
+    let mut rig = rig();
+    rig.model.coulomb = rig.model.coulomb.map(|dry| dry / 6.0);
+    let (outcome, ..) = commission_on(&rig, Wiring::default(), (0.1, 1.0));
+    let found = outcome.expect("it passes");
+    let lines = found.lines().join("\n");
+    assert!(found.stiffness_lowered && lines.contains("lowered"), "{lines}");
+    assert_eq!(found.record.device.limits.stiffness, control_core::stiffest(&found.record.device));
 }
 
 #[test]

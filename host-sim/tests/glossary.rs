@@ -64,6 +64,7 @@ fn called(refusal: Refusal) -> &'static str {
         Refusal::AboveCeiling { .. } => "above ceiling",
         Refusal::CompensationTooStrong { .. } => "compensation too strong",
         Refusal::CompensationUnstable { .. } => "compensation unstable",
+        Refusal::WouldRing { .. } => "would ring",
     }
 }
 
@@ -85,6 +86,7 @@ fn every_refusal_and_verdict_stands_in_the_glossary() {
         Refusal::AboveCeiling { force: x, ceiling: x },
         Refusal::CompensationTooStrong { torque: x, limit: x },
         Refusal::CompensationUnstable { stiffness: x, limit: x },
+        Refusal::WouldRing { stiffness: x, limit: x },
     ];
     let table = rows("Refusals of a configuration");
     assert_eq!(table.len(), 1 + refusals.len());

@@ -133,9 +133,12 @@ impl Proof {
         }
     }
 
-    /// Another configuration is another device, but for the converter's zero, which the pulses give.
+    /// Another configuration is another device, but for what the pulses give: the converter's zero, what moves, and the stiffness
+    /// that it bears, which may be less.
     pub(crate) fn keep(&mut self, before: &Device, after: &Device) {
-        if (Device { dac_zero: after.dac_zero, ..*before }) != *after {
+        let mut same = Device { dac_zero: after.dac_zero, mechanism: after.mechanism, ..*before };
+        same.limits.stiffness = before.limits.stiffness.min(after.limits.stiffness);
+        if same != *after {
             *self = Self::None;
         }
     }

@@ -186,8 +186,11 @@ pub(crate) fn toolchain_for(target: &str, what_for: &str) -> Result<Toolchain, F
 }
 
 /// Cargo as `toolchain` wants it, for a command such as `build`.
+/// Never incrementally: that makes another image, with other times.
 pub(crate) fn cargo_for_board(toolchain: Toolchain, subcommand: &str) -> Command {
-    cargo_with(toolchain, subcommand, "core")
+    let mut cargo = cargo_with(toolchain, subcommand, "core");
+    cargo.env("CARGO_INCREMENTAL", "0");
+    cargo
 }
 
 /// The same where the crates of the standard library in `library` are needed.

@@ -4,6 +4,7 @@ use super::feedforward::Ready;
 use super::{Friction, Gains, VERSION, Wave};
 use crate::config::Device;
 use crate::refusal::{Field, Refusal, within};
+use crate::stability;
 use fixed::types::{I2F30, I16F16, I32F32, U16F16};
 
 /// Of what was found at the most: 243/256. Rounding, wear and a rotor's angle that is off by 2° stay below the rest.
@@ -12,10 +13,6 @@ const LARGEST_GAIN: u8 = 243;
 const TORQUE_SHARE: i32 = 4;
 /// Waves a turn: no more than one in so many counts.
 const COUNTS_PER_WAVE: u16 = 8;
-/// The largest stiffness with all of the mechanism's friction, and what of it goes when friction is taken away: 7 N/mm at
-/// 0.06 N of dry friction and 2 N/mm at 0.01 N, both with one tick of delay (the table of the design notes), on a line.
-const STIFFEST: i32 = 7;
-const STIFFNESS_BY_FRICTION: i32 = 6;
 
 /// Whether `device` may feed its compensation forward at `gains`.
 pub fn check(device: &Device, gains: Gains) -> Result<(), Refusal> {
@@ -89,9 +86,9 @@ fn largest(device: &Device, gains: Gains) -> I16F16 {
 fn check_stability(device: &Device, gains: Gains) -> Result<(), Refusal> {
     let found = &device.compensation;
     let has_friction = found.inwards.dry.0.max(found.outwards.dry.0) > I16F16::ZERO;
-    let taken = if has_friction { gains.friction.share() * STIFFNESS_BY_FRICTION } else { I16F16::ZERO };
-    let left = I16F16::from_num(STIFFEST) - taken;
-    let limit = left.saturating_sub(steepest(device).saturating_mul(gains.angle.share()));
+    let taken = if has_friction { gains.friction.share() } else { I16F16::ZERO };
+    let limit = stability::stiffest_with(device, I16F16::ONE - taken)
+        .saturating_sub(steepest(device).saturating_mul(gains.angle.share()));
     let stiffness = device.limits.stiffness.0;
     if stiffness > limit { Err(Refusal::CompensationUnstable { stiffness, limit }) } else { Ok(()) }
 }

@@ -18,17 +18,22 @@ const LEAST_LUMEN: I16F16 = I16F16::from_bits(13_107);
 /// What the needle meets: its layers, and how it comes to the vessel.
 pub(super) struct Meeting {
     pub(super) layers: Vec<Met, MAX_LAYERS>,
-    vessel: Option<anatomy::Vessel>,
+    way: Option<Way>,
+}
+
+/// How the needle comes to the vessel.
+#[derive(Clone, Copy)]
+enum Way {
+    /// Through the walls in these layers.
+    Through { near: usize, far: Option<usize> },
+    /// Past it from this depth on, perpendicular to the skin.
+    Beside { depth: Millimetres },
 }
 
 /// Prepares what has been checked.
 pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
-    let mut anatomy = Anatomy {
-        vessel: met.vessel,
-        skin_tilt: config.device.skin_tilt.0,
-        layers: Vec::new(),
-        walls: Vec::new(),
-    };
+    let mut anatomy =
+        Anatomy { vessel: None, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
     for (index, Met { number, layer }) in met.layers.iter().enumerate() {
         // All vectors hold MAX_LAYERS: no push can fail.
         let _ = anatomy.layers.push(anatomy::Layer {
@@ -48,7 +53,19 @@ pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
             });
         }
     }
+    anatomy.vessel = met.way.and_then(|way| vessel(&anatomy.layers, way));
     anatomy
+}
+
+/// The vessel that the needle comes to on its `way` through `layers`.
+fn vessel(layers: &[anatomy::Layer], way: Way) -> Option<anatomy::Vessel> {
+    let passage = |layer: usize| Some(anatomy::Passage::of(layer, layers.get(layer)?));
+    Some(match way {
+        Way::Through { near, far } => {
+            anatomy::Vessel::Met { near: passage(near)?, far: far.and_then(passage) }
+        }
+        Way::Beside { depth } => anatomy::Vessel::Beside { depth },
+    })
 }
 
 fn check_layers(config: &Config) -> Result<(), Refusal> {
@@ -106,18 +123,18 @@ pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     let layers = &config.patient.layers;
     let mut met: Vec<Met, MAX_LAYERS> =
         (0..).zip(layers).map(|(number, layer)| Met { number, layer: *layer }).collect();
-    let Some((near, far)) = vessel_walls(config)? else { return Ok(Meeting { layers: met, vessel: None }) };
-    let through = anatomy::Vessel::Met { near, far };
+    let Some((near, far)) = vessel_walls(config)? else { return Ok(Meeting { layers: met, way: None }) };
+    let through = Way::Through { near, far };
     let (Some(shape), Some(far)) = (config.patient.vessel, far) else {
-        return Ok(Meeting { layers: met, vessel: Some(through) });
+        return Ok(Meeting { layers: met, way: Some(through) });
     };
     let depth = |index: usize| layers.get(index).map_or(I16F16::ZERO, |layer| layer.depth.0);
     let height = depth(far).saturating_sub(depth(near));
     let lumen = height.saturating_mul(chord(&shape)?);
     if lumen < LEAST_LUMEN {
         met.retain(|met| !anatomy::is_vessel_wall(met.layer.tissue));
-        let vessel = Some(anatomy::Vessel::Beside { depth: Millimetres(depth(near)) });
-        return Ok(Meeting { layers: met, vessel });
+        let way = Some(Way::Beside { depth: Millimetres(depth(near)) });
+        return Ok(Meeting { layers: met, way });
     }
     let lower = (height - lumen) / 2;
     for (index, sign) in [(near, I16F16::ONE), (far, I16F16::NEG_ONE)] {
@@ -125,7 +142,7 @@ pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
             met.layer.depth.0 = met.layer.depth.0.saturating_add(lower.saturating_mul(sign));
         }
     }
-    Ok(Meeting { layers: met, vessel: Some(through) })
+    Ok(Meeting { layers: met, way: Some(through) })
 }
 
 /// How much of its height a needle sees that passes beside the axis, √(1 − (2·offset/width)²).

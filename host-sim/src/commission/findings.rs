@@ -1,8 +1,9 @@
 //! What recordings of a device's first movements say of its wiring and its mechanism. Pure calculation.
 
-use control_core::Device;
-use control_core::TICK_HZ;
 use control_core::controller::Sample;
+use control_core::units::{Grams, Newtons};
+use control_core::{Device, TICK_HZ, config};
+use fixed::types::I16F16;
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -200,6 +201,16 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
     let [inertia, viscous, dry, offset] =
         least_squares(&rows).filter(|_| rows.len() >= LEAST_WINDOWS).ok_or(Trouble::NoFit)?;
     Ok(Mechanism { inertia, viscous, dry, offset })
+}
+
+/// The same as felt along the needle over a roller of this radius, with a drive that is late by `delay_us`.
+pub fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16) -> config::Mechanism {
+    let radius = radius_mm * 1e-3;
+    config::Mechanism {
+        mass: Grams(I16F16::saturating_from_num((found.inertia / radius / radius * 1e3).clamp(1.0, 1_000.0))),
+        dry_friction: Newtons(I16F16::saturating_from_num((found.dry / radius).clamp(0.0, 10.0))),
+        delay_us,
+    }
 }
 
 /// The largest movement in a tick, in counts, that makes the device too fast at 0.4 m/s: its ceiling of speed. The

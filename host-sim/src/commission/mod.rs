@@ -9,11 +9,11 @@ pub mod mechanism;
 use crate::device::part;
 use crate::failure::Failure;
 use bench::{Act, Bench, Line, ticks};
-use control_core::Device;
 use control_core::compensation::Compensation;
 use control_core::event::Fault;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
+use control_core::{Device, stiffest};
 use findings::{Mechanism, Trouble};
 use fixed::types::I16F16;
 use link::commissioning::Record;
@@ -107,6 +107,8 @@ pub struct Outcome {
     pub radius_mm: f64,
     /// What moves.
     pub mechanism: Mechanism,
+    /// The device allowed a stiffness that its mechanism does not bear.
+    pub stiffness_lowered: bool,
 }
 
 impl Outcome {
@@ -129,6 +131,15 @@ impl Outcome {
             format!("roller radius {:.2} mm", self.radius_mm),
             format!("inertia {:.2} g·cm²", m.inertia * 1e7),
             format!("dry friction {:.3} mN·m, viscous {:.2} µN·m·s", m.dry * 1e3, m.viscous * 1e6),
+            format!(
+                "stiffest wall {:.2} N/mm{}",
+                device.limits.stiffness.0,
+                if self.stiffness_lowered {
+                    ", lowered: with this friction and mass more would ring"
+                } else {
+                    ""
+                }
+            ),
             format!("tilt with the needle flat {} mrad", device.skin_tilt.0),
         ]
     }
@@ -180,6 +191,7 @@ pub fn commission(
     device.roller_radius = Millimetres(I16F16::from_num(radius_mm));
     device.skin_tilt = Milliradians(flat.round() as i16);
     device.limits.max_counts_per_tick = findings::counts_per_tick(radius_mm, counts_per_turn);
+    device.limits.stiffness = before.limits.stiffness.min(stiffest(&device));
     bench.configure(&device)?;
 
     ask(Step::Pulses)?;
@@ -199,9 +211,13 @@ pub fn commission(
         }
     };
     device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
+    device.mechanism = findings::along_the_needle(&mechanism, radius_mm, device.mechanism.delay_us);
+    // Never above what the pulses were driven with: the device takes nothing higher than it has proved.
+    device.limits.stiffness = device.limits.stiffness.min(stiffest(&device));
+    let stiffness_lowered = device.limits.stiffness < before.limits.stiffness;
     bench.configure(&device)?;
     let record = bench.commission(&device)?;
-    Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism })
+    Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism, stiffness_lowered })
 }
 
 /// What moves; none where it turns against its torque.

@@ -6,8 +6,8 @@ use super::compensated::Compensated;
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::profile::fix;
-use control_core::config::{DacWidth, SafetyConfig, SpeedMethod};
-use control_core::units::{Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
+use control_core::config::{DacWidth, Mechanism, SafetyConfig, SpeedMethod};
+use control_core::units::{Damping, Grams, Millimetres, MillinewtonMetres, Milliradians, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan};
 use fixed::types::I8F24;
 use link::Command;
@@ -75,6 +75,8 @@ struct File {
     limits: Limits,
     #[serde(default)]
     control: Control,
+    #[serde(default)]
+    mechanism: Moving,
     compensation: Option<Compensated>,
 }
 
@@ -103,6 +105,15 @@ struct Limits {
     travel_mm: Option<f64>,
     stiffness_n_per_mm: Option<f64>,
     heartbeat_ms: Option<u16>,
+}
+
+/// What moves, which decides how stiff a wall may be.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Moving {
+    mass_g: Option<f64>,
+    dry_friction_n: Option<f64>,
+    delay_us: Option<u16>,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -168,6 +179,7 @@ impl File {
         if let Some(value) = control.passivity_damping_n_s_per_mm {
             device.passivity_damping = damping("passivity_damping_n_s_per_mm", value)?;
         }
+        self.mechanism.set(&mut device.mechanism)?;
         if let Some(compensation) = &self.compensation {
             device.compensation = compensation.compensation()?;
         }
@@ -213,8 +225,26 @@ impl File {
                 damping_n_s_per_mm: Some(device.damping.0.to_num()),
                 passivity_damping_n_s_per_mm: Some(device.passivity_damping.0.to_num()),
             },
+            mechanism: Moving {
+                mass_g: Some(device.mechanism.mass.0.to_num()),
+                dry_friction_n: Some(device.mechanism.dry_friction.0.to_num()),
+                delay_us: Some(device.mechanism.delay_us),
+            },
             compensation: device.compensation.is_some().then(|| Compensated::new(&device.compensation)),
         }
+    }
+}
+
+impl Moving {
+    fn set(&self, mechanism: &mut Mechanism) -> Result<(), String> {
+        if let Some(value) = self.mass_g {
+            mechanism.mass = Grams(fix("mass_g", value)?);
+        }
+        if let Some(value) = self.dry_friction_n {
+            mechanism.dry_friction = Newtons(fix("dry_friction_n", value)?);
+        }
+        mechanism.delay_us = self.delay_us.unwrap_or(mechanism.delay_us);
+        Ok(())
     }
 }
 
