@@ -1,31 +1,23 @@
 // A recording's place in time: shown, dragged, and stepped with the arrow keys.
 
 import { clock } from "./events.js";
-
-/** What the server says of the place just after a drag is still the old one. */
-const NEWS_MS = 400;
-/** Between two wishes while the slider is dragged. */
-const STEP_MS = 60;
+import { Slider } from "./slider.js";
 
 export class Scrub {
   /**
    * @param {import("./link.js").Link} link where wishes go
    */
   constructor(link) {
-    this.link = link;
     this.row = document.getElementById("scrub");
     this.place = document.getElementById("scrub-place");
     this.time = document.getElementById("scrub-time");
     this.length = document.getElementById("scrub-length");
-    this.movedAt = -Infinity;
-    this.sentAt = -Infinity;
-    this.unsent = false;
     this.playing = true;
-    this.place.addEventListener("input", () => {
-      this.movedAt = performance.now();
-      this.unsent = true;
-      this.say(Number(this.place.value));
-    });
+    this.drag = new Slider(
+      this.place,
+      (seconds) => this.say(seconds),
+      (seconds) => link.send({ do: "seek", at_s: seconds }),
+    );
   }
 
   /** Follows the server: `replay` is null where nothing is replayed. */
@@ -37,7 +29,7 @@ export class Scrub {
       this.place.max = String(replay.length_s);
       this.length.textContent = clock(replay.length_s);
     }
-    if (performance.now() - this.movedAt < NEWS_MS) return;
+    if (this.drag.isHeld) return;
     this.place.value = String(replay.at_s);
     this.say(replay.at_s);
   }
@@ -50,10 +42,6 @@ export class Scrub {
 
   /** Called before each picture: many movements become one message. */
   tell() {
-    const now = performance.now();
-    if (!this.unsent || now - this.sentAt < STEP_MS) return;
-    this.unsent = false;
-    this.sentAt = now;
-    this.link.send({ do: "seek", at_s: Number(this.place.value) });
+    this.drag.tell();
   }
 }

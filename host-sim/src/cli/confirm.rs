@@ -19,7 +19,7 @@ pub(crate) struct ConsentFlags {
     #[arg(long, conflicts_with = "yes")]
     page: bool,
     /// Port of the page on this computer; 0 takes any free one
-    #[arg(long, default_value_t = 8710, value_name = "N")]
+    #[arg(long, default_value_t = 8710, value_name = "N", requires = "page")]
     port: u16,
 }
 

@@ -48,6 +48,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/patient.js", "patient.js", SCRIPT),
     asset!("/own_forces.js", "own_forces.js", SCRIPT),
     asset!("/scrub.js", "scrub.js", SCRIPT),
+    asset!("/slider.js", "slider.js", SCRIPT),
     asset!("/body.js", "body.js", SCRIPT),
     asset!("/bytes.js", "bytes.js", SCRIPT),
     asset!("/picture.js", "picture.js", SCRIPT),
