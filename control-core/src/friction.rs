@@ -1,4 +1,5 @@
-//! Friction along the needle inside tissue (seed 001, eq. 2): as printed, and as a clamped proxy that holds.
+//! Friction along the needle inside tissue (seed 001, eq. 2): as printed, as a clamped proxy that holds, and as one with a static and a
+//! dynamic level.
 
 use crate::math::{exp, saturating_multiply, saturating_product, truncating_product};
 use crate::proxy::Anchor;
@@ -20,6 +21,29 @@ pub(crate) enum Law {
     },
     /// `z = x − w`, clamped to `limit/K`; `F = K·z`.
     Cone { stiffness: Stiffness, inverse_stiffness: I16F16 },
+    /// The same, clamped to `sliding·limit/K` while the needle slides.
+    StickSlip { stiffness: Stiffness, inverse_stiffness: I16F16, sliding: I16F16 },
+}
+
+/// A needle that has not slid for so many ticks sticks again: 20 ms. One that is slower than a count in that time (0.8 mm/s at 16 µm a
+/// count) therefore counts as at rest from one count to the next.
+const STICKS_AFTER: u16 = 200;
+
+/// Where the needle is held.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hold {
+    anchor: Anchor,
+    /// Ticks for which the needle still counts as sliding; 0 is at rest. Of [`Law::StickSlip`] alone.
+    sliding_ticks: u16,
+}
+
+impl Hold {
+    /// Here, without a force.
+    pub(crate) fn at(depth: Millimetres) -> Self {
+        let mut hold = Self::default();
+        hold.anchor.release(depth);
+        hold
+    }
 }
 
 impl Law {
@@ -27,7 +51,7 @@ impl Law {
     /// there, for the law that asks.
     pub(crate) fn tick(
         &self,
-        anchor: &mut Anchor,
+        Hold { anchor, sliding_ticks }: &mut Hold,
         depth: Millimetres,
         inserted: Millimetres,
         limit: impl FnOnce() -> Newtons,
@@ -49,6 +73,14 @@ impl Law {
                 let reach = saturating_multiply(limit.0, *inverse_stiffness);
                 anchor.drag(depth, reach, reach);
                 Newtons(saturating_multiply(anchor.stretch(depth), stiffness.0).min(limit.0).max(-limit.0))
+            }
+            Law::StickSlip { stiffness, inverse_stiffness, sliding } => {
+                let limit = limit().0;
+                let level = if *sliding_ticks > 0 { saturating_multiply(limit, *sliding) } else { limit };
+                let reach = saturating_multiply(level, *inverse_stiffness);
+                let slides = anchor.drag(depth, reach, reach);
+                *sliding_ticks = if slides { STICKS_AFTER } else { sliding_ticks.saturating_sub(1) };
+                Newtons(saturating_multiply(anchor.stretch(depth), stiffness.0).min(level).max(-level))
             }
         }
     }

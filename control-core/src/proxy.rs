@@ -24,15 +24,18 @@ impl Anchor {
     }
 
     /// Is dragged along by a needle at `depth`, no further than `behind` it on its way in and `ahead` of it on its way out.
-    /// Neither is negative.
-    pub(crate) fn drag(&mut self, depth: Millimetres, behind: I16F16, ahead: I16F16) {
+    /// Neither is negative. Whether it was dragged.
+    pub(crate) fn drag(&mut self, depth: Millimetres, behind: I16F16, ahead: I16F16) -> bool {
         let (nearest, furthest) = (depth.0.saturating_sub(behind), depth.0.saturating_add(ahead));
         let at = coarse(self.position);
         if at < nearest {
             self.position = fine(nearest);
         } else if at > furthest {
             self.position = fine(furthest);
+        } else {
+            return false;
         }
+        true
     }
 
     /// `x − w`, towards −∞.

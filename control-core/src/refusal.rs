@@ -190,6 +190,7 @@ pub enum Field {
     MovingMass,
     MechanismFriction,
     DriveDelayUs,
+    SlidingShare,
 }
 
 impl fmt::Display for Refusal {

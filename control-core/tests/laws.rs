@@ -167,6 +167,76 @@ fn one_count_to_and_fro_is_no_withdrawal() {
     }
 }
 
+/// Beyond 10 mm a static level of 0.2 N and a dynamic one of 0.1 N, held with 1 N/mm.
+fn sticking() -> Config {
+    let layer = |top: i16, friction: f64| Layer {
+        tissue: Tissue::Other,
+        depth: Millimetres(I16F16::from_num(top)),
+        wall: None,
+        friction: FrictionPerMillimetre(I16F16::from_num(friction)),
+    };
+    let law = Law::Jog(FrictionLaw::StickSlip {
+        stiffness: Stiffness(I16F16::ONE),
+        sliding: I16F16::from_num(0.5),
+    });
+    let layers = [layer(0, 0.02), layer(10, 0.0)].into_iter().collect();
+    Config { patient: Patient { law, layers, ..Patient::default() }, ..Config::default() }
+}
+
+#[test]
+fn a_needle_at_rest_sticks_and_a_sliding_one_is_rubbed_less() {
+    for way in [1.0, -1.0] {
+        let mut c = started(&sticking());
+        let mut at = 0.0;
+        travel(&mut c, &mut at, 20.0, 10.0, |_| ());
+        let forces = |c: &mut Controller, at: &mut f64, mm: f64| {
+            let (mut largest, mut last) = (0.0_f64, 0.0_f64);
+            let to = *at + mm * way;
+            travel(c, at, to, 5.0, |out| {
+                last = out.force.0.to_num::<f64>() * way;
+                largest = largest.max(last);
+            });
+            (largest, last)
+        };
+        // Sliding this way, whichever way it came.
+        forces(&mut c, &mut at, 1.0);
+        let near =
+            |force: f64, level: f64| assert!((force - level).abs() < 0.02, "{way}: {force} N for {level} N");
+        let rest = hold(&mut c, at, 0.1).force.0.to_num::<f64>() * way;
+        near(rest, 0.1);
+        let (largest, last) = forces(&mut c, &mut at, 1.0);
+        near(largest, 0.2);
+        near(last, 0.1);
+        // A rest that is too short to stick.
+        hold(&mut c, at, 0.01);
+        near(forces(&mut c, &mut at, 1.0).0, 0.1);
+    }
+}
+
+/// To and fro by drawn ways and rests: never more comes back than the hold stores, 0.02 mJ, and a count of it for each turn.
+#[test]
+fn friction_that_sticks_gives_nothing_of_its_own() {
+    let mut c = started(&sticking());
+    let mut at = 0.0;
+    travel(&mut c, &mut at, 25.0, 10.0, |_| ());
+    let (mut energy, mut least, mut before) = (0.0_f64, 0.0_f64, None::<(f64, f64)>);
+    let mut drawn = 12_345_u32;
+    for _ in 0..300 {
+        drawn = drawn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let to = 18.0 + f64::from(drawn >> 16) / 65_536.0 * 12.0;
+        travel(&mut c, &mut at, to, 5.0 + f64::from(drawn >> 8 & 31), |out| {
+            let (depth, force) = (out.depth.0.to_num::<f64>(), out.force.0.to_num::<f64>());
+            if let Some((from, with)) = before {
+                energy += with * (depth - from);
+                least = least.min(energy);
+            }
+            before = Some((depth, force));
+        });
+        hold(&mut c, at, f64::from(drawn & 63) * 1e-3 + 1e-4);
+    }
+    assert!(least > -0.03 && energy > 10.0, "{least} mJ at the least, {energy} mJ in the end");
+}
+
 #[test]
 fn friction_opposes_withdrawal() {
     for law in [cone(), paper()] {

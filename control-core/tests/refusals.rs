@@ -182,6 +182,16 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
         field(|c| c.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.04)) })),
         Some(Field::FrictionStiffness)
     );
+    let sticking = |stiffness: f64, sliding: f64| {
+        let law = FrictionLaw::StickSlip { stiffness: Stiffness(q(stiffness)), sliding: q(sliding) };
+        field(|c| c.patient.law = Law::Jog(law))
+    };
+    assert_eq!((sticking(1.0, 0.21), sticking(1.0, 1.0)), (None, None));
+    assert_eq!(
+        (sticking(1.0, 0.19), sticking(1.0, 1.01)),
+        (Some(Field::SlidingShare), Some(Field::SlidingShare))
+    );
+    assert_eq!(sticking(0.04, 0.5), Some(Field::FrictionStiffness));
 }
 
 /// With one wall changed.

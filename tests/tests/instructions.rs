@@ -143,10 +143,15 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
         limit: Newtons(q(1.0)),
     };
     let cone = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
-    (0..8_u8).map(move |choice| {
+    let sticking = FrictionLaw::StickSlip { stiffness: Stiffness(q(0.5)), sliding: q(0.5) };
+    (0..10_u8).map(move |choice| {
         let is = |bit: u8| choice & 1 << bit != 0;
         let mut config = Config::default();
-        config.patient.law = Law::Jog(if is(0) { paper } else { cone });
+        config.patient.law = Law::Jog(match (is(3), is(0)) {
+            (true, _) => sticking,
+            (false, true) => paper,
+            (false, false) => cone,
+        });
         config.patient.layers = walls(apart).into_iter().collect();
         config.device.speed = if is(1) { SpeedMethod::EdgeTiming } else { SpeedMethod::Window };
         config.device.damping = Damping(I8F24::from_num(0.0002));

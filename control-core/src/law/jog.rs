@@ -3,10 +3,9 @@
 use super::{Ground, Met, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
-use crate::friction;
+use crate::friction::{self, Hold};
 use crate::math::{reciprocal, saturating_product, saturating_times, sine, truncating_product};
 use crate::passivity::Elements;
-use crate::proxy::Anchor;
 use crate::refusal::{Field, Refusal, milli, within};
 use crate::tissue::{Layer, MAX_LAYERS};
 use crate::units::{Millimetres, Newtons, Stiffness};
@@ -36,6 +35,14 @@ pub enum FrictionLaw {
         /// Stiffness of the hold below the limit.
         stiffness: Stiffness,
     },
+    /// The same with a static and a dynamic level: a needle at rest is held up to the friction limit, and a sliding one is rubbed with
+    /// a share of it.
+    StickSlip {
+        /// Stiffness of the hold below the limit.
+        stiffness: Stiffness,
+        /// Dynamic level as a share of the static one, 0.2–1.
+        sliding: I16F16,
+    },
 }
 
 /// The friction of one layer ready for the tick.
@@ -64,7 +71,7 @@ impl FrictionLaw {
     pub(crate) fn hold(&self) -> I16F16 {
         match *self {
             FrictionLaw::Paper { stiffness, level_cap, .. } => stiffness.0.saturating_mul(level_cap),
-            FrictionLaw::Cone { stiffness } => stiffness.0,
+            FrictionLaw::Cone { stiffness } | FrictionLaw::StickSlip { stiffness, .. } => stiffness.0,
         }
     }
 }
@@ -98,12 +105,12 @@ pub(crate) struct Memory {
     cuts: [Cut; MAX_LAYERS],
     /// How many of them count.
     given: usize,
-    anchor: Anchor,
+    hold: Hold,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Self { cuts: [Cut::NONE; MAX_LAYERS], given: 0, anchor: Anchor::default() }
+        Self { cuts: [Cut::NONE; MAX_LAYERS], given: 0, hold: Hold::default() }
     }
 }
 
@@ -173,11 +180,11 @@ impl Memory {
     fn friction(&mut self, forces: &Plan, met: &Insertion, depth: Millimetres) -> Option<Newtons> {
         let entry = met.top(0);
         if met.given() < forces.walls_that_close || depth.0 < entry {
-            self.anchor.release(depth);
+            self.hold = Hold::at(depth);
             return None;
         }
         let inserted = Millimetres(depth.0.saturating_sub(entry));
-        Some(forces.friction.tick(&mut self.anchor, depth, inserted, || limit(forces, met, depth)))
+        Some(forces.friction.tick(&mut self.hold, depth, inserted, || limit(forces, met, depth)))
     }
 }
 
@@ -208,6 +215,10 @@ fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
             if slope > limit { Err(Refusal::TooStiff { layer, slope, limit }) } else { Ok(()) }
         }
         FrictionLaw::Cone { stiffness } => within(Field::FrictionStiffness, stiffness.0, milli(50), limit),
+        FrictionLaw::StickSlip { stiffness, sliding } => {
+            within(Field::FrictionStiffness, stiffness.0, milli(50), limit)?;
+            within(Field::SlidingShare, sliding, milli(200), I16F16::ONE)
+        }
     }
 }
 
@@ -223,6 +234,11 @@ fn plan_friction(law: &FrictionLaw) -> friction::Law {
         FrictionLaw::Cone { stiffness } => {
             friction::Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
         }
+        FrictionLaw::StickSlip { stiffness, sliding } => friction::Law::StickSlip {
+            stiffness,
+            inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0),
+            sliding,
+        },
     }
 }
 

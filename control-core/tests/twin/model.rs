@@ -241,6 +241,9 @@ impl Twin {
                 let limit = limit.0.to_num::<f64>();
                 ((depth - self.anchor) * level * stiffness.0.to_num::<f64>()).clamp(-limit, limit)
             }
+            FrictionLaw::StickSlip { .. } => {
+                panic!("`laws.rs` tests it: when a needle slips is a matter of a last place")
+            }
             FrictionLaw::Cone { stiffness } => {
                 let mut limit = 0.0;
                 // Only of layers that were touched: on what is carried along nothing rubs yet.

@@ -98,6 +98,7 @@ pub(super) struct Forces {
 pub(super) enum Friction {
     Paper { level_length_mm: f64, level_cap: f64, anchor_ms: u16, stiffness_n_per_mm: f64, limit_n: f64 },
     Cone { stiffness_n_per_mm: f64 },
+    StickSlip { stiffness_n_per_mm: f64, sliding: f64 },
 }
 
 /// `cutting` of a layer.
@@ -281,6 +282,10 @@ impl Friction {
             Friction::Cone { stiffness_n_per_mm } => {
                 FrictionLaw::Cone { stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?) }
             }
+            Friction::StickSlip { stiffness_n_per_mm, sliding } => FrictionLaw::StickSlip {
+                stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?),
+                sliding: fix("sliding", sliding)?,
+            },
         })
     }
 }

@@ -405,6 +405,34 @@ mod tests {
     }
 
     #[test]
+    fn friction_may_have_a_static_and_a_dynamic_level() {
+        let with = |keys: &str| {
+            let friction = format!("[friction]\nlaw = \"stick-slip\"\n{keys}\n\n[[layer]]");
+            Profile::parse(text(BUILT_IN[0].1.replacen("[[layer]]", &friction, 1)))
+        };
+        let law = with("stiffness_n_per_mm = 1.0\nsliding = 0.5").expect("sound").config.patient.law;
+        let half =
+            config::FrictionLaw::StickSlip { stiffness: Stiffness(I16F16::ONE), sliding: I16F16::ONE / 2 };
+        assert_eq!(law, config::Law::Jog(half));
+        for (keys, wanted) in [
+            ("stiffness_n_per_mm = 1.0", "missing field `sliding`"),
+            (
+                "stiffness_n_per_mm = 1.0\nsliding = -0.5",
+                "SlidingShare is -0.5000; it must lie from 0.2000 to 1.0000",
+            ),
+            ("stiffness_n_per_mm = 1.0\nsliding = 0.1", "SlidingShare is 0.1000"),
+            ("stiffness_n_per_mm = -1.0\nsliding = 0.5", "FrictionStiffness is -1.0000"),
+            ("sliding = 0.5", "missing field `stiffness_n_per_mm`"),
+        ] {
+            let said = with(keys).expect_err(keys).to_string();
+            assert!(
+                said.contains("test.toml") && said.contains(wanted) && !said.contains("\n\n"),
+                "{keys}: {said}"
+            );
+        }
+    }
+
+    #[test]
     fn mistakes_are_named_with_their_line() {
         for (wrong, hint) in [
             (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = \"deep\""), "line 23"),
