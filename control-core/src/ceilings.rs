@@ -41,9 +41,11 @@ impl Ceilings {
 
 /// What keeps a device that was commissioned as `before` from becoming `after` without being commissioned again: the first
 /// value that commissioning found and that is another one, or a ceiling that is higher. What only makes the device gentler,
-/// or shows in nothing but the feel, may change.
+/// or shows in nothing but the feel, may change. Less mass and dry friction and more delay are gentler: with them a wall may be
+/// less stiff (`stability.rs`).
 pub fn changed(before: &Device, after: &Device) -> Option<Field> {
     let (old, new) = (&before.limits, &after.limits);
+    let (moved, moves) = (&before.mechanism, &after.mechanism);
     let kept = [
         (Field::RollerRadius, after.roller_radius == before.roller_radius),
         (Field::CountsPerTurn, after.counts_per_turn == before.counts_per_turn),
@@ -60,6 +62,9 @@ pub fn changed(before: &Device, after: &Device) -> Option<Field> {
         (Field::Travel, new.travel <= old.travel),
         (Field::StiffnessLimit, new.stiffness <= old.stiffness),
         (Field::HeartbeatMs, new.heartbeat_ms <= old.heartbeat_ms),
+        (Field::MovingMass, moves.mass <= moved.mass),
+        (Field::MechanismFriction, moves.dry_friction <= moved.dry_friction),
+        (Field::DriveDelayUs, moves.delay_us >= moved.delay_us),
     ];
     kept.into_iter().find_map(|(field, is_kept)| (!is_kept).then_some(field))
 }
@@ -94,7 +99,7 @@ mod tests {
     #[test]
     fn a_commissioned_device_is_lowered_and_never_raised_or_wired_anew() {
         type Change = (Field, fn(&mut Device));
-        let changes: [Change; 15] = [
+        let changes: [Change; 18] = [
             (Field::RollerRadius, |d| d.roller_radius.0 -= I16F16::ONE),
             (Field::CountsPerTurn, |d| d.counts_per_turn += 4),
             (Field::EncoderSign, |d| d.encoder_reversed = true),
@@ -110,6 +115,9 @@ mod tests {
             (Field::Travel, |d| d.limits.travel.0 += I16F16::DELTA),
             (Field::StiffnessLimit, |d| d.limits.stiffness.0 += I16F16::DELTA),
             (Field::HeartbeatMs, |d| d.limits.heartbeat_ms += 1),
+            (Field::MovingMass, |d| d.mechanism.mass.0 += I16F16::DELTA),
+            (Field::MechanismFriction, |d| d.mechanism.dry_friction.0 += I16F16::DELTA),
+            (Field::DriveDelayUs, |d| d.mechanism.delay_us -= 1),
         ];
         let before = Device::default();
         for (field, change) in changes {
@@ -128,7 +136,9 @@ mod tests {
         gentler.limits.heartbeat_ms = 100;
         gentler.limits.fade_in_ms = 444;
         gentler.skin_tilt.0 = 70;
-        gentler.mechanism.dry_friction.0 *= 2;
+        gentler.mechanism.mass.0 /= 2;
+        gentler.mechanism.dry_friction.0 /= 2;
+        gentler.mechanism.delay_us *= 2;
         assert_eq!(changed(&before, &gentler), None);
         assert_eq!(changed(&gentler, &before), Some(Field::TorqueLimit), "not back again");
     }
