@@ -1,136 +1,16 @@
 //! Faults of input and estimation that recordings of real machines showed, each on a small simulated one: starts in motion,
 //! free swings, slow rates, idle stretches, short recordings, plain forces in pairs, machines without inertia to speak of.
 
+#[path = "common/axis.rs"]
+mod axis;
+
+use axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, record, rig};
+use diagnosis::Verdict;
 use diagnosis::effects::EffectName as N;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};
-use diagnosis::{Outcome, Verdict, diagnose_recordings};
 use std::f64::consts::TAU;
-
-/// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
-/// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, and dry
-/// friction that comes and goes along the travel where the axis is slow.
-#[derive(Clone, Copy)]
-struct Machine {
-    inertia: f64,
-    viscous: f64,
-    forward: f64,
-    backward: f64,
-    gravity: f64,
-    offset: f64,
-    delay_s: f64,
-    lag_s: f64,
-    filter_s: f64,
-    limit: f64,
-    slow_grip: f64,
-    cogging: f64,
-    /// White disturbance, as a part of the forward dry friction.
-    disturbance: f64,
-}
-
-const AXIS: Machine = Machine {
-    inertia: 2.0,
-    viscous: 8.0,
-    forward: 3.0,
-    backward: 3.0,
-    gravity: 0.0,
-    offset: 0.0,
-    delay_s: 0.0,
-    lag_s: 0.0,
-    filter_s: 0.0,
-    limit: f64::INFINITY,
-    slow_grip: 0.0,
-    cogging: 0.0,
-    disturbance: 0.05,
-};
-
-/// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
-#[derive(Clone, Copy)]
-struct Taken {
-    rate: f64,
-    seconds: f64,
-    start: (f64, f64),
-    counts: f64,
-}
-
-const BENCH: Taken = Taken { rate: 500.0, seconds: 8.0, start: (0.0, 0.0), counts: 2e5 };
-
-/// Runs the machine under a command over time; `seed` draws a white disturbance of 1 % of its dry friction.
-fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f64) -> Recording {
-    let steps = 40;
-    let h = 1.0 / taken.rate / f64::from(steps);
-    let (mut q, mut v) = taken.start;
-    let (mut driven, mut behind) = (command(0.0), 0.0);
-    let follow = |by: f64| if by > 0.0 { 1.0 - (-h / by).exp() } else { 1.0 };
-    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut noise = || {
-        random ^= random >> 12;
-        random ^= random << 25;
-        random ^= random >> 27;
-        (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
-    let mut out = Recording { file: format!("{seed}.csv"), ..Recording::default() };
-    for row in 0..(taken.rate * taken.seconds) as u32 {
-        let t = f64::from(row) / taken.rate;
-        out.time_s.push(t);
-        out.command.push(command(t));
-        out.position_counts.push(((q - behind) * taken.counts).floor());
-        let disturbance = machine.disturbance * machine.forward.max(0.02 * machine.gravity) * noise();
-        for i in 0..steps {
-            // In rows, and a little on, so that rounding does not make the row before of it.
-            let rows = f64::from(row) + f64::from(i) / f64::from(steps) - machine.delay_s * taken.rate;
-            let u = command((rows + 1e-9).floor() / taken.rate);
-            driven += (u.clamp(-machine.limit, machine.limit) - driven) * follow(machine.lag_s);
-            let free = driven + machine.offset + disturbance - machine.gravity * q.sin()
-                + machine.cogging * (12.0 * q).sin();
-            let at = q;
-            let grip = machine.slow_grip * (4.0 * q).sin().abs() * (-(v / 0.3).abs()).exp();
-            let dry =
-                grip + if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
-            if v != 0.0 || free.abs() > dry {
-                let way = if v == 0.0 { free.signum() } else { v.signum() };
-                let next = v + h * (free - machine.viscous * v - dry * way) / machine.inertia;
-                let before = v;
-                v = if next * v < 0.0 { 0.0 } else { next };
-                q += 0.5 * h * (before + v);
-            }
-            // The filter's lag under the mean speed of the step.
-            let speed = (q - at) / h;
-            behind = (behind - machine.filter_s * speed) * (1.0 - follow(machine.filter_s))
-                + machine.filter_s * speed;
-        }
-    }
-    out
-}
-
-/// Several frequencies, drawn by a phase.
-fn mixed(size: f64, phase: f64) -> impl Fn(f64) -> f64 {
-    move |t| {
-        let tone = |hz: f64, part: f64| part * (TAU * hz * t + phase * hz).sin();
-        size * (tone(0.31, 1.0) + tone(0.83, 0.7) + tone(2.3, 0.5) + tone(5.1, 0.3))
-    }
-}
-
-fn rig(model: &str, encoder: &str, actuator: &str, counts: f64) -> Rig {
-    let text = format!(
-        "format = 1\nkind = \"rotary\"\n[model]\n{model}\n[uncertainty]\ninertia = 0.1\nviscous = 0.3\ncoulomb = 0.3\ngain = 0.05\n\
-         [actuator]\ngain = 1.0\ncommand_unit = \"N·m\"\n{actuator}\n[encoder]\ncounts_per_unit = {counts}\n{encoder}\n"
-    );
-    Rig::parse(&text, "a test").expect("the rig is right")
-}
-
-fn diagnosed(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Outcome {
-    let outcome = diagnose_recordings(rig, fit, holdout, &|_, _| ()).expect("the recordings are usable");
-    println!("{}", outcome.summary());
-    outcome
-}
-
-fn names(outcome: &Outcome) -> Vec<N> {
-    outcome.report.effects.iter().map(|e| e.name).collect()
-}
-
-const WHOLE: &str = "inertia = 2.0\nviscous = 8.0\ncoulomb = 3.0";
 
 #[test]
 fn a_start_in_motion_leaves_no_force_whatever_the_unit_of_length() {

@@ -61,7 +61,7 @@ pub(crate) struct BlockedRecording {
     pub(crate) tilt: Option<Vec<f64>>,
     pub(crate) force: Option<Vec<f64>>,
     pub(crate) reference: Option<Vec<f64>>,
-    /// Position and velocity at the middle of each block, from the smoother.
+    /// Position and velocity at the middle of each block: from the smoother where the recording is fitted, from the filter where it judges.
     pub(crate) x: Vec<f64>,
     pub(crate) v: Vec<f64>,
     /// Blocks where the axis rests or the sign of its speed is not known.
@@ -78,6 +78,8 @@ pub(crate) struct BlockedRecording {
     pub(crate) bias: f64,
     /// Travel that the encoder seems to have lost so far, where steps were found.
     pub(crate) lost: Vec<f64>,
+    /// What each block pays for a jump that was found to begin in it, nats.
+    pub(crate) loss_price: Vec<f64>,
     /// Speed below which its sign is not known.
     pub(crate) speed_floor: f64,
     /// Speed from which the rig's dry friction stops the axis within half a block.
@@ -149,6 +151,7 @@ impl BlockedRecording {
             place: None,
             bias: 0.0,
             lost: vec![0.0; n],
+            loss_price: vec![0.0; n],
             speed_floor: 0.0,
             stops_from: 0.5 * recording.duration_s() / n.max(1) as f64 * rig.model.coulomb.unwrap_or(0.0)
                 / rig.model.inertia,
@@ -306,14 +309,6 @@ impl BlockedRecording {
         let near = [block.saturating_sub(2), (block + 2).min(self.blocks() - 1)];
         let speed = self.v[block].abs();
         speed < self.stops_from && near.iter().all(|other| speed < 0.5 * self.v[*other].abs())
-    }
-
-    /// Jumps of the reading per segment, where lost counts were found.
-    pub(crate) fn jumps(&self) -> impl Iterator<Item = usize> + '_ {
-        let changes = |block: usize| block > 0 && self.lost[block] != self.lost[block - 1];
-        // A jump within a block shows in this one and in the next.
-        let begins = move |block: &usize| changes(*block) && !changes(*block - 1);
-        self.segments.windows(2).map(move |bounds| (bounds[0]..bounds[1]).filter(begins).count())
     }
 
     /// Whether each segment is known all but for a few blocks.

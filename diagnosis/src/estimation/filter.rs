@@ -273,9 +273,9 @@ impl Gains {
     }
 }
 
-/// State at the middle of each block, smoothed over the whole recording.
+/// State at the middle of each block.
 #[derive(Debug, Clone)]
-pub(crate) struct Smoothed {
+pub(crate) struct Motion {
     pub(crate) x: Vec<f64>,
     pub(crate) v: Vec<f64>,
     /// Disturbance acceleration that the inputs do not explain.
@@ -284,13 +284,53 @@ pub(crate) struct Smoothed {
     pub(crate) v_sd: Vec<f64>,
 }
 
-/// Fixed-interval smoother with the model's input.
-pub(crate) fn smooth(track: &BlockedRecording, noise: &Noise, total: &Total) -> Smoothed {
-    if track.reading_lag.is_empty() {
-        smooth_of::<3>(track, noise, total)
-    } else {
-        smooth_of::<4>(track, noise, total)
+impl Motion {
+    fn of(blocks: usize) -> Self {
+        let none = || vec![0.0; blocks];
+        Self { x: none(), v: none(), d: none(), v_sd: none() }
     }
+
+    /// Enters the state at the start of block `j`, of which the input changes the speed by `dv`.
+    fn enter(&mut self, j: usize, [q, v, d]: [f64; 3], variance: f64, dv: f64, span: f64) {
+        let half = 0.5 * span;
+        let a = d + dv / span;
+        self.x[j] = q + (v + 0.5 * a * half) * half;
+        self.v[j] = v + a * half;
+        self.d[j] = d;
+        self.v_sd[j] = variance.max(0.0).sqrt();
+    }
+}
+
+/// What an estimate of the motion in a block may know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Knows {
+    /// Every row of the recording: the fixed-interval smoother, for recordings that are fitted.
+    All,
+    /// The rows up to the block's own: the filter, for recordings that judge. What knows the rows to come knows the disturbance
+    /// that a force is to be told from.
+    Past,
+}
+
+/// The motion under the model's input.
+pub(crate) fn motion(track: &BlockedRecording, noise: &Noise, total: &Total, knows: Knows) -> Motion {
+    if track.reading_lag.is_empty() {
+        motion_of::<3>(track, noise, total, knows)
+    } else {
+        motion_of::<4>(track, noise, total, knows)
+    }
+}
+
+fn motion_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total, knows: Knows) -> Motion {
+    let filtered = filter::<N>(track, noise, total);
+    if knows == Knows::All {
+        return smooth(track, noise, total, &filtered);
+    }
+    let mut out = Motion::of(filtered.len());
+    for (j, Filtered { state, covariance, .. }) in filtered.iter().enumerate() {
+        let state = [state[0], state[1], state[2]];
+        out.enter(j, state, covariance[1][1], total.dv[j], track.span[j]);
+    }
+    out
 }
 
 /// What the filter knew after a block's reading.
@@ -302,9 +342,8 @@ struct Filtered<const N: usize> {
     gain: [f64; N],
 }
 
-/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
-/// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
-fn smooth_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total) -> Smoothed {
+/// What the filter knows after each block's reading.
+fn filter<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total) -> Vec<Filtered<N>> {
     let n = track.blocks();
     let mut filtered: Vec<Filtered<N>> = Vec::with_capacity(n);
     let mut p = initial::<N>(track, noise);
@@ -329,7 +368,19 @@ fn smooth_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &To
         p = predict(&covariance, &step);
         filtered.push(Filtered { state, covariance, innovation, variance, gain });
     }
-    let mut out = Smoothed { x: vec![0.0; n], v: vec![0.0; n], d: vec![0.0; n], v_sd: vec![0.0; n] };
+    filtered
+}
+
+/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
+/// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
+fn smooth<const N: usize>(
+    track: &BlockedRecording,
+    noise: &Noise,
+    total: &Total,
+    filtered: &[Filtered<N>],
+) -> Motion {
+    let n = track.blocks();
+    let mut out = Motion::of(n);
     // What later readings say: the adjoint and its covariance.
     let (mut adjoint, mut known) = ([0.0; N], [[0.0; N]; N]);
     for j in (0..n).rev() {
@@ -341,14 +392,9 @@ fn smooth_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &To
             known = between(f, &known);
         }
         let back = times(covariance, &adjoint);
-        let [q, v, d] = [0, 1, 2].map(|i| state[i] - back[i]);
         let less = product(&covariance[1], &times(&known, &covariance[1]));
-        let half = 0.5 * track.span[j];
-        let a = d + total.dv[j] / track.span[j];
-        out.x[j] = q + (v + 0.5 * a * half) * half;
-        out.v[j] = v + a * half;
-        out.d[j] = d;
-        out.v_sd[j] = (covariance[1][1] - less).max(0.0).sqrt();
+        let state = [0, 1, 2].map(|i| state[i] - back[i]);
+        out.enter(j, state, covariance[1][1] - less, total.dv[j], track.span[j]);
         // Back over the block's own reading.
         let seen = &step.seen;
         let of_gain = product(gain, &adjoint);

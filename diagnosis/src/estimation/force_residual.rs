@@ -4,7 +4,7 @@
 //! under uneven time stamps; its bandwidth is what the report states.
 
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::{Noise, smooth};
+use crate::estimation::filter::{Knows, Noise, motion};
 use std::f64::consts::TAU;
 
 /// Largest bandwidth, Hz.
@@ -40,7 +40,7 @@ impl Estimator {
         let tau = 1e3;
         let walk = (TAU * self.bandwidth_hz).powi(6) * h;
         let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0 };
-        smooth(&even, &noise, total).d
+        motion(&even, &noise, total, Knows::All).d
     }
 }
 

@@ -34,9 +34,34 @@ const FEWEST_AFTER: usize = 6;
 /// How often what is left is looked through again: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
-/// Travel lost so far per block of a recording, from what a fit of it alone that knows of no jumps leaves; zero everywhere
-/// where too few are seen.
-pub(crate) fn find(track: &BlockedRecording, alone: &Fit, count: f64, asked: Asked) -> Vec<f64> {
+/// What a recording seems to have lost.
+pub(crate) struct Losses {
+    /// Travel lost so far per block, rad or m; zero everywhere where too few jumps are seen.
+    pub(crate) lost: Vec<f64>,
+    /// What the jump that begins in a block costs, nats. When counts get lost and how many nobody can tell beforehand, so every
+    /// jump is found in the very recording that it explains; less this price its gain is at most what the recording is likelier
+    /// where each block is as likely to hold it and its size is drawn from a normal distribution of `spread` (Laplace's
+    /// approximation of the marginal likelihood), which noise cannot gain by on the mean.
+    pub(crate) price: Vec<f64>,
+    /// Sizes of the jumps, rad or m.
+    pub(crate) sizes: Vec<f64>,
+}
+
+/// Root mean square of sizes, a count at the least.
+pub(crate) fn spread_of(sizes: &[f64], count: f64) -> f64 {
+    let square = sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64;
+    square.sqrt().max(count)
+}
+
+/// What a recording lost, from what a fit of it alone that knows of no jumps leaves; `spread` is how large jumps are where
+/// other recordings tell, rad or m.
+pub(crate) fn find(
+    track: &BlockedRecording,
+    alone: &Fit,
+    count: f64,
+    asked: Asked,
+    spread: Option<f64>,
+) -> Losses {
     let n = track.blocks();
     let (gains, residual) = (&alone.prepared[0].gains, alone.residual(0));
     let mut jumps: Vec<Jump> = Vec::new();
@@ -56,15 +81,19 @@ pub(crate) fn find(track: &BlockedRecording, alone: &Fit, count: f64, asked: Ask
         let stands = |jump: &Jump| jump.gain() > asked.gain && jump.size.abs() > asked.least * count;
         left = settle(&mut jumps, &residual, stands);
     }
-    let mut lost = vec![0.0; n];
+    let mut found = Losses { lost: vec![0.0; n], price: vec![0.0; n], sizes: Vec::new() };
     if jumps.len() < asked.fewest || follows_command(track, &jumps) || follows_angle(track, &jumps) {
-        return lost;
+        return found;
     }
-    for Jump { block, later, size, .. } in jumps {
-        lost[block] += (1.0 - later) * size;
-        lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
+    found.sizes = jumps.iter().map(|jump| jump.size).collect();
+    let spread = spread.unwrap_or_else(|| spread_of(&found.sizes, count));
+    for jump in &jumps {
+        let Jump { block, later, size, .. } = *jump;
+        found.lost[block] += (1.0 - later) * size;
+        found.lost[block + 1..].iter_mut().for_each(|lost| *lost += size);
+        found.price[block] += jump.price(n, spread);
     }
-    lost
+    found
 }
 
 /// Time before a jump in which the command is looked at, s: a belt or a joint gives way at once.
@@ -208,6 +237,15 @@ impl Jump {
         let response = self.response();
         0.5 * self.size * self.size * dot(&response, &response)
     }
+
+    /// See [`Losses::price`].
+    fn price(&self, blocks: usize, spread: f64) -> f64 {
+        let response = self.response();
+        let information = dot(&response, &response);
+        (blocks as f64).ln()
+            + 0.5 * (information * spread * spread).ln_1p()
+            + 0.5 * (self.size / spread).powi(2)
+    }
 }
 
 /// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits again;
@@ -248,10 +286,12 @@ fn fit_sizes(jumps: &mut [Jump], residual: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{Effect, EffectName};
     use crate::estimation::filter::Noise;
     use crate::estimation::model::{Model, Nominal};
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
+    use crate::numerics::bootstrap::Random;
 
     #[test]
     fn a_jump_within_a_block_is_one_in_two_parts_and_parts_that_oppose_each_other_are_none() {
@@ -288,7 +328,7 @@ mod tests {
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
-        let lost = find(&tracks[0], &fit, count, asked);
+        let lost = find(&tracks[0], &fit, count, asked, None).lost;
         (lost.iter().map(|lost| lost / count).collect(), tracks[0].start.clone())
     }
 
@@ -309,6 +349,42 @@ mod tests {
         assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
         let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
         assert!(!any(lost(impact, Asked::KNOWN)));
+    }
+
+    /// The price is what keeps a search of the very recording that is judged from gaining by chance.
+    #[test]
+    fn jumps_that_chance_makes_cost_more_than_they_gain() {
+        let any = Asked { gain: 2.0, least: 0.0, fewest: 1 };
+        let (mut gained, mut paid, mut jumps) = (0.0, 0.0, 0);
+        for seed in 1..21 {
+            let mut random = Random::new(seed);
+            let mut chance = || (0..12).map(|_| random.below(1000) as f64 / 1000.0).sum::<f64>() - 6.0;
+            let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
+            let recording = Recording {
+                command: vec![0.0; time_s.len()],
+                position_counts: time_s.iter().map(|t| (3000.3 * t + 3.0 * chance()).floor()).collect(),
+                time_s,
+                ..Recording::default()
+            };
+            let rig = Rig::of_values(0.01, 0.0, 0.0);
+            let count = 1.0 / rig.encoder.counts_per_unit;
+            let mut tracks = [BlockedRecording::new(&recording, &rig)];
+            tracks[0].v.fill(3.0);
+            tracks[0].rest.fill(false);
+            let nominal =
+                Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+            let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+            let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
+            let found = find(&tracks[0], &fit, count, any, Some(2.0 * count));
+            jumps += found.sizes.len();
+            paid += found.price.iter().sum::<f64>();
+            (tracks[0].lost, tracks[0].loss_price) = (found.lost, found.price);
+            let effects = vec![Effect::shaped(EffectName::MissedCounts, &[])];
+            let with = Fit::new(&Model { effects, ..Model::default() }, &nominal, &tracks, &noise);
+            gained += with.log_likelihood - fit.log_likelihood;
+        }
+        assert!(jumps > 10, "chance makes only {jumps}");
+        assert!(gained < 0.0 && gained + paid > 0.0, "{jumps} jumps pay {paid} nats and gain {gained} by it");
     }
 
     #[test]

@@ -63,6 +63,7 @@ fn excerpt(track: &BlockedRecording, total: &Total, from: usize, to: usize) -> E
         place: None,
         bias: 0.0,
         lost: Vec::new(),
+        loss_price: Vec::new(),
         speed_floor: track.speed_floor,
         stops_from: track.stops_from,
     };

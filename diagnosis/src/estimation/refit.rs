@@ -1,7 +1,7 @@
 //! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
 
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::{Noise, smooth};
+use crate::estimation::filter::{Knows, Noise, motion};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::{Key, Model, Nominal};
 use crate::estimation::noise::{self, Colour};
@@ -36,11 +36,17 @@ fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
     out
 }
 
-/// Smooths the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
+/// Estimates the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
 /// encoder's.
-pub(crate) fn resmooth(tracks: &mut [BlockedRecording], totals: &[Total], noise: &Noise, count: f64) {
+pub(crate) fn estimate_motion(
+    tracks: &mut [BlockedRecording],
+    totals: &[Total],
+    noise: &Noise,
+    count: f64,
+    knows: Knows,
+) {
     for (track, total) in tracks.iter_mut().zip(totals) {
-        let state = smooth(track, noise, total);
+        let state = motion(track, noise, total, knows);
         let mut sd: Vec<f64> =
             state.v_sd.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(sd, _)| *sd).collect();
         if sd.len() < 10 {
@@ -176,7 +182,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> 
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
     noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
-    resmooth(tracks, &totals, &noise, count);
+    estimate_motion(tracks, &totals, &noise, count, Knows::All);
     let model = Model::default();
     let mut fit = Fit::new(&model, nominal, tracks, &noise);
     for round in 0..2 {
@@ -188,7 +194,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> 
         }
         let totals = fit.totals(tracks);
         noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
-        resmooth(tracks, &totals, &noise, count);
+        estimate_motion(tracks, &totals, &noise, count, Knows::All);
         fit = Fit::new(&model, nominal, tracks, &noise);
     }
     if let Some(sign) = load_sign(nominal, &fit) {

@@ -132,10 +132,88 @@ pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimation::blocked_recording::{Input, Total};
+    use crate::estimation::filter::{Gains, Knows, Noise};
+    use crate::estimation::refit::estimate_motion;
+    use crate::estimation::regressors::effect_inputs;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    /// Two seconds in which an axis is driven to and fro, then a second that goes on or is mirrored, as its command is.
+    fn followed(is_mirrored: bool, knows: Knows) -> (BlockedRecording, Nominal, Total) {
+        let time_s: Vec<f64> = (0..3001).map(|row| f64::from(row) * 1e-3).collect();
+        let after = |t: f64, x: f64, at: f64| if is_mirrored && t > 2.0 { 2.0 * at - x } else { x };
+        // Farthest at first, so that the mirrored end reaches no farther.
+        let moved = |t: f64| (-1.2 * t).exp() * (40_000.0 * (7.0 * t).sin() + 9000.0 * (31.0 * t).cos());
+        let recording = Recording {
+            command: time_s.iter().map(|t| after(*t, (3.0 * t).sin(), 0.0)).collect(),
+            position_counts: time_s.iter().map(|t| after(*t, moved(*t), moved(2.0)).floor()).collect(),
+            tilt_rad: Some(time_s.iter().map(|t| after(*t, 0.1 * t, 0.2)).collect()),
+            force: Some(time_s.iter().map(|t| after(*t, t.cos(), 0.0)).collect()),
+            time_s,
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.02, 0.05);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let mut tracks = [BlockedRecording::new(&recording, &nominal.rig)];
+        let totals = [Total::of_command(&tracks[0], nominal.gain())];
+        estimate_motion(&mut tracks, &totals, &NOISE, 1e-3, knows);
+        let [track] = tracks;
+        let [total] = totals;
+        (track, nominal, total)
+    }
+
+    const NOISE: Noise = Noise { sensor: 1.0, white: 10.0, slow: 1e-3, tau: 0.1, rest: 1.0 };
+
+    /// Largest difference of what an effect puts into the blocks before `until`, over its largest value there.
+    fn difference(a: &Input, b: &Input, until: usize) -> f64 {
+        let columns = |input: &Input| match input {
+            Input::Held(x) | Input::Sensor(x) => vec![x[..until].to_vec()],
+            Input::Rows { dv, dq, dz } => [dv, dq, dz].map(|x| x[..until].to_vec()).to_vec(),
+        };
+        let apart = |(a, b): (Vec<f64>, Vec<f64>)| {
+            let most = a.iter().fold(1e-12_f64, |most, x| most.max(x.abs()));
+            a.iter().zip(&b).fold(0.0_f64, |far, (a, b)| far.max((a - b).abs())) / most
+        };
+        columns(a).into_iter().zip(columns(b)).map(apart).fold(0.0, f64::max)
+    }
 
     #[test]
-    fn drifts_settle_within_the_recording_bristles_are_short_and_grips_hold() {
-        let span = Span {
+    fn what_judges_a_block_of_a_held_out_recording_knows_no_later_row() {
+        let farthest = |name: N, knows: Knows| {
+            let [(a, nominal, total), (b, _, other)] =
+                [false, true].map(|is_mirrored| followed(is_mirrored, knows));
+            // An acceleration takes the neighbours of its block, a second mass those between which its speed lies.
+            let until = a.start.partition_point(|start| *start < 2.0) - 3;
+            let before = |total: &Total| Gains::new(&a, &NOISE).innovations(&a, total)[..until].to_vec();
+            assert_eq!(before(&total), before(&other), "the command is the same until then");
+            let span = span_of(std::slice::from_ref(&a), &nominal);
+            let mut shapes = name.definition().grid(name, &span);
+            if name.definition().is_periodic() {
+                shapes.push(Effect::shaped(name, &[("turn", TAU), ("order_3", 3.0)]));
+            }
+            let inputs = |track: &BlockedRecording, effect: &Effect| {
+                effect_inputs(track, effect, &track.command, 0.0, || track.drive(None))
+            };
+            let apart = |effect: &Effect| {
+                let both = inputs(&a, effect).into_iter().zip(inputs(&b, effect));
+                both.map(|(a, b)| difference(&a, &b, until)).fold(0.0, f64::max)
+            };
+            (shapes.len(), shapes.iter().map(apart).fold(0.0, f64::max))
+        };
+        let mut looked_at = 0;
+        for name in N::ALL {
+            let (shapes, far) = farthest(*name, Knows::Past);
+            assert!(far < 1e-6, "{name}: {far}");
+            looked_at += usize::from(shapes > 0);
+        }
+        assert!(looked_at > 20, "{looked_at} effects");
+        let (_, far) = farthest(N::ViscousFriction, Knows::All);
+        assert!(far > 1e-4, "a smoother knows what comes: {far}");
+    }
+
+    fn span() -> Span {
+        Span {
             speed: 10.0,
             speed_floor: 0.1,
             slow: 1.0,
@@ -151,7 +229,29 @@ mod tests {
             tilt: false,
             force: false,
             rig: Believed::default(),
+        }
+    }
+
+    #[test]
+    fn a_law_of_the_travel_is_looked_for_where_recordings_start_at_one_place() {
+        let mut rig = Rig::of_values(0.01, 0.0, 0.05);
+        let mut is_looked_for = |start_spread| {
+            rig.encoder.start_spread = start_spread;
+            let rig = rig.clone();
+            let nominal =
+                Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+            let mut span = span();
+            span.rig.has_stroke = has_stroke(&span, &nominal);
+            let any = |name: N| !shapes(name, &span, &nominal).is_empty();
+            [N::PositionSpring, N::PositionDependentFriction, N::PositionDependentDamping].map(any)
         };
+        assert_eq!(is_looked_for(Some(1.0)), [true; 3]);
+        assert_eq!(is_looked_for(Some(15.0)), [false; 3], "starts that lie 15 rad apart on a travel of 20");
+    }
+
+    #[test]
+    fn drifts_settle_within_the_recording_bristles_are_short_and_grips_hold() {
+        let span = span();
         let at_end = |name: N, time_constant: f64| {
             is_at_end(&Effect::shaped(name, &[("time_constant", time_constant)]), &span)
         };

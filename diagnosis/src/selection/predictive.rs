@@ -7,11 +7,12 @@ use crate::estimation::fit::{Fit, normal_of};
 use crate::numerics::linear::{Prior, bounded};
 
 /// Parts that segments are dealt into.
-const FOLDS: usize = 6;
+pub(crate) const FOLDS: usize = 6;
 /// Neighbouring segments that are left out together: what a disturbance remembers must not tell of the block that is judged.
 const TOGETHER: usize = 3;
 
-fn fold_of(recording: usize, segment: usize) -> usize {
+/// The fold in which a segment of a recording is left out.
+pub(crate) fn fold_of(recording: usize, segment: usize) -> usize {
     (segment / TOGETHER + recording) % FOLDS
 }
 

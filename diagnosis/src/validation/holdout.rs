@@ -1,14 +1,17 @@
-//! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may move (its offset, and
-//! the place along the travel at which it started).
+//! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may move (its offset, and the
+//! encoder's zero, on which the phase of periodic effects rests). That is found on other stretches of the recording than
+//! those it judges, as it is on fitted recordings, so that no freedom on held-out rows speaks for an effect.
 
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
-use crate::estimation::model::{Key, Model, Nominal, total};
+use crate::estimation::model::{Key, Model, Nominal};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
 use crate::selection::joint;
+use crate::selection::predictive::{FOLDS, fold_of};
 use crate::selection::search::FittedModel;
+use rayon::prelude::*;
 
 /// A model laid on one held-out recording.
 pub(crate) struct HoldoutFit {
@@ -21,12 +24,6 @@ pub(crate) struct HoldoutFit {
     pub(crate) residual: Vec<f64>,
     /// What the model pays for jumps found in this very recording, in log-likelihood.
     pub(crate) surcharge: f64,
-}
-
-impl HoldoutFit {
-    fn cost(&self) -> f64 {
-        self.costs.iter().sum()
-    }
 }
 
 /// Pattern of an effect with its own phase: per wave (frequency, cosine, sine), with the recordings' phases undone.
@@ -116,22 +113,16 @@ pub(crate) fn evaluate(
     track: &BlockedRecording,
     noise: &Noise,
 ) -> HoldoutFit {
-    let mut best = evaluate_once(candidate, nominal, track, noise);
-    if !candidate.model.effects.iter().any(joint::is_joint) {
-        return best;
-    }
-    // The law of a joint takes up the force that is there all the time, which laying it finds.
-    let mut own = track.clone();
-    let mut bias = best.bias;
-    for _ in 0..BIASES {
-        own.bias = bias;
-        let evaluated = evaluate_once(candidate, nominal, &own, noise);
-        bias = evaluated.bias;
-        if evaluated.cost() < best.cost() {
-            best = HoldoutFit { bias: own.bias, ..evaluated };
+    let mut evaluated = evaluate_once(candidate, nominal, track, noise);
+    if candidate.model.effects.iter().any(joint::is_joint) {
+        // The law of a joint takes up the force that is there all the time, which evaluating it finds.
+        let mut own = track.clone();
+        for _ in 0..BIASES {
+            own.bias = evaluated.bias;
+            evaluated = evaluate_once(candidate, nominal, &own, noise);
         }
     }
-    best
+    evaluated
 }
 
 /// How often the force that is there all the time is found anew.
@@ -146,99 +137,144 @@ fn evaluate_once(
     let (model, fit) = (&candidate.model, &candidate.fit);
     let one = Prepared::new(model, nominal, track, noise);
     let p = one.columns.len();
-    let mut theta = one.reference.clone();
-    for (i, column) in one.columns.iter().enumerate() {
-        if !column.own
-            && let Some(value) = fit.value(column.key)
-        {
-            theta[i] = value;
+    let mut fitted = one.reference.clone();
+    for (theta, column) in fitted.iter_mut().zip(&one.columns).filter(|(_, column)| !column.own) {
+        if let Some(value) = fit.value(column.key) {
+            *theta = value;
         }
     }
-    let (mut m, mut b) = (Square::zero(p), vec![0.0; p]);
-    for (segment, _) in one.segments.iter().zip(track.known_segments()).filter(|(_, known)| *known) {
-        for i in 0..p {
-            b[i] += segment.at(i, p);
-            for j in 0..p {
-                m.add(i, j, segment.at(i, j));
-            }
-        }
+    let patterns: Vec<Option<Pattern>> =
+        (0..model.effects.len()).map(|effect| Pattern::new(fit, model, effect, &one)).collect();
+    let known: Vec<bool> = track.known_segments().collect();
+    let own = |fold: usize| {
+        let sums = Sums::new(&one, |segment| known[segment] && fold_of(0, segment) != fold);
+        sums.own_values(fitted.clone(), &one, &patterns)
+    };
+    let by_fold: Vec<Vec<f64>> = (0..FOLDS).into_par_iter().map(own).collect();
+    let step_of = |theta: &Vec<f64>| -> Vec<f64> {
+        theta.iter().zip(&one.reference).map(|(value, reference)| value - reference).collect()
+    };
+    let steps: Vec<Vec<f64>> = by_fold.iter().map(step_of).collect();
+    let places: Vec<usize> = (0..p).collect();
+    let costs_by_fold: Vec<Vec<f64>> = steps.iter().map(|step| one.costs(&places, step)).collect();
+    let (mut costs, mut residual) = (vec![0.0; known.len()], Vec::new());
+    for segment in (0..known.len()).filter(|segment| known[*segment]) {
+        let fold = fold_of(0, segment);
+        costs[segment] = costs_by_fold[fold][segment];
+        residual.extend(one.segment(segment).0.map(|j| one.residual_at(j, &places, &steps[fold])));
+    }
+    let mut total = Total::zero(track.blocks());
+    for (i, column) in one.columns.iter().enumerate() {
+        let value = |segment: usize| by_fold[fold_of(0, segment)][i];
+        let by_block: Vec<f64> = (0..known.len())
+            .flat_map(|segment| one.segment(segment).0.map(move |_| segment))
+            .map(value)
+            .collect();
+        column.input.scaled(&by_block).add_to(&mut total, track, 1.0);
     }
     let offset = one.columns.iter().position(|c| c.key == Key::Offset);
-    // Twice round, because offset and phases lean on each other.
-    for _ in 0..2 {
-        if let Some(o) = offset {
-            let prior = one.columns[o].prior;
-            let weight = if prior.sd.is_finite() { prior.sd.powi(-2) } else { 0.0 };
-            let rest: f64 =
-                (0..p).filter(|j| *j != o).map(|j| m.at(o, j) * (theta[j] - one.reference[j])).sum();
-            let information = m.at(o, o) + weight;
-            if information > 0.0 {
-                theta[o] = one.reference[o] + (b[o] - rest) / information;
-            }
+    let mean = |i: usize| by_fold.iter().map(|theta| theta[i]).sum::<f64>() / FOLDS as f64;
+    HoldoutFit { total, bias: offset.map_or(0.0, mean), costs, residual, surcharge: one.surcharge() }
+}
+
+/// An effect of which each recording has its own phase: its waves, their columns, and what the fitted recordings say of it.
+struct Pattern {
+    shape: Vec<(f64, f64, f64)>,
+    /// Waves that share a shift, with the columns of their cosines and sines, the shift's period and their highest wave.
+    groups: Vec<(Vec<usize>, Vec<usize>, f64, f64)>,
+}
+
+impl Pattern {
+    fn new(fit: &Fit, model: &Model, effect: usize, one: &Prepared) -> Option<Self> {
+        let places: Vec<usize> = (0..one.columns.len())
+            .filter(|i| matches!(one.columns[*i].key, Key::Term { effect: e, .. } if e == effect))
+            .collect();
+        let which = &model.effects[effect];
+        if !which.name.definition().has_own_phase() || places.is_empty() {
+            return None;
         }
-        for effect in 0..model.effects.len() {
-            let name = model.effects[effect].name;
-            let places: Vec<usize> = (0..p)
-                .filter(|i| matches!(one.columns[*i].key, Key::Term { effect: e, .. } if e == effect))
-                .collect();
-            if !name.definition().has_own_phase() || places.is_empty() {
-                continue;
-            }
-            let shape = pattern(fit, model, effect);
-            let waves = waves_of(model, effect);
-            for group in groups(waves.len(), model.effects[effect].shape.contains_key("turn")) {
-                let reach = group.iter().map(|i| std::f64::consts::TAU / waves[*i]).fold(0.0, f64::max);
-                let columns: Vec<usize> =
-                    group.iter().flat_map(|i| [places[2 * i], places[2 * i + 1]]).collect();
-                let pull: Vec<f64> = columns
-                    .iter()
-                    .map(|i| {
-                        let rest: f64 = (0..p)
-                            .filter(|j| !columns.contains(j))
-                            .map(|j| m.at(*i, j) * (theta[j] - one.reference[j]))
-                            .sum();
-                        b[*i] - rest
-                    })
-                    .collect();
-                let at = |shift: f64| -> Vec<f64> {
-                    group
-                        .iter()
-                        .flat_map(|i| {
-                            let (_, c, s) = turned(shape[*i], shift);
-                            [c, s]
-                        })
-                        .collect()
-                };
-                let gain = |shift: f64| {
-                    let x = at(shift);
-                    let mut sum = 0.0;
-                    for (a, i) in columns.iter().enumerate() {
-                        let row: f64 = columns.iter().zip(&x).map(|(j, x)| m.at(*i, *j) * x).sum();
-                        sum += x[a] * (pull[a] - 0.5 * row);
-                    }
-                    sum
-                };
-                let shift = best_shift(reach, highest(&waves, &group), gain);
-                for (i, x) in columns.iter().zip(at(shift)) {
-                    theta[*i] = x;
+        let waves = waves_of(model, effect);
+        let of_group = |group: Vec<usize>| {
+            let reach = group.iter().map(|i| std::f64::consts::TAU / waves[*i]).fold(0.0, f64::max);
+            let columns = group.iter().flat_map(|i| [places[2 * i], places[2 * i + 1]]).collect();
+            let most = highest(&waves, &group);
+            (group, columns, reach, most)
+        };
+        let groups = groups(waves.len(), which.shape.contains_key("turn")).into_iter().map(of_group);
+        Some(Self { shape: pattern(fit, model, effect), groups: groups.collect() })
+    }
+}
+
+/// Normal equations of some segments of a held-out recording, about the reference.
+struct Sums {
+    m: Square,
+    b: Vec<f64>,
+}
+
+impl Sums {
+    fn new(one: &Prepared, is_used: impl Fn(usize) -> bool) -> Self {
+        let p = one.columns.len();
+        let (mut m, mut b) = (Square::zero(p), vec![0.0; p]);
+        for (_, segment) in one.segments.iter().enumerate().filter(|(s, _)| is_used(*s)) {
+            for i in 0..p {
+                b[i] += segment.at(i, p);
+                for j in 0..p {
+                    m.add(i, j, segment.at(i, j));
                 }
             }
         }
+        Self { m, b }
     }
-    let places: Vec<usize> = (0..p).collect();
-    let step: Vec<f64> = theta.iter().zip(&one.reference).map(|(a, b)| a - b).collect();
-    let costs = one
-        .costs(&places, &step)
-        .into_iter()
-        .zip(track.known_segments())
-        .map(|(cost, is_known)| if is_known { cost } else { 0.0 })
-        .collect();
-    let bias = offset.map_or(0.0, |o| theta[o]);
-    let known = track.segments.windows(2).zip(track.known_segments()).filter(|(_, is_known)| *is_known);
-    let residual =
-        known.flat_map(|(w, _)| (w[0]..w[1]).map(|j| one.residual_at(j, &places, &step))).collect();
-    let surcharge = one.surcharge();
-    HoldoutFit { total: total(track, &one.columns, &theta), bias, costs, residual, surcharge }
+
+    /// What of the score of column `i` the others leave at `theta`.
+    fn pull(&self, i: usize, theta: &[f64], one: &Prepared, is_other: impl Fn(usize) -> bool) -> f64 {
+        let others = (0..theta.len()).filter(|j| is_other(*j));
+        self.b[i] - others.map(|j| self.m.at(i, j) * (theta[j] - one.reference[j])).sum::<f64>()
+    }
+
+    /// `theta` with what is the recording's own, its offset and the phases of its patterns, found on these segments.
+    fn own_values(&self, mut theta: Vec<f64>, one: &Prepared, patterns: &[Option<Pattern>]) -> Vec<f64> {
+        let offset = one.columns.iter().position(|c| c.key == Key::Offset);
+        // Twice round, because offset and phases lean on each other.
+        for _ in 0..2 {
+            if let Some(o) = offset {
+                let prior = one.columns[o].prior;
+                let weight = if prior.sd.is_finite() { prior.sd.powi(-2) } else { 0.0 };
+                let information = self.m.at(o, o) + weight;
+                if information > 0.0 {
+                    theta[o] = one.reference[o] + self.pull(o, &theta, one, |j| j != o) / information;
+                }
+            }
+            for Pattern { shape, groups } in patterns.iter().flatten() {
+                for (group, columns, reach, most) in groups {
+                    let pull: Vec<f64> = columns
+                        .iter()
+                        .map(|i| self.pull(*i, &theta, one, |j| !columns.contains(&j)))
+                        .collect();
+                    let at = |shift: f64| -> Vec<f64> {
+                        let wave = |i: &usize| {
+                            let (_, c, s) = turned(shape[*i], shift);
+                            [c, s]
+                        };
+                        group.iter().flat_map(wave).collect()
+                    };
+                    let gain = |shift: f64| {
+                        let x = at(shift);
+                        let row = |i: usize| -> f64 {
+                            columns.iter().zip(&x).map(|(j, x)| self.m.at(i, *j) * x).sum()
+                        };
+                        let terms = columns.iter().zip(&x).zip(&pull);
+                        terms.map(|((i, x), pull)| x * (pull - 0.5 * row(*i))).sum()
+                    };
+                    let shift = best_shift(*reach, *most, gain);
+                    for (i, x) in columns.iter().zip(at(shift)) {
+                        theta[*i] = x;
+                    }
+                }
+            }
+        }
+        theta
+    }
 }
 
 /// Held-out gain of one model over another under the same noise.
@@ -249,4 +285,39 @@ pub(crate) fn compare(with: &[HoldoutFit], without: &[HoldoutFit]) -> Gain {
         .flat_map(|(a, b)| a.costs.iter().zip(&b.costs).map(|(a, b)| b - a))
         .collect();
     bootstrap(&gains)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    #[test]
+    fn the_offset_of_a_held_out_stretch_is_that_of_the_other_stretches() {
+        // Pushed on for the 0.6 s that are left out together, and gliding from then on.
+        let moved = |t: f64| 5000.0 * (t + if t < 0.6 { t * t } else { 1.2 * t - 0.36 });
+        let time_s: Vec<f64> = (0..5000).map(|row| f64::from(row) * 1e-3).collect();
+        let recording = Recording {
+            command: vec![0.0; time_s.len()],
+            position_counts: time_s.iter().map(|t| moved(*t).floor()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let track = BlockedRecording::new(&recording, &rig);
+        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0 };
+        let model = Model::default();
+        let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);
+        let fitted = FittedModel { model, noise, fit, merit: 0.0 };
+        let evaluated = evaluate(&fitted, &nominal, &track, &noise);
+        let offset = |block: usize| evaluated.total.dv[block] / track.span[block];
+        let of_fold = |fold: usize| {
+            (0..track.segment_count()).find(|s| fold_of(0, *s) == fold).expect("it is long enough")
+        };
+        let [pushed, gliding] = [0, 1].map(|fold| offset(track.segments[of_fold(fold)]));
+        assert!(gliding > 0.2, "the push is among the stretches that tell of this one: {gliding}");
+        assert!(pushed.abs() < 0.1 * gliding, "it tells of itself: {pushed} of {gliding}");
+    }
 }

@@ -143,5 +143,18 @@ mod tests {
         };
         assert_eq!(repeats(vec![track(0.0, outside(3)), track(0.3, outside(9))]), None);
         assert_eq!(repeats(vec![track(0.0, of_motion)]), None, "one recording without periods");
+        // Where the motion itself is unlike, what the loop was asked to follow tells.
+        let asked = |late: f64, reads: fn(f64) -> f64| {
+            let (mut track, left) = track(late, of_motion);
+            let followed = |t: &f64| (0.9 * (t - late) * (t - late).abs().sqrt()).sin();
+            track.reference = Some(track.start.iter().map(followed).collect());
+            track.v.iter_mut().for_each(|v| *v = reads(*v));
+            (track, left)
+        };
+        let both = || vec![asked(0.0, |v| v), asked(0.3, |_| 0.0)];
+        assert!(repeats(both()).is_some());
+        let unasked =
+            both().into_iter().map(|(track, left)| (BlockedRecording { reference: None, ..track }, left));
+        assert_eq!(repeats(unasked.collect()), None);
     }
 }

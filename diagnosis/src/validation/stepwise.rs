@@ -3,7 +3,7 @@
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
-use crate::estimation::filter::Noise;
+use crate::estimation::filter::{Knows, Noise};
 use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::lost_counts::{self, Asked};
@@ -44,8 +44,9 @@ pub(crate) struct Search {
     pub(crate) rejected: Vec<(EffectName, Option<f64>, String)>,
 }
 
-/// Smooths holdout-out recordings with a fitted model; `scale` is the acceleration that the command makes.
-fn smooth_holdout(
+/// Estimates the motion of held-out recordings with a fitted model, each block's from the rows until then; `scale` is the
+/// acceleration that the command makes.
+fn follow_holdout(
     candidate: &FittedModel,
     nominal: &Nominal,
     span: &Span,
@@ -55,7 +56,8 @@ fn smooth_holdout(
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
     let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
-    refit::resmooth(tracks, &drives, &crate::estimation::noise::guess(tracks, scale), count);
+    let first = crate::estimation::noise::guess(tracks, scale);
+    refit::estimate_motion(tracks, &drives, &first, count, Knows::Past);
     for _ in 0..3 {
         let evaluated =
             evaluate_all(candidate, nominal, &known(tracks, &candidate.model, span), &candidate.noise);
@@ -63,7 +65,7 @@ fn smooth_holdout(
             track.bias = evaluated.bias;
         }
         let totals: Vec<Total> = evaluated.into_iter().map(|evaluated| evaluated.total).collect();
-        refit::resmooth(tracks, &totals, &candidate.noise, count);
+        refit::estimate_motion(tracks, &totals, &candidate.noise, count, Knows::Past);
     }
 }
 
@@ -76,7 +78,7 @@ fn in_its_own_motion(
 ) -> (Vec<BlockedRecording>, FittedModel) {
     let mut own = tracks.to_vec();
     let count = 1.0 / on.nominal.rig.encoder.counts_per_unit;
-    refit::resmooth(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count);
+    refit::estimate_motion(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count, Knows::All);
     let context = FitContext { tracks: &own, ..*on };
     let again = context.fit(candidate.model, &candidate.noise, Colour::White);
     let again = joint::settled(&context, again);
@@ -99,12 +101,9 @@ fn is_balanced(
     estimator.rms(&left, tracks) < BALANCED * estimator.rms(&force, tracks)
 }
 
-fn loses_counts(tracks: &[BlockedRecording]) -> bool {
-    tracks.iter().any(|track| track.lost.iter().any(|lost| *lost != 0.0))
-}
-
 /// Looks for lost counts in every recording under the null, and again with the noise that is left without them and with
-/// the knowledge that counts get lost.
+/// the knowledge that counts get lost; gives how many are lost at a time, as travel. Held-out recordings take that, `spread`, from
+/// the fitted ones.
 fn find_steps(
     nominal: &Nominal,
     span: &Span,
@@ -112,16 +111,21 @@ fn find_steps(
     noise: &Noise,
     scale: f64,
     mut asked: Asked,
-) {
+    spread: Option<f64>,
+) -> Option<f64> {
     let mut noise = *noise;
+    let mut sizes = Vec::new();
     for _ in 0..2 {
+        sizes.clear();
         for track in tracks.iter_mut() {
             let alone = std::slice::from_ref(&*track);
             let fit = Fit::new(&Model::default(), nominal, alone, &noise);
-            track.lost = lost_counts::find(track, &fit, span.count, asked);
+            let found = lost_counts::find(track, &fit, span.count, asked, spread);
+            (track.lost, track.loss_price) = (found.lost, found.price);
+            sizes.extend(found.sizes);
         }
-        if !loses_counts(tracks) {
-            return;
+        if sizes.is_empty() {
+            return None;
         }
         asked = Asked::KNOWN;
         let model =
@@ -129,6 +133,7 @@ fn find_steps(
         let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
         noise = crate::estimation::noise::estimate(tracks, &totals, &noise, scale, Colour::White);
     }
+    Some(lost_counts::spread_of(&sizes, span.count))
 }
 
 /// The model as far as it has come, under white and under coloured noise, and the motion that goes with it.
@@ -224,7 +229,7 @@ fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Ne
         let (tracks, white) = in_its_own_motion(&now.tracks, white, on);
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
-        smooth_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
+        follow_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
         let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
         let judged = judge_all(&own, &white, &slow.noise, &holdout);
         if judged.iter().all(|judged| judged.rejection_reason().is_none()) {
@@ -268,7 +273,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, on);
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
-        smooth_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
+        follow_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
         let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
         let rejection_reason = judged
             .rejection_reason()
@@ -306,12 +311,12 @@ pub(crate) fn search(
     let scale = refit::acceleration_scale(&nominal, &tracks);
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = span_of(&tracks, &nominal);
-    find_steps(&nominal, &span, &mut tracks, &noise, scale, Asked::UNKNOWN);
-    let asked = if loses_counts(&tracks) { Asked::KNOWN } else { Asked::UNKNOWN };
+    let spread = find_steps(&nominal, &span, &mut tracks, &noise, scale, Asked::UNKNOWN, None);
+    let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
-    smooth_holdout(&first, &nominal, &span, &mut holdout, scale);
-    find_steps(&nominal, &span, &mut holdout, &noise, scale, asked);
+    follow_holdout(&first, &nominal, &span, &mut holdout, scale);
+    find_steps(&nominal, &span, &mut holdout, &noise, scale, asked, spread);
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }
@@ -402,7 +407,7 @@ impl SearchContext<'_> {
         let fitted = context.fit(s.last.model.clone(), self.noise, Colour::White);
         let (tracks, white) = in_its_own_motion(&s.fit_tracks, fitted, &context);
         let mut holdout = s.holdout_tracks.clone();
-        smooth_holdout(&white, self.nominal, self.span, &mut holdout, self.scale);
+        follow_holdout(&white, self.nominal, self.span, &mut holdout, self.scale);
         let slow = self.context(&tracks).fit_slow(white.model.clone(), &[&s.last.noise, &white.noise]);
         SearchState { white, slow, tracks, holdout }
     }

@@ -273,10 +273,11 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
                 ql += vl * dt;
                 continue;
             }
-            if is("grip") {
+            if is("grip") || is("grip_of_a_light_needle") {
                 // Another standing force in each recording.
                 let standing = C * if part.is_multiple_of(2) { 0.2 } else { -0.1 };
-                let (jl, jm, half) = (0.55 * J, 0.45 * J, 0.5 * dry);
+                let part = if is("grip") { 0.55 } else { 0.3 };
+                let (jl, jm, half) = (part * J, (1.0 - part) * J, 0.5 * dry);
                 let traction = GRIP / s * ((v - vl) / 0.2).tanh();
                 let (a, al) =
                     ((force + 0.5 * B * v - traction) / jm, (traction - 0.5 * B * vl + standing) / jl);

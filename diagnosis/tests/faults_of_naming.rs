@@ -1,0 +1,136 @@
+//! Faults of naming that recordings of real machines and a second generator showed, each on a small simulated machine: names given
+//! where another cause, wrong values or chance were there, and what was said in their place.
+
+#[path = "common/axis.rs"]
+mod axis;
+mod common;
+
+use axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
+use common::Setup;
+use diagnosis::effects::EffectName as N;
+use diagnosis::{Outcome, Verdict, diagnose_recordings};
+
+fn bench(effect: &'static str) -> Setup {
+    Setup { effect, size: 1.0, closed: false, rate: 1000.0, seconds: 12.0, disturbance: 0.05, seed: 5 }
+}
+
+/// Two recordings to fit and one to judge.
+fn on_bench(fit: &Setup, holdout: &Setup) -> Outcome {
+    let rig = common::rig([0.1, -0.3, 0.3, -0.05], "offset = 0.0");
+    let fit = [common::record(fit, 1), common::record(fit, 3)];
+    diagnose_recordings(&rig, &fit, &[common::record(holdout, 2)], &|_, _| ()).expect("usable")
+}
+
+#[test]
+fn wrong_values_of_an_axis_are_no_bristles() {
+    for (seed, viscous, dry) in [(1_u64, 5.0, 4.5), (4, 11.0, 1.8), (7, 12.0, 4.8)] {
+        let machine = Machine { inertia: 2.3, viscous, forward: dry, backward: dry, ..AXIS };
+        let take = |part: u64| axis::record(machine, BENCH, seed + part, mixed(14.0, (seed + part) as f64));
+        let outcome = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &[take(0), take(1)], &[take(2)]);
+        assert_eq!(outcome.report.verdict, Verdict::ParametersOnly, "{}", outcome.report.sentence);
+    }
+}
+
+#[test]
+fn cogging_of_a_bare_rotor_is_no_compliance() {
+    let machine = Machine { cogging: 6.0, ..AXIS };
+    for counts in [2000.0, 2e5] {
+        let take = |seed| axis::record(machine, Taken { counts, ..BENCH }, seed, mixed(16.0, seed as f64));
+        let outcome = diagnosed(&rig(WHOLE, "", "", counts), &[take(1), take(2)], &[take(3)]);
+        assert_eq!(names(&outcome), [N::Cogging], "{counts} counts a radian");
+    }
+}
+
+#[test]
+fn a_force_that_repeats_with_the_trajectory_is_not_said_not_to() {
+    let machine = Machine { push: 2.0, ..AXIS };
+    let take = |seed| axis::record(machine, BENCH, seed, mixed(14.0, 1.0));
+    let report = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &[take(1), take(2)], &[take(3)]).report;
+    assert_ne!(report.verdict, Verdict::RandomDisturbance, "{}", report.sentence);
+    assert!(report.effects.is_empty(), "{}", report.sentence);
+    assert!(report.sentence.contains("repeat"), "{}", report.sentence);
+}
+
+#[test]
+fn a_belt_that_stretches_as_the_drive_switches_loses_no_counts() {
+    let machine = Machine { belt_hz: 13.0, ..AXIS };
+    let switched = |phase: f64| {
+        move |t: f64| {
+            let slow = mixed(10.0, phase)(t);
+            slow + if (t / 0.37 + phase).fract() < 0.5 { 12.0 } else { -12.0 }
+        }
+    };
+    let take = |seed| axis::record(machine, Taken { counts: 5000.0, ..BENCH }, seed, switched(seed as f64));
+    let outcome = diagnosed(&rig(WHOLE, "", "", 5000.0), &[take(1), take(2)], &[take(3)]);
+    for effect in &outcome.report.effects {
+        assert!(!effect.class.contains(&N::MissedCounts), "{:?}", effect.class);
+    }
+}
+
+#[test]
+fn a_gravity_that_is_missing_is_no_unit_that_is_off() {
+    let machine = Machine { gravity: 30.0, ..AXIS };
+    let take =
+        |seed| axis::record(machine, Taken { counts: 5000.0, ..BENCH }, seed, mixed(40.0, seed as f64));
+    let outcome = diagnosed(&rig(WHOLE, "", "", 5000.0), &[take(1), take(2)], &[take(3)]);
+    assert_eq!(outcome.report.verdict, Verdict::MissingPhysics, "{}", outcome.report.sentence);
+    assert!(outcome.report.effects[0].class.contains(&N::MassImbalance), "{}", outcome.report.sentence);
+}
+
+/// A command that answers the noise of the encoder lets regressors that know the future take it for an effect.
+#[test]
+fn under_feedback_no_effect_predicts_what_a_null_leaves() {
+    for seed in [5, 6, 7] {
+        let null = Setup { closed: true, seed, ..bench("none") };
+        let outcome = on_bench(&null, &null);
+        assert!(names(&outcome).is_empty(), "{}", outcome.summary());
+        for hypothesis in &outcome.report.hypotheses {
+            let gain = hypothesis.holdout_gain.unwrap_or(0.0);
+            assert!(gain < 15.0, "{} gains {gain} nats on a null", hypothesis.name);
+        }
+    }
+}
+
+#[test]
+fn the_held_out_gain_of_a_hypothesis_is_the_likelihood_that_its_reason_tells() {
+    let mut told = 0;
+    for effect in ["stribeck_friction", "gain_drift", "cogging"] {
+        let outcome = on_bench(&bench(effect), &bench(effect));
+        for hypothesis in &outcome.report.hypotheses {
+            let Some(reason) = &hypothesis.rejected_because else {
+                assert!(hypothesis.holdout_gain.is_some_and(|gain| gain > 0.0), "{hypothesis:?}");
+                continue;
+            };
+            let says = |before: &str, after: &str| -> Option<f64> {
+                reason.split_once(before)?.1.split_once(after)?.0.parse().ok()
+            };
+            let loses = says("less likely with it, by ", " nats").map(|x| -x);
+            let gains = says("its gain on held-out recordings, ", " nats");
+            if let Some(nats) = loses.or(gains) {
+                told += 1;
+                assert!(
+                    (hypothesis.holdout_gain.expect("it was judged") - nats).abs() < 0.51,
+                    "{hypothesis:?}"
+                );
+            }
+            if reason.contains("slow disturbance would") {
+                assert_eq!(hypothesis.holdout_gain, None, "{hypothesis:?}");
+            }
+        }
+    }
+    assert!(told > 0, "no reason tells a gain");
+}
+
+#[test]
+fn a_small_drift_of_the_gain_a_small_deadband_and_the_slip_of_a_light_needle_are_found() {
+    for (effect, size, name) in [
+        ("gain_drift", 0.4, N::GainDrift),
+        ("command_deadband", 0.3, N::CommandDeadband),
+        ("grip_of_a_light_needle", 1.0, N::RollerSlip),
+    ] {
+        let setup = Setup { size, ..bench(effect) };
+        let outcome = on_bench(&setup, &setup);
+        let class = outcome.report.effects.first().map(|effect| effect.class.clone()).unwrap_or_default();
+        assert!(class.contains(&name), "{effect}: {}", outcome.summary());
+    }
+}
