@@ -30,13 +30,14 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     let scale = acceleration_scale(&s.nominal, &s.fit_tracks);
     let nominal = s.nominal.clone();
     let fit_tracks = std::mem::take(&mut s.fit_tracks);
-    let holdout_tracks = std::mem::take(&mut s.holdout_tracks);
+    let holdout = std::mem::take(&mut s.holdout_tracks);
+    let smoothed = &holdout.smoothed;
     let span = s.span.clone();
     let context = FitContext { nominal: &nominal, tracks: &fit_tracks, span: &span, scale };
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit_tracks, count, nominal.rig.turn());
     let refit = context.fit(Model::default(), &s.null.noise, Colour::White);
-    let mut assessment = weigh(&mut s, &context, &refit, &holdout_tracks, &excitation);
+    let mut assessment = weigh(&mut s, &context, &refit, &holdout, &excitation);
     s.fit_tracks = fit_tracks.clone();
     let driven = is_driven(&nominal, &fit_tracks);
     if let Some(reason) = misfit(&assessment, &nominal).filter(|_| driven) {
@@ -45,18 +46,18 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     let beside = opponent::oppose(&mut assessment, &context, &s);
     let maps_of = |shown: &Shown| {
         let (on_fit, on_holdout) = (&shown.on_fit.patched, &shown.on_holdout.patched);
-        residual_maps::maps((&fit_tracks, on_fit), (&holdout_tracks, on_holdout), nominal.rig.turn())
+        residual_maps::maps((&fit_tracks, on_fit), (smoothed, on_holdout), nominal.rig.turn())
     };
     let maps_with_all = maps_of(&assessment.shown);
     let nothing_named = assessment.named().is_empty();
-    let unnamed = nothing_named.then(|| opponent::alone(&context, &refit, &holdout_tracks, &s)).flatten();
+    let unnamed = nothing_named.then(|| opponent::alone(&context, &refit, &holdout, &s)).flatten();
     let length = nominal.rig.kind.length();
     let form = unnamed.as_ref().map(|unnamed| free_form::sentence(&unnamed.shape, length));
     let foreign = nothing_named
-        .then(|| out_of_library::alone(&context, &refit, &holdout_tracks))
+        .then(|| out_of_library::alone(&context, &refit, &holdout))
         .flatten()
         .or_else(|| form.as_ref().map(|form| format!("{form} would explain it")));
-    let (verdict, reason) = verdict(&assessment, &maps_with_all, &holdout_tracks, &excitation, foreign);
+    let (verdict, reason) = verdict(&assessment, &maps_with_all, smoothed, &excitation, foreign);
     let unnamed = unnamed.filter(|_| verdict == Verdict::Unexplained);
     let reason = match (reason, form.as_ref().filter(|_| unnamed.is_some())) {
         (Some(reason), Some(form)) if !reason.contains(form.as_str()) => {
@@ -65,13 +66,13 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
         (reason, _) => reason,
     };
     // The verdict rests on all that was weighed, what people see on what is named.
-    let with_named = only_named(&assessment, &context, &refit, &holdout_tracks, &s);
+    let with_named = only_named(&assessment, &context, &refit, smoothed, &s);
     let named_alone = with_named.as_ref().unwrap_or(&assessment.shown);
     let where_left = &named_alone.on_holdout.patched;
     let free_form = free_form::told(unnamed.as_ref(), form.filter(|_| unnamed.is_some()), beside);
     let drawn = unnamed.as_ref().map(|unnamed| unnamed.shape.clone());
     let with_force = unnamed.and_then(|unnamed| {
-        Some(Shown::new(&context, &holdout_tracks, &assessment.estimator, &refit, unnamed.fitted?))
+        Some(Shown::new(&context, smoothed, &assessment.estimator, &refit, unnamed.fitted?))
     });
     let Shown { patched, on_fit, on_holdout, table, keeps_nominal } =
         with_force.as_ref().unwrap_or(named_alone);
@@ -96,11 +97,11 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
         unexplained_fraction: if before > 0.0 { (left / before).min(1.0) } else { 0.0 },
         hypotheses: hypotheses(&assessment, &s),
         place: matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance)
-            .then(|| top_place(&holdout_tracks, where_left, &maps)),
+            .then(|| top_place(smoothed, where_left, &maps)),
         free_form,
         separating_experiment: match verdict {
             Verdict::InsufficientExcitation => Some(next_experiment::SPEEDS.to_owned()),
-            _ => known_travel::beyond(&holdout_tracks, &patched.model, &span, length),
+            _ => known_travel::beyond(smoothed, &patched.model, &span, length),
         },
         simulation: pooled(&simulated),
         verdict,
@@ -108,7 +109,7 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     };
     report.sentence = outcome::sentence(&report, nominal.rig.kind);
     let mut series = all_series(&assessment, &fit_tracks, on_fit, false);
-    series.extend(all_series(&assessment, &holdout_tracks, on_holdout, true));
+    series.extend(all_series(&assessment, smoothed, on_holdout, true));
     let evidence = Evidence {
         series,
         maps,

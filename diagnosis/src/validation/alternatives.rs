@@ -13,6 +13,7 @@ use crate::selection::predictive::left_out_costs;
 use crate::selection::search::{FitContext, FittedModel};
 use crate::thresholds::{BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, MOST_IN_CLASS};
 use crate::validation::evidence::{EffectEvidence, Rival};
+use crate::validation::held_out::HeldOut;
 use crate::validation::judge::evaluate_all;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
@@ -37,7 +38,7 @@ pub(crate) fn fit_rivals(
     context: &FitContext,
     last: &FittedModel,
     slow: &FittedModel,
-    holdout: &[BlockedRecording],
+    holdout: &HeldOut,
     found: &mut [EffectEvidence],
 ) {
     let best = context.fit(last.model.clone(), &last.noise, Colour::White);
@@ -65,7 +66,7 @@ pub(crate) fn fit_rivals(
                 let fit = Fit::new(&model, context.nominal, context.tracks, &best.noise);
                 let rival = FittedModel { model, noise: best.noise, fit, merit: 0.0 };
                 // Both are judged where both know something.
-                let holdout = known(holdout, &best.model, context.span);
+                let holdout = holdout.judging(&best.model, context.span);
                 let holdout = known(&holdout, &rival.model, context.span);
                 let own = costs(&best, context.nominal, &holdout);
                 let lead = |rival: &FittedModel| {

@@ -15,7 +15,7 @@ use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover};
 use crate::validation::evidence::EffectEvidence;
-use crate::validation::known_travel::known;
+use crate::validation::held_out::HeldOut;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
 use crate::validation::repeats::correlation_of_repeats;
@@ -178,7 +178,7 @@ pub(crate) fn weigh(
     s: &mut Search,
     context: &FitContext,
     refit: &FittedModel,
-    holdout: &[BlockedRecording],
+    holdout: &HeldOut,
     excitation: &Excitation,
 ) -> Assessment {
     let scales = Scales { context, refit, holdout, excitation };
@@ -198,7 +198,7 @@ pub(crate) fn weigh(
 struct Scales<'a> {
     context: &'a FitContext<'a>,
     refit: &'a FittedModel,
-    holdout: &'a [BlockedRecording],
+    holdout: &'a HeldOut,
     excitation: &'a Excitation,
 }
 
@@ -255,10 +255,10 @@ impl Scales<'_> {
         let nominal = context.nominal;
         let mut found = std::mem::take(&mut s.found);
         let patched = context.fit(s.last.model.clone(), &s.last.noise, Colour::White);
-        let known: &[BlockedRecording] = &known(holdout, &patched.model, context.span);
+        let known: &[BlockedRecording] = &holdout.shown(&patched.model, context.span);
         alternatives::fit_rivals(context, &patched, &s.last, holdout, &mut found);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
-        let shown = Shown::new(context, holdout, &estimator, refit, patched);
+        let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
         let Shown { patched, on_fit, on_holdout, table, .. } = &shown;
         let (inertia, _, _) = parameters::scale(nominal, patched);
         let count = 1.0 / nominal.rig.encoder.counts_per_unit;
@@ -281,8 +281,9 @@ impl Scales<'_> {
         let understood = part_of_force < UNDERSTOOD.0 || (helps_much && part_of_force < UNDERSTOOD.1);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
         let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
-        let swing = hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(holdout, on_holdout)));
-        let all: Vec<BlockedRecording> = context.tracks.iter().chain(holdout).cloned().collect();
+        let swing =
+            hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
+        let all: Vec<BlockedRecording> = context.tracks.iter().chain(&holdout.smoothed).cloned().collect();
         let left: Vec<Vec<f64>> = on_fit.patched.iter().chain(&on_holdout.patched).cloned().collect();
         let moving: Vec<Vec<bool>> = all.iter().map(|track| estimator.moving(track)).collect();
         let repeats = correlation_of_repeats(&all, &left, &moving, estimator.bandwidth_hz);

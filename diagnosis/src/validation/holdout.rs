@@ -1,11 +1,11 @@
 //! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may move (its offset, and the
-//! encoder's zero, on which the phase of periodic effects rests). That is found on other stretches of the recording than
-//! those it judges, as it is on fitted recordings, so that no freedom on held-out rows speaks for an effect.
+//! encoder's zero, on which the phase of periodic effects rests). For likelihoods that is found on other stretches of the
+//! recording than those it judges, as it is on fitted recordings, so that no freedom on held-out rows speaks for an effect.
 
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
-use crate::estimation::model::{Key, Model, Nominal};
+use crate::estimation::model::{Key, Model, Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
 use crate::selection::joint;
@@ -15,12 +15,13 @@ use rayon::prelude::*;
 
 /// A model laid on one held-out recording.
 pub(crate) struct HoldoutFit {
+    /// What moves the axis, with the recording's own values found on all of it.
     pub(crate) total: Total,
-    /// Acceleration by the force that is there all the time.
+    /// Acceleration by the force that is there all the time, found on all of the recording.
     pub(crate) bias: f64,
-    /// Cost of each segment, in log-likelihood.
+    /// Cost of each segment with the own values of the others, in log-likelihood.
     pub(crate) costs: Vec<f64>,
-    /// Whitened residual of each block of the segments that the model knows something of.
+    /// Whitened residual of each block of the segments that the model knows something of, with the own values of the others.
     pub(crate) residual: Vec<f64>,
     /// What the model pays for jumps found in this very recording, in log-likelihood.
     pub(crate) surcharge: f64,
@@ -146,11 +147,13 @@ fn evaluate_once(
     let patterns: Vec<Option<Pattern>> =
         (0..model.effects.len()).map(|effect| Pattern::new(fit, model, effect, &one)).collect();
     let known: Vec<bool> = track.known_segments().collect();
-    let own = |fold: usize| {
-        let sums = Sums::new(&one, |segment| known[segment] && fold_of(0, segment) != fold);
+    let own = |is_used: &dyn Fn(usize) -> bool| {
+        let sums = Sums::new(&one, |segment| known[segment] && is_used(segment));
         sums.own_values(fitted.clone(), &one, &patterns)
     };
-    let by_fold: Vec<Vec<f64>> = (0..FOLDS).into_par_iter().map(own).collect();
+    let whole = own(&|_| true);
+    let by_fold: Vec<Vec<f64>> =
+        (0..FOLDS).into_par_iter().map(|fold| own(&|segment| fold_of(0, segment) != fold)).collect();
     let step_of = |theta: &Vec<f64>| -> Vec<f64> {
         theta.iter().zip(&one.reference).map(|(value, reference)| value - reference).collect()
     };
@@ -163,18 +166,14 @@ fn evaluate_once(
         costs[segment] = costs_by_fold[fold][segment];
         residual.extend(one.segment(segment).0.map(|j| one.residual_at(j, &places, &steps[fold])));
     }
-    let mut total = Total::zero(track.blocks());
-    for (i, column) in one.columns.iter().enumerate() {
-        let value = |segment: usize| by_fold[fold_of(0, segment)][i];
-        let by_block: Vec<f64> = (0..known.len())
-            .flat_map(|segment| one.segment(segment).0.map(move |_| segment))
-            .map(value)
-            .collect();
-        column.input.scaled(&by_block).add_to(&mut total, track, 1.0);
-    }
     let offset = one.columns.iter().position(|c| c.key == Key::Offset);
-    let mean = |i: usize| by_fold.iter().map(|theta| theta[i]).sum::<f64>() / FOLDS as f64;
-    HoldoutFit { total, bias: offset.map_or(0.0, mean), costs, residual, surcharge: one.surcharge() }
+    HoldoutFit {
+        total: total(track, &one.columns, &whole),
+        bias: offset.map_or(0.0, |offset| whole[offset]),
+        costs,
+        residual,
+        surcharge: one.surcharge(),
+    }
 }
 
 /// An effect of which each recording has its own phase: its waves, their columns, and what the fitted recordings say of it.
@@ -312,12 +311,21 @@ mod tests {
         let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);
         let fitted = FittedModel { model, noise, fit, merit: 0.0 };
         let evaluated = evaluate(&fitted, &nominal, &track, &noise);
-        let offset = |block: usize| evaluated.total.dv[block] / track.span[block];
         let of_fold = |fold: usize| {
             (0..track.segment_count()).find(|s| fold_of(0, *s) == fold).expect("it is long enough")
         };
-        let [pushed, gliding] = [0, 1].map(|fold| offset(track.segments[of_fold(fold)]));
-        assert!(gliding > 0.2, "the push is among the stretches that tell of this one: {gliding}");
-        assert!(pushed.abs() < 0.1 * gliding, "it tells of itself: {pushed} of {gliding}");
+        let one = Prepared::new(&fitted.model, &nominal, &track, &noise);
+        let offset = one.columns.iter().position(|c| c.key == Key::Offset).expect("every model has one");
+        let places: Vec<usize> = (0..one.columns.len()).collect();
+        let cost_at = |value: f64| {
+            let mut step = vec![0.0; places.len()];
+            step[offset] = value - one.reference[offset];
+            one.costs(&places, &step)[of_fold(0)]
+        };
+        let (without, with_own) = (cost_at(0.0), cost_at(evaluated.bias));
+        let of_itself = without - with_own;
+        assert!(of_itself > 1.0, "the offset of all of it would explain the push: {without}, {with_own}");
+        let left_out = evaluated.costs[of_fold(0)];
+        assert!(left_out > without - 0.1 * of_itself, "it tells of itself: {left_out} of {without}");
     }
 }

@@ -14,8 +14,8 @@ use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::selection::search::{FitContext, FittedModel};
 use crate::thresholds::DRIFT;
 use crate::validation::evidence::EffectEvidence;
+use crate::validation::held_out::HeldOut;
 use crate::validation::holdout::{self, HoldoutFit};
-use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
@@ -37,18 +37,20 @@ pub(crate) fn judge_all(
     context: &FitContext,
     last: &FittedModel,
     slow: &Noise,
-    holdout: &[BlockedRecording],
+    holdout: &HeldOut,
 ) -> Vec<EffectEvidence> {
-    let holdout: &[BlockedRecording] = &known(holdout, &last.model, context.span);
-    let with = evaluate_all(last, context.nominal, holdout, &last.noise);
+    let judging: &[BlockedRecording] = &holdout.judging(&last.model, context.span);
+    let holdout: &[BlockedRecording] = &holdout.shown(&last.model, context.span);
+    let with = evaluate_all(last, context.nominal, judging, &last.noise);
     let with_fit = left_out_costs(&last.fit);
     let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
     let left = |c: &FittedModel, tracks: &[BlockedRecording], totals: &[Total]| {
         forces(&estimator, tracks, totals, parameters::scale(context.nominal, c).0)
     };
     let left_on_fit = |c: &FittedModel| left(c, context.tracks, &c.fit.totals(context.tracks));
-    let left_on_holdout = |c: &FittedModel, evaluated: &[HoldoutFit]| {
-        left(c, holdout, &evaluated.iter().map(|l| l.total.clone()).collect::<Vec<_>>())
+    let left_on_holdout = |c: &FittedModel| {
+        let evaluated = evaluate_all(c, context.nominal, holdout, &last.noise);
+        left(c, holdout, &evaluated.into_iter().map(|one| one.total).collect::<Vec<_>>())
     };
     let square = |left: &[Vec<f64>], tracks: &[BlockedRecording]| estimator.rms(left, tracks).powi(2);
     let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
@@ -59,10 +61,9 @@ pub(crate) fn judge_all(
         let floor = estimator.counting(tracks, &last.noise, count) * inertia;
         above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
     };
-    let of_null = left_on_holdout(&null, &evaluate_all(&null, context.nominal, holdout, &last.noise));
-    let held_out = explainable(&of_null, holdout);
+    let held_out = explainable(&left_on_holdout(&null), holdout);
     let fitted = explainable(&left_on_fit(&null), context.tracks);
-    let (left_held_out, left_fitted) = (left_on_holdout(last, &with), left_on_fit(last));
+    let (left_held_out, left_fitted) = (left_on_holdout(last), left_on_fit(last));
     (0..last.model.effects.len())
         .map(|i| {
             let mut less = last.model.clone();
@@ -71,10 +72,10 @@ pub(crate) fn judge_all(
             let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
             let without_fit = left_out_costs(&without.fit);
             let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
-            let evaluated = evaluate_all(&without, context.nominal, holdout, &last.noise);
+            let evaluated = evaluate_all(&without, context.nominal, judging, &last.noise);
             let holdout_gain = holdout::compare(&with, &evaluated);
             // What one recording hardly plays another may be made for.
-            let (less_held_out, less_fitted) = (left_on_holdout(&without, &evaluated), left_on_fit(&without));
+            let (less_held_out, less_fitted) = (left_on_holdout(&without), left_on_fit(&without));
             let share = ((square(&less_held_out, holdout) - square(&left_held_out, holdout)) / held_out)
                 .max((square(&less_fitted, context.tracks) - square(&left_fitted, context.tracks)) / fitted);
             let force = relative_gain(&estimator, holdout, &less_held_out, &left_held_out);
@@ -105,7 +106,7 @@ pub(crate) fn judge_all(
                 sizes,
             };
             if found.rejection_reason().is_some() {
-                found.score_z = score_z_of(context, &last.model, &without.model, slow, holdout);
+                found.score_z = score_z_of(context, &last.model, &without.model, slow, judging);
             }
             found
         })

@@ -5,6 +5,7 @@ pub(crate) mod assess;
 pub(crate) mod comparison;
 pub(crate) mod confidence;
 pub(crate) mod evidence;
+pub(crate) mod held_out;
 pub(crate) mod holdout;
 pub(crate) mod judge;
 pub(crate) mod known_travel;

@@ -1,12 +1,12 @@
 //! Something that is not in the library, as the opponent of every name: a force of any form. Nothing here changes a model.
 
 use crate::effects::{Effect, Variable};
-use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
 use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::assess::Assessment;
+use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
 use crate::validation::parameters;
 use crate::validation::stepwise::Search;
@@ -69,7 +69,7 @@ pub(crate) struct Unnamed {
 pub(crate) fn alone(
     context: &FitContext,
     refit: &FittedModel,
-    holdout: &[BlockedRecording],
+    holdout: &HeldOut,
     s: &Search,
 ) -> Option<Unnamed> {
     let evaluator = Evaluator::new(context.nominal, context.tracks, &s.null.noise, context.scale);

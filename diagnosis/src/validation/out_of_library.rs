@@ -3,12 +3,12 @@
 //! speaks against a name.
 
 use crate::effects::{Effect, EffectName as N};
-use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::search::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
+use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
 use rayon::prelude::*;
 
@@ -88,11 +88,7 @@ fn like(effect: &Effect, context: &FitContext) -> Vec<OutOfLibrary> {
 }
 
 /// What foreign physics would explain of a refit where nothing is named, if it is most of it and as sure as of a name.
-pub(crate) fn alone(
-    context: &FitContext,
-    refit: &FittedModel,
-    holdout: &[BlockedRecording],
-) -> Option<String> {
+pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut) -> Option<String> {
     let spring = Effect::shaped(N::PositionSpring, &[("from", 0.0)]);
     let mut all = creeping_springs(&spring);
     all.extend(changing_loads(context));

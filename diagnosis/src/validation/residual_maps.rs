@@ -1,4 +1,4 @@
-//! Where the residual sits: maps over states that carry from the fitted to the holdout-out recordings, and intervals of time.
+//! Where the residual sits: maps over states that carry from the fitted to the held-out recordings, and intervals of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::numerics::bootstrap::{Gain, bootstrap};
@@ -14,7 +14,7 @@ pub struct Map {
     pub forward: Vec<Option<f64>>,
     /// The same, moving backward.
     pub backward: Vec<Option<f64>>,
-    /// Part of the holdout-out mean square that the map of the fitted recordings predicts.
+    /// Part of the held-out mean square that the map of the fitted recordings predicts.
     pub carries: f64,
     /// Whether that is more than chance.
     pub significant: bool,
@@ -128,7 +128,7 @@ impl Bins {
     }
 }
 
-/// Averages residuals over bins on the fitted recordings and asks the holdout-out ones whether that was luck.
+/// Averages residuals over bins on the fitted recordings and asks the held-out ones whether that was luck.
 pub(crate) fn maps(
     fit: (&[BlockedRecording], &[Vec<f64>]),
     holdout: (&[BlockedRecording], &[Vec<f64>]),

@@ -91,10 +91,10 @@ pub(crate) fn above(residual: f64, chance: f64, least: f64) -> f64 {
     (whole - chance * chance).max(least * whole)
 }
 
-/// Part of the force that a refit must take from the holdout-out residual before values are called wrong.
+/// Part of the force that a refit must take from the held-out residual before values are called wrong.
 const REFIT_MATTERS: f64 = 0.02;
 
-/// Whether other values explain holdout-out recordings better than the rig's own, each recording's bias left aside.
+/// Whether other values explain held-out recordings better than the rig's own, each recording's bias left aside.
 pub(crate) fn refit_matters(
     estimator: &Estimator,
     tracks: &[BlockedRecording],
@@ -116,7 +116,7 @@ pub(crate) fn refit_matters(
     taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after).low > 0.0
 }
 
-/// Relative reduction of the holdout-out mean square.
+/// Relative reduction of the held-out mean square.
 pub(crate) fn relative_gain(
     estimator: &Estimator,
     tracks: &[BlockedRecording],

@@ -2,7 +2,7 @@
 
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName};
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Knows, Noise};
 use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
@@ -18,8 +18,8 @@ use crate::selection::search::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use crate::validation::evidence::EffectEvidence;
-use crate::validation::judge::{evaluate_all, judge_all};
-use crate::validation::known_travel::known;
+use crate::validation::held_out::HeldOut;
+use crate::validation::judge::judge_all;
 use crate::validation::parameters;
 use crate::validation::residuals::{drive_force, forces};
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ pub(crate) struct Search {
     pub(crate) original: Rig,
     pub(crate) nominal: Nominal,
     pub(crate) fit_tracks: Vec<BlockedRecording>,
-    pub(crate) holdout_tracks: Vec<BlockedRecording>,
+    pub(crate) holdout_tracks: HeldOut,
     pub(crate) span: Span,
     /// The null under coloured noise.
     pub(crate) null: FittedModel,
@@ -42,31 +42,6 @@ pub(crate) struct Search {
     pub(crate) found: Vec<EffectEvidence>,
     /// Hypotheses that were fitted in full and lost: name, gain, reason.
     pub(crate) rejected: Vec<(EffectName, Option<f64>, String)>,
-}
-
-/// Estimates the motion of held-out recordings with a fitted model, each block's from the rows until then; `scale` is the
-/// acceleration that the command makes.
-fn follow_holdout(
-    candidate: &FittedModel,
-    nominal: &Nominal,
-    span: &Span,
-    tracks: &mut [BlockedRecording],
-    scale: f64,
-) {
-    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
-    let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
-    let first = crate::estimation::noise::guess(tracks, scale);
-    refit::estimate_motion(tracks, &drives, &first, count, Knows::Past);
-    for _ in 0..3 {
-        let evaluated =
-            evaluate_all(candidate, nominal, &known(tracks, &candidate.model, span), &candidate.noise);
-        for (track, evaluated) in tracks.iter_mut().zip(&evaluated) {
-            track.bias = evaluated.bias;
-        }
-        let totals: Vec<Total> = evaluated.into_iter().map(|evaluated| evaluated.total).collect();
-        refit::estimate_motion(tracks, &totals, &candidate.noise, count, Knows::Past);
-    }
 }
 
 /// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
@@ -141,7 +116,7 @@ struct SearchState {
     white: FittedModel,
     slow: FittedModel,
     tracks: Vec<BlockedRecording>,
-    holdout: Vec<BlockedRecording>,
+    holdout: HeldOut,
 }
 
 /// What was looked at and not taken.
@@ -158,7 +133,7 @@ struct Rejected {
 /// The model with one more effect.
 struct Next {
     state: SearchState,
-    /// Whether the effect generalises to the holdout-out recordings, rather than being likely to beside another.
+    /// Whether the effect generalises to the held-out recordings, rather than being likely to beside another.
     generalises: bool,
 }
 
@@ -229,7 +204,7 @@ fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Ne
         let (tracks, white) = in_its_own_motion(&now.tracks, white, on);
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
-        follow_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
+        holdout.follow(&white, on.nominal, on.span, on.scale);
         let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
         let judged = judge_all(&own, &white, &slow.noise, &holdout);
         if judged.iter().all(|judged| judged.rejection_reason().is_none()) {
@@ -273,7 +248,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, on);
         let own = FitContext { tracks: &tracks, ..*on };
         let mut holdout = now.holdout.clone();
-        follow_holdout(&white, on.nominal, on.span, &mut holdout, on.scale);
+        holdout.follow(&white, on.nominal, on.span, on.scale);
         let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
         let rejection_reason = judged
             .rejection_reason()
@@ -315,8 +290,10 @@ pub(crate) fn search(
     let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
-    follow_holdout(&first, &nominal, &span, &mut holdout, scale);
-    find_steps(&nominal, &span, &mut holdout, &noise, scale, asked, spread);
+    let mut holdout = HeldOut::new(holdout);
+    holdout.follow(&first, &nominal, &span, scale);
+    find_steps(&nominal, &span, &mut holdout.filtered, &noise, scale, asked, spread);
+    holdout.share_jumps();
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }
@@ -327,7 +304,7 @@ pub(crate) fn search(
         SearchContext { original: rig, nominal: &nominal, span: &span, scale, noise: &noise, progress };
     let mut rejected = Rejected::default();
     let grown = ground.forward_selection(SearchState { white, slow, tracks, holdout }, &mut rejected);
-    progress("judging on holdout-out recordings", 0.8);
+    progress("judging on held-out recordings", 0.8);
     let mut s = ground.backward_elimination(grown);
     rejected.excluded = s.rejected.iter().map(|(name, _, _)| *name).collect();
     if !s.found.is_empty() && !rejected.excluded.is_empty() {
@@ -389,7 +366,7 @@ impl SearchContext<'_> {
             original: self.original.clone(),
             nominal: self.nominal.clone(),
             fit_tracks: Vec::new(),
-            holdout_tracks: Vec::new(),
+            holdout_tracks: HeldOut::default(),
             span: self.span.clone(),
             null,
             last: slow,
@@ -407,15 +384,15 @@ impl SearchContext<'_> {
         let fitted = context.fit(s.last.model.clone(), self.noise, Colour::White);
         let (tracks, white) = in_its_own_motion(&s.fit_tracks, fitted, &context);
         let mut holdout = s.holdout_tracks.clone();
-        follow_holdout(&white, self.nominal, self.span, &mut holdout, self.scale);
+        holdout.follow(&white, self.nominal, self.span, self.scale);
         let slow = self.context(&tracks).fit_slow(white.model.clone(), &[&s.last.noise, &white.noise]);
         SearchState { white, slow, tracks, holdout }
     }
 }
 
-/// Takes out whatever does not carry to the holdout-out recordings, the weakest first, until all that is left does, and
+/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and
 /// judges that; `noise` is white.
-pub(crate) fn eliminate(s: &mut Search, context: &FitContext, holdout: &[BlockedRecording], noise: &Noise) {
+pub(crate) fn eliminate(s: &mut Search, context: &FitContext, holdout: &HeldOut, noise: &Noise) {
     loop {
         let plain = context.fit(s.last.model.clone(), noise, Colour::White);
         s.found = judge_all(context, &plain, &s.last.noise, holdout);
