@@ -4,7 +4,9 @@
 //! A layer has its depth perpendicular to the skin and stays there. Along the needle it is met at depth / sin(angle to the
 //! skin), which changes when the needle turns. A wall that has not given way is pushed in and carries what lies under it
 //! along: the next layer is touched only once the wall above it has given way. Then the wall springs back to a stated part
-//! of how far it was pushed in, and that part goes as its relief goes. So the order of events is the order of the anatomy.
+//! of how far it was pushed in, and that part goes as its relief goes: the next layer lies deeper by what is left where the tip
+//! comes to it, or is met where the wall gave way, if that is further in. So the order of events is the order of the anatomy, and where
+//! a wall is met does not depend on when a tick falls.
 //!
 //! The angle is the measured tilt less what the tilt reads with the needle laid on the skin. It is smoothed over 51 ms and
 //! taken over in steps of a milliradian with three quarters of one as dead band; a layer that was touched is left only
@@ -52,8 +54,10 @@ pub(crate) struct Wall {
     pub(crate) puncture: I16F16,
     /// Travel past contact at which nothing is left of it.
     pub(crate) relieved: I16F16,
-    /// What is left of its indentation for each mm before that.
-    pub(crate) indented_per_mm: I16F16,
+    /// What is left of its indentation when it has just given way.
+    pub(crate) left: I16F16,
+    /// `left / (left + relieved − puncture)`, below 1: see [`Insertion::carried_along`].
+    pub(crate) share: I2F30,
 }
 
 /// What has to have happened for the tip to be past the wall of a layer, or in the layer where it has none.
@@ -136,8 +140,8 @@ pub(crate) struct Insertion {
     carried: [I16F16; MAX_LAYERS],
     touched: usize,
     given: usize,
-    /// The tip is past where the next layer lies at rest, which the wall above has carried along.
-    is_carrying: bool,
+    /// A wall has just given way: what the tip is past already it meets now, a layer a tick.
+    is_springing_back: bool,
     /// The tip has touched the wall that gives way next.
     is_pressing: bool,
     /// Along the needle, where the tip passes beside the vessel.
@@ -160,7 +164,7 @@ impl Insertion {
             carried: [I16F16::ZERO; MAX_LAYERS],
             touched: 0,
             given: 0,
-            is_carrying: false,
+            is_springing_back: false,
             is_pressing: false,
             beside: I16F16::MAX,
             vessel: VesselState::Outside,
@@ -307,14 +311,22 @@ impl Insertion {
         }
     }
 
-    /// What is left of the last wall's indentation: the next layer lies this much deeper than at rest.
-    fn indentation(&self, anatomy: &Anatomy, depth: Millimetres) -> I16F16 {
-        let Some(last) = self.given.checked_sub(1) else { return I16F16::ZERO };
-        let Some(wall) = anatomy.walls.get(last) else { return I16F16::ZERO };
-        let before = wall.relieved.saturating_sub(self.travel(last, depth).max(wall.puncture));
-        let before = before.max(I16F16::ZERO);
-        // At most what the wall was pushed in.
-        I16F16::from_bits(truncating_product(before.to_bits(), wall.indented_per_mm.to_bits(), 16))
+    /// How much deeper than at rest the next layer lies where the tip comes to it, for what is left there of the last wall's
+    /// indentation.
+    ///
+    /// With l left at the puncture and none from R on, l·(R − x)/ρ is left at x, ρ the way from the puncture to R. The tip comes to a
+    /// layer at T, which lies at `T + l·(R − x)/ρ` then, at `x = T + (R − T)·l/(l + ρ)`.
+    fn carried_along(&self, anatomy: &Anatomy) -> I16F16 {
+        let Some((wall, origin)) = self.last_given(anatomy) else { return I16F16::ZERO };
+        let before = origin.saturating_add(wall.relieved).saturating_sub(self.top(self.touched));
+        let share = truncating_product(before.to_bits(), wall.share.to_bits(), 30);
+        I16F16::from_bits(share).min(wall.left).max(I16F16::ZERO)
+    }
+
+    /// The wall that gave way last, and where the tip began to push it in.
+    fn last_given<'a>(&self, anatomy: &'a Anatomy) -> Option<(&'a Wall, I16F16)> {
+        let last = self.given.checked_sub(1)?;
+        anatomy.walls.get(last).zip(self.origins.get(last).copied())
     }
 
     /// The layer that the tip touches or leaves; a wall is whole again once the tip has left its layer.
@@ -322,39 +334,42 @@ impl Insertion {
         if let Some(next) = anatomy.layers.get(self.touched)
             && depth.0 >= self.top(self.touched)
         {
-            let is_free = self.given >= next.walls_above;
-            if is_free && depth.0 >= self.top(self.touched).saturating_add(self.indentation(anatomy, depth)) {
-                self.touch(next, depth);
-                return Transitions { contact: 1 << next.number, ..Transitions::default() };
+            if self.given >= next.walls_above {
+                let place = self.top(self.touched).saturating_add(self.carried_along(anatomy));
+                if depth.0 >= place {
+                    self.touch(anatomy, next, place);
+                    return Transitions { contact: 1 << next.number, ..Transitions::default() };
+                }
             }
-            self.is_carrying = true;
         } else if let Some(last) = self.touched.checked_sub(1)
             && let Some(layer) = anatomy.layers.get(last)
             && depth.0 < self.top(last).saturating_sub(EXIT_DISTANCE)
         {
             self.touched = last;
             self.given = self.given.min(layer.walls_above);
-            self.is_carrying = false;
             return Transitions { exit: 1 << layer.number, ..Transitions::default() };
-        } else {
-            self.is_carrying = false;
         }
+        self.is_springing_back = false;
         Transitions::default()
     }
 
-    /// A wall that was carried along is pushed in from here; any other from where it lies.
+    /// A layer is touched. Its wall, if it has one, is pushed in from `place` on, or from where the wall above has just given way.
     #[inline(never)]
-    fn touch(&mut self, layer: &Layer, depth: Millimetres) {
+    fn touch(&mut self, anatomy: &Anatomy, layer: &Layer, mut place: I16F16) {
+        if self.is_springing_back
+            && let Some((wall, origin)) = self.last_given(anatomy)
+        {
+            place = place.max(origin.saturating_add(wall.puncture));
+        }
         let top = self.top(self.touched);
         self.touched += 1;
         if layer.has_wall
             && let Some(origin) = self.origins.get_mut(layer.walls_above)
             && let Some(carried) = self.carried.get_mut(layer.walls_above)
         {
-            *carried = if self.is_carrying { depth.0.saturating_sub(top) } else { I16F16::ZERO };
-            *origin = top.saturating_add(*carried);
+            *carried = place.saturating_sub(top);
+            *origin = place;
         }
-        self.is_carrying = false;
     }
 
     /// The wall that gives way, a bit for its layer.
@@ -364,6 +379,7 @@ impl Insertion {
             return 0;
         }
         self.given += 1;
+        self.is_springing_back = true;
         anatomy.layers.get(wall.layer).map_or(0, |layer| 1 << layer.number)
     }
 

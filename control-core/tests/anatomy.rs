@@ -114,6 +114,39 @@ fn what_is_left_of_the_skins_indentation_delays_the_next_layer_until_the_relief_
     assert!((contacts[1].1 - 3.5).abs() < COUNT_MM, "sprung back at once: {contacts:?}");
 }
 
+/// A vein so deep below the skin, which gives way at 3 mm, that it was carried along with the skin, comes to rest on the relief, or does
+/// not move at all: what it resists with at a depth is one force, however fast the needle came there.
+#[test]
+fn where_a_wall_is_met_does_not_depend_on_when_a_tick_falls() {
+    for depth in [1.0, 2.5, 3.2, 3.9, 3.96, 3.99, 4.05] {
+        let mut config = Config::default();
+        config.patient.layers =
+            [config.patient.layers[0], Layer { depth: Millimetres(q(depth)), ..config.patient.layers[2] }]
+                .into_iter()
+                .collect();
+        let force_after = |step: f64| {
+            let mut needle = Needle::new(&config, 90.0);
+            let mut gently = 0.0_f64;
+            while needle.at_mm + step < 4.4 {
+                gently = (gently + 6e-5).min(step);
+                needle.at_mm += gently;
+                assert_eq!(needle.tick().tripped, None);
+            }
+            needle.at_mm = 4.4;
+            // Until nothing is left of the speed.
+            (0..3_000).map(|_| needle.tick().force.0.to_num::<f64>()).last().expect("it rests")
+        };
+        let slowly = force_after(0.002);
+        for step in [0.007, 0.011, 0.013, 0.017, 0.023] {
+            let fast = force_after(step);
+            assert!(
+                (fast - slowly).abs() < 0.002,
+                "{depth} mm deep, {step} mm a tick: {fast} N for {slowly} N"
+            );
+        }
+    }
+}
+
 /// States in their order, and how often blood showed.
 fn through(needle: &mut Needle, mm: f64) -> (Vec<VesselState>, usize) {
     let (mut states, mut flashbacks) = (vec![needle.tick().vessel], 0);

@@ -7,7 +7,7 @@ use crate::law::Met;
 use crate::refusal::{Field, Refusal, milli, within};
 use crate::units::Millimetres;
 use crate::wall::Parabola;
-use fixed::types::{I16F16, U32F32};
+use fixed::types::{I2F30, I16F16, U32F32};
 use heapless::Vec;
 
 /// A force that appears at contact all at once is felt as a hit and rings: at most 0.05 N.
@@ -49,7 +49,8 @@ pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
                 layer: index,
                 puncture: wall.puncture_travel.0,
                 relieved: wall.relief.vertex.0,
-                indented_per_mm: left.saturating_div(relief),
+                left,
+                share: I2F30::saturating_from_num(left.wide_div(left.saturating_add(relief))),
             });
         }
     }

@@ -182,7 +182,8 @@ fn walk(legs: &[(f64, u16)], largest: f64, furthest: i32) -> Vec<i32> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2_000, max_global_rejects: 2_000_000, max_shrink_iters: 2_000, ..ProptestConfig::default() })]
+    // More with PROPTEST_CASES.
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.max(2_000), max_global_rejects: u32::MAX, max_shrink_iters: 2_000, ..ProptestConfig::default() })]
 
     #[test]
     fn fixed_point_stays_within_one_step_of_its_twin(
@@ -207,7 +208,7 @@ proptest! {
             controller.order(Order::Heartbeat);
             let output = controller.tick(TickInput { count: Counts(count * counts_sign), tilt });
             prop_assert_eq!(output.tripped, None);
-            let (got, wanted) = ((f64::from(output.dac.0) - zero) * f64::from(codes_sign), twin.tick(count, output.angle, output.transitions));
+            let (got, wanted) = ((f64::from(output.dac.0) - zero) * f64::from(codes_sign), twin.tick(count, &output));
             let allowed = 1.0 + twin.steps_of_heat();
             prop_assert!((got - wanted).abs() <= allowed, "tick {tick}, count {count}: {got} for {wanted}");
         }

@@ -1,15 +1,20 @@
 //! The floating-point twin of the whole tick, written from the equations (seed 001 and the force laws of the design), not
 //! from the fixed-point code. It takes the configuration's own quantised values as exact.
 
+use control_core::TickOutput;
 use control_core::config::{Config, FrictionLaw, Law, Parabola, SpeedMethod};
-use control_core::event::Transitions;
-use control_core::units::Milliradians;
+use control_core::event::{State, Transitions};
 
 /// What the fixed-point lengths along a slanted needle may be off by, in mm: within it, the twin takes the core's word for
 /// which side of a threshold the tip is.
 const LENGTH_DOUBT_MM: f64 = 3e-4;
 /// The tip has left a layer when it is this far outside, in mm.
 const EXIT_MM: f64 = 13_107.0 / 65_536.0;
+
+/// Whether a tip that is this far past a threshold (mm) is past it for the core, too.
+fn is(margin: f64, told: bool) -> bool {
+    if margin.abs() < LENGTH_DOUBT_MM { told } else { margin >= 0.0 }
+}
 
 /// What the twin remembers from tick to tick.
 pub(crate) struct Twin {
@@ -25,8 +30,8 @@ pub(crate) struct Twin {
     allowed: f64,
     /// What of the heat the places make that forces lose: half of the last one of each wall, of friction and of damping.
     heat_doubt: f64,
-    /// The tip was past the next layer in the last tick, and that was not to be touched yet.
-    carrying: bool,
+    /// A wall gave way in this tick, or in one since which a layer was touched in each.
+    springing_back: bool,
     ticks: u32,
     counts: Vec<i32>,
     edges: Vec<(usize, i32)>,
@@ -62,7 +67,7 @@ impl Twin {
             squared: 0.0,
             allowed: f64::MAX,
             heat_doubt: 0.0,
-            carrying: false,
+            springing_back: false,
             ticks: 0,
             counts: Vec::new(),
             edges: vec![(0, 0)],
@@ -70,14 +75,18 @@ impl Twin {
         }
     }
 
-    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call. `angle` and what `told` the
-    /// core has made of the tip's way are checked against the anatomy.
-    pub(crate) fn tick(&mut self, count: i32, angle: Milliradians, told: Transitions) -> f64 {
+    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call. What the core has `told` of the
+    /// tip's way is checked against the anatomy.
+    pub(crate) fn tick(&mut self, count: i32, told: &TickOutput) -> f64 {
         let depth = f64::from(count) * self.mm_per_count;
         let speed = self.speed(count);
-        let stretch = 1.0 / (f64::from(angle.0) * 1e-3).sin();
-        self.meet(depth, stretch, told);
-        let force = self.walls(depth, stretch) + self.friction(depth, stretch);
+        let stretch = 1.0 / (f64::from(told.angle.0) * 1e-3).sin();
+        self.meet(depth, stretch, told.transitions);
+        let rubs = matches!(
+            State::from_code(told.sample.state),
+            Some(State::Puncture | State::Friction | State::Withdrawal)
+        );
+        let force = self.walls(depth, stretch) + self.friction(depth, stretch, rubs);
         let force = force + speed * self.config.device.damping.0.to_num::<f64>();
         let device = self.config.device;
         let limits = self.config.device.limits;
@@ -142,7 +151,6 @@ impl Twin {
 
     /// One layer touched or left, and one wall that gives way, a tick at the most.
     fn meet(&mut self, depth: f64, stretch: f64, told: Transitions) {
-        let is = |margin: f64, told: bool| if margin.abs() < LENGTH_DOUBT_MM { told } else { margin >= 0.0 };
         let bit = |index: usize| 1_u8 << index;
         let mut puncture = 0;
         let next = self
@@ -158,51 +166,54 @@ impl Twin {
             if is(travel - wall.puncture_travel.0.to_num::<f64>(), told.puncture != 0) {
                 puncture = bit(next);
                 self.layers[next].open = true;
+                self.springing_back = true;
                 self.layers[next].frontier = travel;
             }
         }
         assert_eq!(puncture, told.puncture, "at {depth} mm");
         let touched = self.layers.iter().filter(|layer| layer.touched).count();
-        let (past_next, is_free, left) = (
-            depth - self.top(touched, stretch),
-            self.layers[..touched]
-                .iter()
-                .zip(&self.config.patient.layers)
-                .all(|(s, l)| s.open || l.wall.is_none()),
-            touched.checked_sub(1).map_or(-1.0, |last| self.top(last, stretch) - EXIT_MM - depth),
-        );
+        let is_free = self.layers[..touched]
+            .iter()
+            .zip(&self.config.patient.layers)
+            .all(|(s, l)| s.open || l.wall.is_none());
+        let place = self.top(touched, stretch) + self.carried_along(touched, stretch);
+        let last = touched.checked_sub(1);
+        let outside = last.map_or(-1.0, |last| self.top(last, stretch) - EXIT_MM - depth);
         let (mut contact, mut exit) = (0, 0);
-        let is_past = is(past_next, told.contact != 0 || self.carrying);
-        let indented = self.indentation(depth, stretch);
-        if is_past && is_free && is(past_next - indented, told.contact != 0) {
+        if is_free && is(depth - place, told.contact != 0) {
             contact = bit(touched);
-            let walled = self.config.patient.layers[touched].wall.is_some();
-            let carried = if self.carrying && walled { depth - self.top(touched, stretch) } else { 0.0 };
+            let met = if self.springing_back { place.max(self.gave_way(stretch)) } else { place };
+            let carried = met - self.top(touched, stretch);
             self.layers[touched] = LayerState { touched: true, carried, ..LayerState::default() };
-            self.carrying = false;
-        } else if is_past {
-            self.carrying = true;
+        } else if let Some(last) = last
+            && is(outside, told.exit != 0)
+        {
+            exit = bit(last);
+            self.layers[last] = LayerState::default();
         } else {
-            self.carrying = false;
-            if let Some(last) = touched.checked_sub(1)
-                && is(left, told.exit != 0)
-            {
-                exit = bit(last);
-                self.layers[last] = LayerState::default();
-            }
+            self.springing_back = false;
         }
         assert_eq!((contact, exit), (told.contact, told.exit), "at {depth} mm");
     }
 
-    /// What is left of the indentation of the wall that gave way last.
-    fn indentation(&self, depth: f64, stretch: f64) -> f64 {
+    /// How much deeper than at rest layer `next` lies where the tip comes to it: there, what is left of the indentation of the wall
+    /// that gave way last is as long as the tip is past the layer's place at rest.
+    fn carried_along(&self, next: usize, stretch: f64) -> f64 {
         let Some(last) = self.layers.iter().rposition(|layer| layer.open) else { return 0.0 };
         let wall = self.config.patient.layers[last].wall.expect("it has given way");
         let (puncture, relieved) =
             (wall.puncture_travel.0.to_num::<f64>(), wall.relief.vertex.0.to_num::<f64>());
-        let travel = (depth - self.origin(last, stretch)).max(puncture);
-        let share = ((relieved - travel) / (relieved - puncture)).max(0.0);
-        share * wall.spring_back.to_num::<f64>() * puncture
+        let left = wall.spring_back.to_num::<f64>() * puncture;
+        let per_mm = left / (relieved - puncture);
+        let before_relief = self.origin(last, stretch) + relieved - self.top(next, stretch);
+        (before_relief * per_mm / (1.0 + per_mm)).clamp(0.0, left)
+    }
+
+    /// Where the tip was when the last wall gave way.
+    fn gave_way(&self, stretch: f64) -> f64 {
+        let last = self.layers.iter().rposition(|layer| layer.open).expect("one has");
+        let wall = self.config.patient.layers[last].wall.expect("it has given way");
+        self.origin(last, stretch) + wall.puncture_travel.0.to_num::<f64>()
     }
 
     fn walls(&mut self, depth: f64, stretch: f64) -> f64 {
@@ -223,12 +234,13 @@ impl Twin {
         sum
     }
 
-    fn friction(&mut self, depth: f64, stretch: f64) -> f64 {
+    /// `rubs`: the core has told of friction.
+    fn friction(&mut self, depth: f64, stretch: f64, rubs: bool) -> f64 {
         let layers = &self.config.patient.layers;
         let first_wall = layers.iter().position(|l| l.wall.is_some());
         let open = first_wall.is_none_or(|i| self.layers[i].open);
         let entry = self.top(0, stretch);
-        if !open || depth < entry {
+        if !open || !is(depth - entry, rubs) {
             self.anchor = depth;
             return 0.0;
         }
