@@ -10,7 +10,7 @@ use crate::refusal::{Field, Refusal, milli, within};
 use crate::tissue::{Layer, MAX_LAYERS};
 use crate::units::{Millimetres, Newtons, Stiffness};
 use crate::wall::{self, Cut};
-use fixed::types::{I2F30, I8F24, I16F16};
+use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -49,8 +49,8 @@ pub enum FrictionLaw {
 #[derive(Clone, Copy, Debug)]
 struct Rub {
     per_mm: I2F30,
-    /// Friction limit that the layers above have added up to with the needle straight in.
-    above: Newtons,
+    /// Friction limit in N that the layers above have added up to with the needle straight in. No motor that is accepted gives 128 N.
+    above: I8F24,
 }
 
 /// The forces of the tissue ready for the tick, in the order of the [`crate::anatomy::Anatomy`] that [`crate::plan`] has
@@ -82,16 +82,16 @@ impl Plan {
         check_friction(friction, ground)?;
         check_along(ground)?;
         let mut rubs = Vec::new();
-        let mut above: Option<(&Layer, I16F16)> = None;
+        let mut above: Option<(&Layer, I32F32)> = None;
         for Met { layer, .. } in ground.layers {
-            let rub_above = above.map_or(I16F16::ZERO, |(last, rub)| {
+            let rub_above = above.map_or(I32F32::ZERO, |(last, rub)| {
                 let thickness = layer.depth.0.saturating_sub(last.depth.0);
-                rub.saturating_add(thickness.saturating_mul(last.friction.0))
+                rub.saturating_add(thickness.wide_mul(last.friction.0))
             });
             above = Some((layer, rub_above));
             let per_mm = I2F30::saturating_from_num(layer.friction.0);
             // It holds MAX_LAYERS: the push cannot fail.
-            let _ = rubs.push(Rub { per_mm, above: Newtons(rub_above) });
+            let _ = rubs.push(Rub { per_mm, above: I8F24::saturating_from_num(rub_above) });
         }
         let walls = wall::all(ground.layers.iter().map(|met| &met.layer));
         Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: plan_friction(friction) })
@@ -193,12 +193,12 @@ fn limit(forces: &Plan, met: &Insertion, depth: Millimetres) -> Newtons {
     let index = met.innermost(depth);
     let Some(rub) = forces.rubs.get(index) else { return Newtons::default() };
     let inside = depth.0.saturating_sub(met.top(index));
-    Newtons(saturating_times(inside, rub.per_mm).saturating_add(stretched(rub.above.0, met.path_per_depth())))
+    Newtons(saturating_times(inside, rub.per_mm).saturating_add(stretched(rub.above, met.path_per_depth())))
 }
 
-/// What layers that are passed at an angle add up to.
-fn stretched(straight: I16F16, path_per_depth: I8F24) -> I16F16 {
-    I16F16::from_bits(saturating_product(straight.to_bits(), path_per_depth.to_bits(), 24))
+/// What layers that are passed at an angle add up to, in N.
+fn stretched(straight: I8F24, path_per_depth: I8F24) -> I16F16 {
+    I16F16::from_bits(saturating_product(straight.to_bits(), path_per_depth.to_bits(), 32))
 }
 
 fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
