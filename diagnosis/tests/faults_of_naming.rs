@@ -6,7 +6,7 @@ mod axis;
 mod common;
 
 use axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
-use common::Setup;
+use common::{Setup, WARM_SQUARE};
 use diagnosis::effects::EffectName as N;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 
@@ -133,4 +133,18 @@ fn a_small_drift_of_the_gain_a_small_deadband_and_the_slip_of_a_light_needle_are
         let class = outcome.report.effects.first().map(|effect| effect.class.clone()).unwrap_or_default();
         assert!(class.contains(&name), "{effect}: {}", outcome.summary());
     }
+}
+
+#[test]
+fn a_gain_that_falls_with_the_copper_loss_is_found_with_its_size_and_time() {
+    let setup = Setup { seconds: 20.0, ..bench("gain_drift_by_loss") };
+    let outcome = on_bench(&setup, &setup);
+    let found = outcome.report.effects.first().unwrap_or_else(|| panic!("{}", outcome.summary()));
+    assert_eq!(found.name, N::GainDrift, "{}", outcome.summary());
+    let drift = outcome.patched_rig.effects.last().expect("the patched rig has it");
+    let mean_square = *drift.shape.get("mean_square").expect("it follows the loss, not the time alone");
+    let change = found.parameters["change"].value * WARM_SQUARE / mean_square;
+    assert!((change / -0.15 - 1.0).abs() < 0.15, "{change}: {}", outcome.summary());
+    let time_s = found.parameters["time_constant"].value;
+    assert!((time_s / (0.2 * setup.seconds) - 1.0).abs() < 0.2, "{time_s}: {}", outcome.summary());
 }

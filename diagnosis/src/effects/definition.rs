@@ -30,8 +30,9 @@ pub(crate) struct Span {
     /// Travel relative to the start of each recording, rad or m.
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Largest |command|.
+    /// Largest |command|, and the mean of its square over time.
     pub(crate) command: f64,
+    pub(crate) mean_square: f64,
     /// Longest recording, s.
     pub(crate) duration: f64,
     /// Mean time between rows, s, and between blocks.

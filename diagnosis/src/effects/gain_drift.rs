@@ -1,5 +1,7 @@
-//! A torque constant that changes over the recording, as it heats: `change·drive·(1 - exp(-t/time_constant))`; with `at_once_s` the
-//! load changes at once, which has no name and speaks only against others.
+//! A torque constant that changes over the recording, as magnets and winding heat: `change·drive·h`. Either h follows the time alone,
+//! `1 - exp(-t/time_constant)`, or, with `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
+//! command and h nought at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
+//! `at_once_s` the load changes at once, which has no name and speaks only against others.
 
 use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -10,6 +12,19 @@ struct Law {
     time_constant: f64,
     /// Time at which the drift comes all at once, s.
     at_once_s: f64,
+    /// Square of the command under which the heat settles at one; none where it follows the time alone.
+    mean_square: Option<f64>,
+    heat: f64,
+}
+
+impl Law {
+    /// The heat in the middle of a step, which it moves on to the step's end.
+    fn heated(&mut self, state: &State, mean_square: f64) -> f64 {
+        let from = self.heat;
+        let settled = state.command * state.command / mean_square;
+        self.heat += (settled - from) * -(-state.dt / self.time_constant).exp_m1();
+        0.5 * (from + self.heat)
+    }
 }
 
 impl ForceLaw for Law {
@@ -17,7 +32,9 @@ impl ForceLaw for Law {
         vec!["change".into()]
     }
     fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
-        out[0] = if !self.at_once_s.is_finite() {
+        out[0] = if let Some(mean_square) = self.mean_square {
+            state.drive * self.heated(state, mean_square)
+        } else if !self.at_once_s.is_finite() {
             state.drive * (1.0 - (-state.time / self.time_constant).exp())
         } else if state.time >= self.at_once_s {
             state.drive
@@ -40,8 +57,12 @@ impl Definition for Defined {
         "the torque constant changes as the recording goes on"
     }
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        let time_constant = effect.shape_or("time_constant", 1.0);
-        Some(Box::new(Law { time_constant, at_once_s: effect.shape_or("at_once_s", f64::INFINITY) }))
+        Some(Box::new(Law {
+            time_constant: effect.shape_or("time_constant", 1.0),
+            at_once_s: effect.shape_or("at_once_s", f64::INFINITY),
+            mean_square: effect.shape.get("mean_square").copied(),
+            heat: 0.0,
+        }))
     }
     fn scales_drive(&self) -> bool {
         true
@@ -59,8 +80,17 @@ impl Definition for Defined {
         &["time_constant"]
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |time_constant: f64| Effect::shaped(name, &[("time_constant", time_constant)]);
-        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(at).collect()
+        let by_time = |time_constant: f64| Effect::shaped(name, &[("time_constant", time_constant)]);
+        let by_loss = |time_constant: f64| {
+            let shape = [("time_constant", time_constant), ("mean_square", span.mean_square)];
+            Effect::shaped(name, &shape)
+        };
+        let times = logarithmic(0.08 * span.duration, 2.0 * span.duration, 5);
+        let mut all: Vec<Effect> = times.iter().map(|time| by_time(*time)).collect();
+        if span.mean_square > 0.0 {
+            all.extend(times.iter().map(|time| by_loss(*time)));
+        }
+        all
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
@@ -88,5 +118,28 @@ impl Definition for Defined {
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.one_speed.then_some(EffectName::FrictionDrift).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::{Effect, EffectName, Law, State};
+
+    #[test]
+    fn heat_follows_the_square_of_the_command_and_fades_without() {
+        let shape = [("time_constant", 2.0), ("mean_square", 0.04)];
+        let mut law = Law::new(&Effect::shaped(EffectName::GainDrift, &shape)).unwrap();
+        let mut after = |command: f64, seconds: f64| {
+            let mut out = [0.0];
+            for _ in 0..(1000.0 * seconds) as usize {
+                law.terms(&State { command, drive: 3.0, dt: 1e-3, ..State::default() }, &mut out);
+            }
+            out[0] / 3.0
+        };
+        let near = |heat: f64, expected: f64| assert!((heat - expected).abs() < 1e-3, "{heat} for {expected}");
+        let settled = 1.0 - (-1.0_f64).exp();
+        near(after(-0.2, 2.0), settled);
+        near(after(0.0, 2.0), settled * (-1.0_f64).exp());
+        near(after(0.4, 40.0), 4.0);
     }
 }

@@ -23,7 +23,10 @@ pub(crate) fn effect_inputs(
     let n = track.blocks();
     let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
         || effect.name.formula().is_some_and(|formula| formula.uses("u"));
-    let carried = (over_command || effect.shape.contains_key("of_drive")).then(|| track.block_mean(command));
+    let of_drive = effect.shape.contains_key("of_drive");
+    let uses_command = over_command || of_drive || effect.shape.contains_key("mean_square");
+    let carried = uses_command.then(|| track.block_mean(command));
+    let scales_drive = effect.name.definition().scales_drive();
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
@@ -32,7 +35,8 @@ pub(crate) fn effect_inputs(
             velocity: track.v[j],
             acceleration: track.acceleration(j),
             rest: track.rest[j],
-            drive: carried.as_ref().map_or(1.0, |carried| carried[j]),
+            // What scales the drive scales its whole input below.
+            drive: carried.as_ref().filter(|_| !scales_drive).map_or(1.0, |carried| carried[j]),
             command: carried.as_ref().map_or(1.0, |carried| carried[j]),
             tilt: track.tilt_at(j),
             external: track.force_at(j),
@@ -46,7 +50,7 @@ pub(crate) fn effect_inputs(
         }
     }
     let sensor = law.in_sensor();
-    let drive = effect.name.definition().scales_drive().then(drive);
+    let drive = scales_drive.then(drive);
     columns
         .into_iter()
         .map(|column| {

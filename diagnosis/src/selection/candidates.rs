@@ -41,6 +41,9 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         .collect();
     moving.sort_by(f64::total_cmp);
     let command = fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs())));
+    let square = |t: &BlockedRecording| -> f64 {
+        t.command.iter().zip(t.row_hold.iter()).map(|(u, hold)| u * u * hold).sum()
+    };
     let fast = speeds[speeds.len() * 99 / 100];
     let machine = nominal.machine(None);
     let mut span = Span {
@@ -50,6 +53,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),
         high: fold(&|t| t.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         command,
+        mean_square: tracks.iter().map(square).sum::<f64>() / seconds,
         duration: fold(&|t| t.row_time.last().copied().unwrap_or(0.0)),
         row: seconds / rows,
         block: seconds / blocks,
@@ -217,6 +221,7 @@ mod tests {
             speed: 10.0,
             speed_floor: 0.1,
             slow: 1.0,
+            mean_square: 0.2,
             low: 0.0,
             high: 20.0,
             command: 1.0,

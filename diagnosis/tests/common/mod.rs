@@ -34,6 +34,9 @@ pub const COUNTS: f64 = 636.619_772_4;
 /// Force at which a grip of size 1 lets go, N·m.
 pub const GRIP: f64 = 7e-4;
 
+/// Square of the command under which a gain that falls with the copper loss settles at its full change, A².
+pub const WARM_SQUARE: f64 = 3e-4;
+
 /// The nominal rig, with values off by the given relative errors of inertia, viscous, coulomb and gain.
 pub fn rig(off: [f64; 4], extra: &str) -> Rig {
     let text = format!(
@@ -96,6 +99,7 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
     let mut lagged = 0.0;
     let (mut ql, mut vl) = (0.0f64, 0.0f64);
     let mut lost = 0.0;
+    let mut heat = 0.0;
     let mut integral = 0.0;
     for row in 0..rows {
         let t = row as f64 / setup.rate;
@@ -130,6 +134,9 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
         } else {
             0.024 * triangle * 1.6 + 0.014 * wave
         };
+        // Hard work and rest by turns.
+        let works = !is("gain_drift_by_loss") || (4.0 * t / setup.seconds).fract() < 0.5;
+        let command = if works { command } else { 0.4 * command };
         out.time_s.push(t + jitter);
         out.command.push(command);
         out.position_counts.push(counts);
@@ -172,6 +179,10 @@ pub fn record(setup: &Setup, part: u64) -> Recording {
             }
             if is("gain_drift") {
                 u *= 1.0 - 0.3 * s * (1.0 - (-t / (0.3 * setup.seconds)).exp());
+            }
+            if is("gain_drift_by_loss") {
+                heat += (u * u / WARM_SQUARE - heat) * dt / (0.2 * setup.seconds);
+                u *= 1.0 - 0.15 * s * heat;
             }
             if is("torque_ripple") {
                 u *= 1.0 + s * (0.2 * (3.0 * (q + zero)).sin() + 0.1 * (6.0 * (q + zero) + 1.0).sin());

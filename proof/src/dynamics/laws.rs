@@ -201,9 +201,13 @@ fn law<'a>(rig: &'a Rig, entry: &'a Entry, along: f64) -> Result<Term<'a>, Strin
         "gain_drift" => {
             let (change, tau) = (c("change"), entry.shape("time_constant", 1.0));
             let at_once = entry.shape("at_once_s", f64::INFINITY);
+            let mean_square = entry.shape("mean_square", f64::INFINITY);
+            let mut heat = 0.0;
             Box::new(move |m, u, i| {
+                heat += (u[i] * u[i] / mean_square - heat) * m.step() / tau;
                 let settled = match at_once.is_finite() {
                     true => f64::from(u8::from(m.time[i] >= at_once)),
+                    false if mean_square.is_finite() => heat,
                     false => 1.0 - (-m.time[i] / tau).exp(),
                 };
                 change * gain * u[i] * settled
