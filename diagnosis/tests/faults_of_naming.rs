@@ -139,7 +139,11 @@ fn a_small_drift_of_the_gain_a_small_deadband_and_the_slip_of_a_light_needle_are
 fn a_gain_that_falls_with_the_copper_loss_is_found_with_its_size_and_time() {
     let setup = Setup { seconds: 20.0, ..bench("gain_drift_by_loss") };
     let outcome = on_bench(&setup, &setup);
-    let found = outcome.report.effects.first().unwrap_or_else(|| panic!("{}", outcome.summary()));
+    let found = outcome
+        .report
+        .effects
+        .first()
+        .unwrap_or_else(|| panic!("{:?} {}", outcome.report.hypotheses, outcome.summary()));
     assert_eq!(found.name, N::GainDrift, "{}", outcome.summary());
     let drift = outcome.patched_rig.effects.last().expect("the patched rig has it");
     let mean_square = *drift.shape.get("mean_square").expect("it follows the loss, not the time alone");

@@ -35,7 +35,7 @@ pub const COUNTS: f64 = 636.619_772_4;
 pub const GRIP: f64 = 7e-4;
 
 /// Square of the command under which a gain that falls with the copper loss settles at its full change, A².
-pub const WARM_SQUARE: f64 = 3e-4;
+pub const WARM_SQUARE: f64 = 1e-3;
 
 /// The nominal rig, with values off by the given relative errors of inertia, viscous, coulomb and gain.
 pub fn rig(off: [f64; 4], extra: &str) -> Rig {
