@@ -1,5 +1,6 @@
 //! The folders of the crate stand in an order, and each uses only those before it: no circle, no arrow upward.
 
+use diagnosis::effects::EffectName;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -75,4 +76,84 @@ fn the_sources_hold_no_file_beside_the_folders_but_the_numbers_that_decide() {
     }
     let thresholds = fs::read_to_string(root.join("thresholds.rs")).expect("a source can be read");
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
+}
+
+/// Where code outside `effects/` may name effects, and why. What an effect is belongs into its file: ask its `Definition`.
+const MAY_NAME: [(&str, &str); 0] = [];
+
+/// The effects, as the code names them: `stribeck_friction` is `StribeckFriction`.
+fn variants() -> Vec<String> {
+    let capital = |word: &str| word[..1].to_uppercase() + &word[1..];
+    EffectName::ALL.iter().map(|name| name.as_str().split('_').map(capital).collect()).collect()
+}
+
+/// The part of a source that is compiled without its tests, and the files that are tests alone.
+fn without_tests(text: &str) -> (Vec<&str>, Vec<String>) {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut files = Vec::new();
+    for (number, pair) in lines.windows(2).enumerate() {
+        let module = pair[1].trim().strip_prefix("mod ").filter(|_| pair[0].trim() == "#[cfg(test)]");
+        match module.and_then(|module| module.strip_suffix(';')) {
+            Some(file) => files.push(format!("{file}.rs")),
+            None if module.is_some() => return (lines[..number].to_vec(), files),
+            None => {}
+        }
+    }
+    (lines, files)
+}
+
+/// Whether a line of code names an effect, by `EffectName` or by what a file calls it.
+fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
+    let code = line.split("//").next().unwrap_or("");
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    code.match_indices("::").any(|(place, _)| {
+        let before = code[..place].rsplit(|c| !is_word(c)).next().unwrap_or("");
+        let after = code[place + 2..].split(|c| !is_word(c)).next().unwrap_or("");
+        // Nothing but names stands in a list or in a star.
+        let is_effect = variants.iter().any(|variant| variant == after) || after.is_empty();
+        aliases.iter().any(|alias| alias == before) && is_effect
+    })
+}
+
+#[test]
+fn what_an_effect_is_stands_in_its_file() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let variants = variants();
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let texts: Vec<(PathBuf, String)> = files
+        .into_iter()
+        .map(|file| (file.clone(), fs::read_to_string(file).expect("a source can be read")))
+        .collect();
+    let tests: Vec<PathBuf> = texts
+        .iter()
+        .flat_map(|(file, text)| without_tests(text).1.into_iter().map(|test| file.with_file_name(test)))
+        .collect();
+    let mut naming: Vec<(String, String)> = Vec::new();
+    let mut in_effects = 0;
+    for (file, text) in texts.iter().filter(|(file, _)| !tests.contains(file)) {
+        let mut aliases = vec!["EffectName".to_owned()];
+        let calls = text.match_indices("EffectName as ").map(|(place, found)| &text[place + found.len()..]);
+        aliases
+            .extend(calls.map(|rest| rest.chars().take_while(|c| c.is_alphanumeric()).collect::<String>()));
+        let name = file.strip_prefix(&root).expect("it is below").display().to_string();
+        for line in without_tests(text).0 {
+            if !names_effect(line, &aliases, &variants) {
+                continue;
+            }
+            if name.starts_with("effects") {
+                in_effects += 1;
+            } else {
+                naming.push((name.clone(), line.trim().to_owned()));
+            }
+        }
+    }
+    assert!(in_effects > 10, "only {in_effects} names were seen in effects/: the reader of sources is blind");
+    let may = |file: &str| MAY_NAME.iter().any(|(may, _)| *may == file);
+    let wrong: Vec<String> =
+        naming.iter().filter(|(file, _)| !may(file)).map(|(file, line)| format!("{file}: {line}")).collect();
+    assert!(wrong.is_empty(), "code outside effects/ names effects:\n{}", wrong.join("\n"));
+    for (file, why) in MAY_NAME {
+        assert!(naming.iter().any(|(name, _)| name == file), "{file} names no effect, and need not ({why})");
+    }
 }

@@ -1,7 +1,8 @@
 //! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn q̇|)`. Where the nominal model has an
 //! offset the dry part is that offset, and only the viscous part can be told.
 
-use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Reported, Span};
+use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Plain, Reported, Span};
+use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem};
 
@@ -66,5 +67,21 @@ impl Definition for Defined {
     }
     fn form_sd(&self, _value: &str) -> f64 {
         0.025
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 4, has_twin: true })
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
+        joint.bias -= effect.coefficient("coulomb_difference");
+        let difference = effect.coefficient("viscous_difference");
+        if difference != 0.0 {
+            joint.notes.push(format!(
+                "asymmetric_friction: viscous friction is {:.6e} forward and {:.6e} backward; damping holds their mean",
+                joint.viscous + difference,
+                joint.viscous - difference
+            ));
+        }
+        true
     }
 }

@@ -1,6 +1,8 @@
 //! A gap between motor and load that opens at reversals; the law is in `load`.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{
+    Allowed, Coupling, Definition, Factors, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+};
 use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden::logarithmic;
@@ -46,8 +48,8 @@ impl Definition for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
-    fn is_joint(&self) -> bool {
-        true
+    fn coupling(&self) -> Option<Coupling> {
+        Some(Coupling::Stiff)
     }
     fn has_optima_apart(&self) -> bool {
         true
@@ -92,5 +94,8 @@ impl Definition for Defined {
         let unseen = effect.shape_or("gap", f64::INFINITY) < SEEN * shown.count;
         let spring = unseen.then_some(EffectName::DriveCompliance);
         spring.into_iter().chain(shown.one_length.then_some(EffectName::PreslidingFriction)).collect()
+    }
+    fn start_factors(&self) -> &'static [Factors] {
+        &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])]
     }
 }

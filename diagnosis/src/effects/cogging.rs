@@ -39,4 +39,8 @@ impl Definition for Defined {
             "slow turns with a small and with a large constant load: ripple grows with the command, cogging does not",
         )
     }
+    fn is_of_orders(&self, orders: &[f64]) -> bool {
+        // Once per turn and nothing else is an off-centre mass.
+        orders.iter().any(|order| *order != 1.0)
+    }
 }

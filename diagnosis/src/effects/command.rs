@@ -26,6 +26,16 @@ impl CommandLaw {
         effect.name.definition().command_law(effect)
     }
 
+    /// A transport delay, s.
+    pub(crate) fn of_delay(delay: f64) -> Self {
+        Self::Delay { delay, queue: VecDeque::new(), waiting: 0.0 }
+    }
+
+    /// A first-order lag of a time constant, s.
+    pub(crate) fn of_lag(time_constant: f64) -> Self {
+        Self::Lag { time_constant, state: None }
+    }
+
     /// The mean effective command over a step of `dt` s during which `command` is held.
     pub fn step(&mut self, command: f64, dt: f64) -> f64 {
         match self {

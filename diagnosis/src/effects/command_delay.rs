@@ -1,9 +1,9 @@
 //! A pure transport delay between command and force.
 
 use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
-use std::collections::VecDeque;
 
 pub(super) struct Defined;
 
@@ -15,8 +15,7 @@ impl Definition for Defined {
         "the drive applies the command late"
     }
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        let delay = effect.shape_or("delay", 0.0);
-        Some(CommandLaw::Delay { delay, queue: VecDeque::new(), waiting: 0.0 })
+        Some(CommandLaw::of_delay(effect.shape_or("delay", 0.0)))
     }
     fn is_of_command(&self) -> bool {
         true
@@ -45,5 +44,9 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::ElectricalLag).then_some(experiments::PHASE)
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.delay += effect.shape_or("delay", 0.0);
+        true
     }
 }

@@ -1,6 +1,7 @@
 //! A drive that clips below its declared limit.
 
 use super::definition::{Definition, Fitted, Movable, Reported, Shown, Span};
+use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 
 pub(super) struct Defined;
@@ -46,5 +47,10 @@ impl Definition for Defined {
     fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
         // A drive that clips, and a roller that slips at a constant force.
         vec![EffectName::RollerSlip]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        let clip = effect.shape_or("limit", f64::INFINITY);
+        joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
+        true
     }
 }

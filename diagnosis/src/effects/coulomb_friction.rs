@@ -1,6 +1,9 @@
 //! Dry friction, where the nominal model has none: `-coulomb·sgn(q̇)`.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span};
+use super::definition::{
+    Allowed, Definition, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
+};
+use super::joint_terms::JointTerms;
 use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem};
 
@@ -42,5 +45,15 @@ impl Definition for Defined {
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coulomb", fitted.force.into())
+    }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Coulomb)
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 0, has_twin: false })
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.dry += effect.coefficient("coulomb");
+        true
     }
 }

@@ -3,6 +3,7 @@
 //! Forces are in N·m or N when a plant runs and per inertia, as accelerations, when a recording is fitted; a law is written once
 //! for both. Nothing here may know how an effect is found.
 
+use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, State, Subsystem};
 
 /// A law with its state. The force is the sum of coefficient times term; laws in the sensor give travel instead.
@@ -184,8 +185,52 @@ pub(crate) struct Shown {
     pub(crate) count: f64,
 }
 
+/// A term of the rig's own model that is the same force as an effect: where the rig holds it, the effect cannot have been left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NominalTerm {
+    /// Friction that grows with speed.
+    Viscous,
+    /// Dry friction.
+    Coulomb,
+    /// The gravity of an off-centre mass.
+    Gravity,
+    /// A weight that acts through the tilt.
+    Weight,
+}
+
+/// What holds a second mass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coupling {
+    /// Something stiff, a shaft or flanks that touch, which rings with the masses.
+    Stiff,
+    /// A grip, which lets go and does not ring.
+    Grip,
+}
+
+/// What makes an effect one that any machine may have.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plain {
+    /// Place in the order in which plain forces enter a model.
+    pub(crate) rank: u8,
+    /// Whether another effect of the library may take the same force.
+    pub(crate) has_twin: bool,
+}
+
+/// Physics without a name in the library, of the law of an effect: nothing of it is named, it speaks only against names.
+pub(crate) struct Unnamed {
+    /// The law with the shape that makes it such.
+    pub(crate) effect: Effect,
+    /// As how many values its freedom counts.
+    pub(crate) freedom: f64,
+    /// What it is, in words.
+    pub(crate) what: String,
+}
+
 /// A value of a shape that may move: its key, and its bounds.
 pub(crate) type Movable = (&'static str, f64, f64);
+
+/// A value of a shape by its key, and factors on it.
+pub(crate) type Factors = (&'static str, &'static [f64]);
 
 /// An effect.
 pub(crate) trait Definition: Sync {
@@ -225,6 +270,11 @@ pub(crate) trait Definition: Sync {
         false
     }
 
+    /// Whether its coefficients in a rig are parts of the gain rather than forces.
+    fn is_relative_to_gain(&self) -> bool {
+        self.scales_drive()
+    }
+
     /// Whether it is told by what the command does fast, or by the command's scale.
     fn is_of_command(&self) -> bool {
         false
@@ -240,19 +290,54 @@ pub(crate) trait Definition: Sync {
         false
     }
 
-    /// Whether its law is of a second mass behind a joint.
-    fn is_joint(&self) -> bool {
-        false
+    /// What holds the second mass that its law is of, where it is of one: such a law is faster than a block.
+    fn coupling(&self) -> Option<Coupling> {
+        None
     }
 
-    /// Whether its law is of a second mass, faster than a block.
-    fn is_second_mass(&self) -> bool {
-        self.is_joint()
+    /// The term of the rig that is the same force.
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        None
+    }
+
+    /// Whether and how any machine may have it: such forces are looked for together, before anything else.
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        None
+    }
+
+    /// Whether waves of such orders of a turn are its own and not another's.
+    fn is_of_orders(&self, _orders: &[f64]) -> bool {
+        true
     }
 
     /// Whether it changes with the time of the recording.
     fn drifts(&self) -> bool {
         false
+    }
+
+    /// Whether its law is of the travel as far as that was fitted, and says nothing beyond.
+    fn follows_travel(&self) -> bool {
+        false
+    }
+
+    /// Whether its one term is the jumps of each recording's readings, which are found before any effect is: each of its moments
+    /// is decided by itself.
+    fn is_of_jumps(&self) -> bool {
+        false
+    }
+
+    /// Puts jumps that were found into an effect that is of them: times, s, and how far the reading jumps, rad or m.
+    fn put_jumps(&self, _effect: &mut Effect, _jumps: &[(f64, f64)]) {}
+
+    /// Whether it bends to the little that any model leaves next to reversals, and so gains a little on recordings in which
+    /// there is nothing.
+    fn bends_at_reversals(&self) -> bool {
+        false
+    }
+
+    /// Travel over which it gives way after a reversal before it holds, rad or m, where it does and that should be short.
+    fn gives_way_over(&self, _effect: &Effect) -> Option<f64> {
+        None
     }
 
     /// Shape values without which it cannot be run; all are above zero.
@@ -273,6 +358,12 @@ pub(crate) trait Definition: Sync {
         false
     }
 
+    /// Factors on values of the shape that go together, to look elsewhere for the optimum of an effect that is built on the
+    /// rest of the machine.
+    fn start_factors(&self) -> &'static [Factors] {
+        &[]
+    }
+
     /// Whether values of a shape go together.
     fn is_possible(&self, _effect: &Effect) -> bool {
         true
@@ -281,6 +372,11 @@ pub(crate) trait Definition: Sync {
     /// What the coefficient of a term may be for the effect to be what its name says, per inertia.
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         FREE
+    }
+
+    /// Whether it is in doubt where the coefficient of a term stands at its limit.
+    fn is_in_doubt_at_limit(&self, _term: usize) -> bool {
+        true
     }
 
     /// How many coefficients are fitted, over so many recordings.
@@ -305,6 +401,17 @@ pub(crate) trait Definition: Sync {
     /// Others that recordings which show so much cannot tell from it, however well either fits.
     fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
         Vec::new()
+    }
+
+    /// Physics without a name that its law may also be: what may look like `fitted`, an effect of any name, or all there is
+    /// where nothing is fitted. `name` is its own.
+    fn unnamed(&self, _name: EffectName, _fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
+        Vec::new()
+    }
+
+    /// Adds the effect to a joint and its motor, as other simulators have them; whether those can say it.
+    fn add_to_joint(&self, _effect: &Effect, _joint: &mut JointTerms) -> bool {
+        false
     }
 
     /// The recording that would tell it from another; none where the other knows better or nobody does.

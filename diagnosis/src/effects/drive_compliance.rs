@@ -1,6 +1,6 @@
 //! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{Allowed, Coupling, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden::logarithmic;
 use std::f64::consts::TAU;
@@ -71,8 +71,8 @@ impl Definition for Defined {
         let omega = TAU * effect.shape_or("resonance_hz", 1.0);
         Some(Box::new(Law { omega, damping: effect.shape_or("damping", 0.05), state: None }))
     }
-    fn is_second_mass(&self) -> bool {
-        true
+    fn coupling(&self) -> Option<Coupling> {
+        Some(Coupling::Stiff)
     }
     fn is_of_command(&self) -> bool {
         true
@@ -113,5 +113,8 @@ impl Definition for Defined {
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         // A spring that explains little of what it should explain may well have a gap.
         shown.leaves_much.then_some(EffectName::Backlash).into_iter().collect()
+    }
+    fn is_relative_to_gain(&self) -> bool {
+        true
     }
 }

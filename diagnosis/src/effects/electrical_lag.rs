@@ -1,6 +1,7 @@
 //! A first-order lag (L/R) between command and force.
 
 use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
 
@@ -14,7 +15,7 @@ impl Definition for Defined {
         "a first-order lag between command and torque"
     }
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        Some(CommandLaw::Lag { time_constant: effect.shape_or("time_constant", 0.0), state: None })
+        Some(CommandLaw::of_lag(effect.shape_or("time_constant", 0.0)))
     }
     fn is_of_command(&self) -> bool {
         true
@@ -43,5 +44,9 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::CommandDelay).then_some(experiments::PHASE)
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.lag += effect.shape_or("time_constant", 0.0);
+        true
     }
 }

@@ -3,7 +3,7 @@
 //! command and h nought at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
 //! `at_once_s` the load changes at once, which has no name and speaks only against others.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
 
@@ -46,6 +46,9 @@ impl ForceLaw for Law {
         Box::new(self.clone())
     }
 }
+
+/// Times, as parts of the longest recording, at which a load may change at once.
+const CHANGES: usize = 40;
 
 pub(super) struct Defined;
 
@@ -118,6 +121,17 @@ impl Definition for Defined {
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.one_speed.then_some(EffectName::FrictionDrift).into_iter().collect()
+    }
+    fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
+        if fitted.is_some_and(|effect| effect.name != name) {
+            return Vec::new();
+        }
+        let at = |i: usize| {
+            let time = span.duration * i as f64 / CHANGES as f64;
+            let effect = Effect::shaped(name, &[("time_constant", span.duration), ("at_once_s", time)]);
+            Unnamed { effect, freedom: 4.0, what: format!("a load that changes at once, at {time:.1} s,") }
+        };
+        (1..CHANGES).map(at).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with `of_drive` the load is the drive's
 //! own force, as a gear loses it, which has no name and speaks only against others.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span};
+use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed};
 use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem};
 
@@ -49,5 +49,13 @@ impl Definition for Defined {
     }
     fn form_sd(&self, _value: &str) -> f64 {
         0.03
+    }
+    fn unnamed(&self, name: EffectName, _fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
+        // Whatever bends with speed, force or command may be the loss of a gear.
+        vec![Unnamed {
+            effect: Effect::shaped(name, &[("of_drive", 1.0)]),
+            freedom: 1.0,
+            what: "friction in proportion to the force of the drive, as a gear loses it,".into(),
+        }]
     }
 }

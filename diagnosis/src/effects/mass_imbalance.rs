@@ -1,6 +1,6 @@
 //! Gravity on an off-centre mass: once per turn of the axis, or of the motor.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Shown, Span};
+use super::definition::{Definition, Fitted, ForceLaw, NominalTerm, Plain, Reported, Shown, Span};
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem};
 
@@ -66,5 +66,11 @@ impl Definition for Defined {
         // Waves of once a turn, where nothing that turns need be heavy.
         let wave = shown.linear.then_some(EffectName::Cogging);
         wave.into_iter().chain(shown.less_than_a_turn.then_some(EffectName::PositionSpring)).collect()
+    }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Gravity)
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 3, has_twin: true })
     }
 }

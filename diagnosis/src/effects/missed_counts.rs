@@ -54,4 +54,14 @@ impl Definition for Defined {
     fn variable(&self) -> &'static str {
         "time"
     }
+    fn is_of_jumps(&self) -> bool {
+        true
+    }
+    fn put_jumps(&self, effect: &mut Effect, jumps: &[(f64, f64)]) {
+        for (time, step) in jumps {
+            let n = effect.shape.len() + 1;
+            effect.shape.insert(format!("time_{n}"), *time);
+            effect.coefficients.insert(format!("step_{n}"), *step);
+        }
+    }
 }

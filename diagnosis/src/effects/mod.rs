@@ -9,6 +9,7 @@ mod command;
 pub(crate) mod definition;
 pub(crate) mod experiments;
 mod formula;
+pub(crate) mod joint_terms;
 mod law;
 mod load;
 mod travel_profile;

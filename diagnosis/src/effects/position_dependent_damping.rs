@@ -1,7 +1,7 @@
 //! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the inertia that follows the travel, which
 //! has no name and speaks only against others.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{Definition, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
 use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -43,6 +43,9 @@ impl ForceLaw for Law {
     }
 }
 
+/// Degree of the polynomial along the travel that an inertia may follow.
+const INERTIA_DEGREE: f64 = 12.0;
+
 pub(super) struct Defined;
 
 impl Definition for Defined {
@@ -73,5 +76,21 @@ impl Definition for Defined {
     }
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         Some(experiments::STROKES)
+    }
+    fn follows_travel(&self) -> bool {
+        true
+    }
+    fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
+        // All of them are told by an acceleration that changes with the travel.
+        let alike = [name, EffectName::EncoderEccentricity, EffectName::MassImbalance];
+        if fitted.is_some_and(|effect| !alike.contains(&effect.name)) {
+            return Vec::new();
+        }
+        let shape = [("low", span.low), ("high", span.high), ("degree", INERTIA_DEGREE), ("of_inertia", 1.0)];
+        vec![Unnamed {
+            effect: Effect::shaped(name, &shape),
+            freedom: INERTIA_DEGREE,
+            what: "an inertia that changes along the travel".into(),
+        }]
     }
 }

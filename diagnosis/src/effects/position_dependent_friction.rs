@@ -56,4 +56,7 @@ impl Definition for Defined {
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         Some(experiments::STROKES)
     }
+    fn follows_travel(&self) -> bool {
+        true
+    }
 }

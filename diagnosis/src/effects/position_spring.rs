@@ -2,8 +2,9 @@
 //! creeps, which has no name and speaks only against others.
 
 use super::definition::{
-    Allowed, Definition, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span,
+    Allowed, Definition, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain, Reported, Shown, Span, Unnamed,
 };
+use super::joint_terms::JointTerms;
 use super::law::first_or_both;
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
@@ -36,6 +37,9 @@ impl ForceLaw for Law {
         Box::new(self.clone())
     }
 }
+
+/// Times in which the force of a spring that creeps may fade, s.
+const FADES_S: [f64; 6] = [0.1, 0.25, 0.6, 1.5, 4.0, 10.0];
 
 pub(super) struct Defined;
 
@@ -92,5 +96,31 @@ impl Definition for Defined {
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()
+    }
+    fn plain(&self, effect: &Effect) -> Option<Plain> {
+        (!effect.is_set("one_sided")).then_some(Plain { rank: 5, has_twin: true })
+    }
+    fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
+        let spring = match fitted {
+            None => Effect::shaped(name, &[("from", 0.0)]),
+            Some(effect) if effect.name == name => effect.clone(),
+            Some(_) => return Vec::new(),
+        };
+        let fading = |time: f64| {
+            let mut effect = spring.clone();
+            effect.shape.insert("fades_s".into(), time);
+            let what = format!("a spring that creeps, whose force fades within {time} s,");
+            Unnamed { effect, freedom: 4.0, what }
+        };
+        FADES_S.map(fading).into()
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        if effect.shape_or("fades_s", f64::INFINITY).is_finite() || effect.is_set("one_sided") {
+            return false;
+        }
+        joint.stiffness += effect.coefficient("stiffness");
+        joint.slack = effect.shape_or("from", 0.0);
+        joint.bias += effect.coefficient("preload");
+        true
     }
 }

@@ -89,4 +89,14 @@ impl Definition for Defined {
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.one_length.then_some(EffectName::Backlash).into_iter().collect()
     }
+    fn bends_at_reversals(&self) -> bool {
+        true
+    }
+    fn gives_way_over(&self, effect: &Effect) -> Option<f64> {
+        Some(effect.shape_or("deflection", 0.0))
+    }
+    fn is_in_doubt_at_limit(&self, term: usize) -> bool {
+        // Bristles without damping are bristles all the same.
+        term == 0
+    }
 }

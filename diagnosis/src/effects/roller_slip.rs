@@ -1,6 +1,8 @@
 //! A drive that lets go above a force ceiling; the law is in `load`.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{
+    Allowed, Coupling, Definition, Factors, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+};
 use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
@@ -38,8 +40,8 @@ impl Definition for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
-    fn is_joint(&self) -> bool {
-        true
+    fn coupling(&self) -> Option<Coupling> {
+        Some(Coupling::Grip)
     }
     fn has_optima_apart(&self) -> bool {
         true
@@ -109,5 +111,8 @@ impl Definition for Defined {
     fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
         // A drive that clips, and a roller that slips at a constant force.
         vec![EffectName::CommandSaturation]
+    }
+    fn start_factors(&self) -> &'static [Factors] {
+        &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]
     }
 }

@@ -1,6 +1,6 @@
 //! A weight that acts through the tilt, where the nominal model has none: `weight·sin(tilt)`.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{Definition, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span};
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -41,5 +41,11 @@ impl Definition for Defined {
     }
     fn variable(&self) -> &'static str {
         "tilt"
+    }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Weight)
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 2, has_twin: false })
     }
 }

@@ -1,6 +1,9 @@
 //! Friction that grows with speed, where the nominal model has none: `-viscous·q̇`.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span};
+use super::definition::{
+    Allowed, Definition, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
+};
+use super::joint_terms::JointTerms;
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -41,5 +44,15 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::StribeckFriction).then_some(super::experiments::SPEEDS)
+    }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Viscous)
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 1, has_twin: false })
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.viscous += effect.coefficient("viscous");
+        true
     }
 }

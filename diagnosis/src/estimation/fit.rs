@@ -1,6 +1,5 @@
 //! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
 
-use crate::effects::EffectName;
 use crate::estimation::blocked_recording::{BlockedRecording, Total};
 use crate::estimation::filter::{Gains, Noise, robust_loss};
 use crate::estimation::model::{Column, Key, Model, Nominal, total};
@@ -118,7 +117,7 @@ impl Prepared {
 
 /// What a model with lost counts pays in each segment of a recording for the jumps found in it, in log-likelihood.
 fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
-    let has_jumps = model.effects.iter().any(|effect| effect.name == EffectName::MissedCounts);
+    let has_jumps = model.effects.iter().any(|effect| effect.name.definition().is_of_jumps());
     let paid = |bounds: &[usize]| match track.loss_price.get(bounds[0]..bounds[1]) {
         Some(prices) if has_jumps => prices.iter().sum(),
         _ => 0.0,

@@ -1,6 +1,6 @@
 //! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
 
-use crate::effects::definition::Allowed;
+use crate::effects::definition::{Allowed, NominalTerm};
 use crate::effects::{CommandLaw, Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
 use crate::estimation::filter::Noise;
@@ -133,13 +133,17 @@ impl Nominal {
 
     /// Whether the nominal model holds an effect already, so that it cannot have been left out.
     pub(crate) fn holds(&self, name: EffectName) -> bool {
+        name.definition().nominal_term().is_some_and(|term| self.has(term))
+    }
+
+    /// Whether the nominal model has a term.
+    pub(crate) fn has(&self, term: NominalTerm) -> bool {
         let model = &self.rig.model;
-        match name {
-            EffectName::ViscousFriction => model.viscous.is_some_and(|x| x > 0.0),
-            EffectName::CoulombFriction => model.coulomb.is_some_and(|x| x > 0.0),
-            EffectName::MassImbalance => model.gravity.is_some_and(|x| x != 0.0),
-            EffectName::TiltGravity => model.weight.is_some_and(|x| x != 0.0),
-            _ => false,
+        match term {
+            NominalTerm::Viscous => model.viscous.is_some_and(|x| x > 0.0),
+            NominalTerm::Coulomb => model.coulomb.is_some_and(|x| x > 0.0),
+            NominalTerm::Gravity => model.gravity.is_some_and(|x| x != 0.0),
+            NominalTerm::Weight => model.weight.is_some_and(|x| x != 0.0),
         }
     }
 
@@ -184,14 +188,14 @@ impl Nominal {
     /// What the coefficient of an effect's term may be for the effect to be what its name says.
     pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
         let model = &self.rig.model;
-        let most = |held: EffectName, value| self.holds(held).then(|| self.most_friction(value));
+        let most = |held: NominalTerm, value| self.has(held).then(|| self.most_friction(value));
         let dry = model.coulomb.unwrap_or(0.0) / self.known_inertia();
         let allowed = Allowed {
             gain: self.known_gain(),
             gain_reach: self.gain_reach(),
             is_anchored: self.anchor.is_some(),
-            viscous: most(EffectName::ViscousFriction, model.viscous),
-            dry: most(EffectName::CoulombFriction, model.coulomb),
+            viscous: most(NominalTerm::Viscous, model.viscous),
+            dry: most(NominalTerm::Coulomb, model.coulomb),
             dry_by_uncertainty: most_over_nominal(self.rig.coulomb_sd()) * dry,
         };
         name.definition().limits(term, &allowed)
@@ -326,17 +330,17 @@ impl Model {
         let mut push = |key: Key, input: Input, own: bool| {
             columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
         };
-        if nominal.holds(EffectName::ViscousFriction) {
+        if nominal.has(NominalTerm::Viscous) {
             push(Key::Viscous, Input::Held(track.v.iter().map(|v| -v).collect()), false);
         }
-        if nominal.holds(EffectName::CoulombFriction) {
+        if nominal.has(NominalTerm::Coulomb) {
             push(Key::Coulomb, Input::Held(direction.iter().map(|s| -s).collect()), false);
         }
         push(Key::Offset, Input::Held(vec![1.0; track.blocks()]), true);
-        if let (true, Some(tilt)) = (nominal.holds(EffectName::TiltGravity), &track.tilt) {
+        if let (true, Some(tilt)) = (nominal.has(NominalTerm::Weight), &track.tilt) {
             push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
         }
-        if nominal.rig.model.gravity.is_some_and(|x| x != 0.0) {
+        if nominal.has(NominalTerm::Gravity) {
             let zero = nominal.rig.model.gravity_zero.unwrap_or(0.0) - track.origin;
             push(Key::Gravity, Input::Held(track.x.iter().map(|x| -(x - zero).sin()).collect()), false);
         }

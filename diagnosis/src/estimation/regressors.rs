@@ -1,6 +1,7 @@
 //! What one effect puts into a recording: the inputs of its terms. Nothing here is fitted.
 
-use crate::effects::{Effect, EffectName, Law, State, Variable};
+use crate::effects::definition::Coupling;
+use crate::effects::{Effect, Law, State, Variable};
 use crate::estimation::blocked_recording::{BlockedRecording, Input};
 
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
@@ -12,12 +13,13 @@ pub(crate) fn effect_inputs(
     bias: f64,
     drive: impl FnOnce() -> Input,
 ) -> Vec<Input> {
-    if effect.name == EffectName::MissedCounts {
+    let definition = effect.name.definition();
+    if definition.is_of_jumps() {
         return vec![Input::Sensor(track.lost.clone())];
     }
     let Some(mut law) = Law::new(effect) else { return Vec::new() };
-    if effect.name.definition().is_second_mass() {
-        return vec![of_second_mass(track, effect, &mut law, command, bias)];
+    if let Some(coupling) = definition.coupling() {
+        return vec![of_second_mass(track, coupling, &mut law, command, bias)];
     }
     let count = law.names().len();
     let n = track.blocks();
@@ -26,7 +28,7 @@ pub(crate) fn effect_inputs(
     let of_drive = effect.shape.contains_key("of_drive");
     let uses_command = over_command || of_drive || effect.shape.contains_key("mean_square");
     let carried = uses_command.then(|| track.block_mean(command));
-    let scales_drive = effect.name.definition().scales_drive();
+    let scales_drive = definition.scales_drive();
     let mut columns = vec![Vec::with_capacity(n); count];
     let mut out = vec![0.0; count];
     for j in 0..n {
@@ -68,12 +70,15 @@ pub(crate) fn effect_inputs(
 /// What a second mass does is faster than a block.
 fn of_second_mass(
     track: &BlockedRecording,
-    effect: &Effect,
+    coupling: Coupling,
     law: &mut Law,
     command: &[f64],
     bias: f64,
 ) -> Input {
-    let slices = if effect.name == EffectName::RollerSlip { &track.of_grip } else { &track.of_contact };
+    let slices = match coupling {
+        Coupling::Grip => &track.of_grip,
+        Coupling::Stiff => &track.of_contact,
+    };
     let mut out = [0.0];
     let mut signal = Vec::new();
     for (j, slices) in slices.blocks().enumerate() {

@@ -275,13 +275,10 @@ impl Rig {
 
     /// The delay and the lag between command and force that the rig already knows.
     pub(crate) fn known_command_laws(&self) -> Vec<CommandLaw> {
-        let law = |name, key: &str, value: Option<f64>| {
-            let value = value.filter(|x| *x > 0.0)?;
-            CommandLaw::new(&Effect::shaped(name, &[(key, value)]))
-        };
-        let delay = law(EffectName::CommandDelay, "delay", self.actuator.delay_s);
-        let lag = law(EffectName::ElectricalLag, "time_constant", self.actuator.lag_s);
-        [delay, lag].into_iter().flatten().collect()
+        let positive = |value: Option<f64>| value.filter(|x| *x > 0.0);
+        let delay = positive(self.actuator.delay_s).map(CommandLaw::of_delay);
+        let lag = positive(self.actuator.lag_s).map(CommandLaw::of_lag);
+        delay.into_iter().chain(lag).collect()
     }
 
     /// Relative standard deviation of the inertia.

@@ -1,6 +1,7 @@
 //! A rig for other simulators. What a format cannot say stands in the file as a note; nothing is left out in silence.
 
-use crate::effects::{Effect, EffectName};
+use crate::effects::Effect;
+use crate::effects::joint_terms::JointTerms;
 use crate::io::rig::{Kind, Rig};
 use std::fmt::Write as _;
 
@@ -45,24 +46,6 @@ pub fn export(rig: &Rig, format: Format) -> String {
     }
 }
 
-/// A rig in the terms of a joint and its motor.
-struct Joint {
-    inertia: f64,
-    viscous: f64,
-    dry: f64,
-    /// Force that is there all the time.
-    bias: f64,
-    stiffness: f64,
-    /// Where the spring is slack, from the start.
-    slack: f64,
-    gain: f64,
-    limit: Option<f64>,
-    delay: f64,
-    lag: f64,
-    /// What a joint and its motor cannot say.
-    notes: Vec<String>,
-}
-
 /// Numbers of an effect, for a note.
 fn numbers(effect: &Effect) -> String {
     if let Some(formula) = effect.name.formula() {
@@ -74,74 +57,43 @@ fn numbers(effect: &Effect) -> String {
     all.map(|(key, value)| format!("{key} {value:.6e}")).collect::<Vec<_>>().join(", ")
 }
 
-impl Joint {
-    fn new(rig: &Rig) -> Self {
-        use EffectName as N;
-        let model = &rig.model;
-        let mut joint = Self {
-            inertia: model.inertia,
-            viscous: model.viscous.unwrap_or(0.0),
-            dry: model.coulomb.unwrap_or(0.0),
-            bias: model.offset.unwrap_or(0.0),
-            stiffness: 0.0,
-            slack: 0.0,
-            gain: rig.actuator.gain,
-            limit: rig.actuator.limit,
-            delay: rig.actuator.delay_s.unwrap_or(0.0),
-            lag: rig.actuator.lag_s.unwrap_or(0.0),
-            notes: Vec::new(),
-        };
-        if let Some(weight) = model.weight.filter(|w| *w != 0.0) {
-            joint.notes.push(format!(
-                "weight {weight:.6e} {} times the sine of the tilt: add it as an applied force, or tilt the joint under gravity",
-                rig.kind.force()
-            ));
-        }
-        if let Some(gravity) = model.gravity.filter(|g| *g != 0.0) {
-            joint.notes.push(format!(
-                "gravity {gravity:.6e} {} times the sine of the angle from {:.6e} rad: add it as an applied force, or hang a mass on the joint",
-                rig.kind.force(),
-                model.gravity_zero.unwrap_or(0.0)
-            ));
-        }
-        if let Some(filter) = rig.encoder.filter_s.filter(|s| *s > 0.0) {
-            joint.notes.push(format!("the position is read behind a first-order filter of {filter:.6e} s"));
-        }
-        for effect in &rig.effects {
-            let of = |key: &str| effect.coefficient(key);
-            match effect.name {
-                N::ViscousFriction => joint.viscous += of("viscous"),
-                N::CoulombFriction => joint.dry += of("coulomb"),
-                N::AsymmetricFriction => {
-                    // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
-                    joint.bias -= of("coulomb_difference");
-                    if of("viscous_difference") != 0.0 {
-                        joint.notes.push(format!(
-                            "asymmetric_friction: viscous friction is {:.6e} forward and {:.6e} backward; damping holds their mean",
-                            joint.viscous + of("viscous_difference"),
-                            joint.viscous - of("viscous_difference")
-                        ));
-                    }
-                }
-                N::PositionSpring
-                    if effect.shape_or("fades_s", f64::INFINITY).is_infinite()
-                        && effect.shape_or("one_sided", 0.0) < 0.5 =>
-                {
-                    joint.stiffness += of("stiffness");
-                    joint.slack = effect.shape_or("from", 0.0);
-                    joint.bias += of("preload");
-                }
-                N::CommandDelay => joint.delay += effect.shape_or("delay", 0.0),
-                N::ElectricalLag => joint.lag += effect.shape_or("time_constant", 0.0),
-                N::CommandSaturation => {
-                    let clip = effect.shape_or("limit", f64::INFINITY);
-                    joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
-                }
-                name => joint.notes.push(format!("{name} ({}): {}", name.in_words(), numbers(effect))),
-            }
-        }
-        joint
+/// A rig in the terms of a joint and its motor.
+fn joint_of(rig: &Rig) -> JointTerms {
+    let model = &rig.model;
+    let mut joint = JointTerms {
+        inertia: model.inertia,
+        viscous: model.viscous.unwrap_or(0.0),
+        dry: model.coulomb.unwrap_or(0.0),
+        bias: model.offset.unwrap_or(0.0),
+        gain: rig.actuator.gain,
+        limit: rig.actuator.limit,
+        delay: rig.actuator.delay_s.unwrap_or(0.0),
+        lag: rig.actuator.lag_s.unwrap_or(0.0),
+        ..JointTerms::default()
+    };
+    if let Some(weight) = model.weight.filter(|w| *w != 0.0) {
+        joint.notes.push(format!(
+            "weight {weight:.6e} {} times the sine of the tilt: add it as an applied force, or tilt the joint under gravity",
+            rig.kind.force()
+        ));
     }
+    if let Some(gravity) = model.gravity.filter(|g| *g != 0.0) {
+        joint.notes.push(format!(
+            "gravity {gravity:.6e} {} times the sine of the angle from {:.6e} rad: add it as an applied force, or hang a mass on the joint",
+            rig.kind.force(),
+            model.gravity_zero.unwrap_or(0.0)
+        ));
+    }
+    if let Some(filter) = rig.encoder.filter_s.filter(|s| *s > 0.0) {
+        joint.notes.push(format!("the position is read behind a first-order filter of {filter:.6e} s"));
+    }
+    for effect in &rig.effects {
+        let name = effect.name;
+        if !name.definition().add_to_joint(effect, &mut joint) {
+            joint.notes.push(format!("{name} ({}): {}", name.in_words(), numbers(effect)));
+        }
+    }
+    joint
 }
 
 /// Text that may stand in XML, and in its comments.
@@ -153,7 +105,7 @@ fn xml(text: &str) -> String {
         .replace("--", "– ")
 }
 
-fn notes(out: &mut String, joint: &Joint) {
+fn notes(out: &mut String, joint: &JointTerms) {
     for note in &joint.notes {
         let _ = writeln!(out, "  <!-- not in this file: {} -->", xml(note));
     }
@@ -163,7 +115,7 @@ fn notes(out: &mut String, joint: &Joint) {
 const TIMESTEP_S: f64 = 2e-4;
 
 fn mjcf(rig: &Rig) -> String {
-    let joint = Joint::new(rig);
+    let joint = joint_of(rig);
     let mut out = String::new();
     let _ = writeln!(out, "<mujoco model=\"{}\">", xml(&rig.name));
     let _ = writeln!(
@@ -219,7 +171,7 @@ fn mjcf(rig: &Rig) -> String {
 }
 
 fn urdf(rig: &Rig) -> String {
-    let mut joint = Joint::new(rig);
+    let mut joint = joint_of(rig);
     let unit = rig.kind.force();
     joint.notes.push(format!(
         "the drive gives {:.6e} {unit} for one {} of command",
@@ -255,7 +207,7 @@ fn urdf(rig: &Rig) -> String {
 }
 
 fn json(rig: &Rig) -> String {
-    let joint = Joint::new(rig);
+    let joint = joint_of(rig);
     let value = serde_json::json!({
         "format": 1,
         "rig": rig,

@@ -1,6 +1,5 @@
 //! What an effect becomes: the entry of the patched rig, and the place where it acts.
 
-use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Key, total};
 use crate::io::rig::Rig;
@@ -41,15 +40,14 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
     let theta = last.fit.theta(0);
     for (index, effect) in last.model.effects.iter().enumerate() {
         let mut effect = effect.clone();
-        if effect.name == EffectName::MissedCounts {
+        let definition = effect.name.definition();
+        if definition.is_of_jumps() {
             // The steps of the recording with the most, as they happened.
             let steps = |track: &&BlockedRecording| track.lost.windows(2).filter(|w| w[0] != w[1]).count();
             let track = s.fit_tracks.iter().max_by_key(steps).expect("something was fitted");
-            for (i, w) in track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]) {
-                let n = effect.shape.len() + 1;
-                effect.shape.insert(format!("time_{n}"), track.start[i + 1]);
-                effect.coefficients.insert(format!("step_{n}"), w[1] - w[0]);
-            }
+            let jumped = track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
+            let jumps: Vec<_> = jumped.map(|(i, w)| (track.start[i + 1], w[1] - w[0])).collect();
+            definition.put_jumps(&mut effect, &jumps);
         } else if let Some(law) = crate::effects::Law::new(&effect) {
             for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
                 let Key::Term { effect: e, term } = column.key else { continue };
@@ -57,11 +55,9 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
                     continue;
                 }
                 let name = law.names()[term].clone();
-                let definition = effect.name.definition();
-                let drive = definition.scales_drive() || effect.name == EffectName::DriveCompliance;
                 let unit = if law.in_sensor() {
                     1.0
-                } else if drive {
+                } else if definition.is_relative_to_gain() {
                     1.0 / ratio
                 } else {
                     inertia

@@ -1,6 +1,6 @@
 //! Which shapes of each effect are worth trying on given recordings: the grids from which refinement starts.
 
-use crate::effects::definition::{Believed, Movable, Span};
+use crate::effects::definition::{Believed, Movable, NominalTerm, Span};
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Nominal;
@@ -67,8 +67,8 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
             axis_turn: (nominal.rig.kind == Kind::Rotary).then_some(TAU),
             has_stroke: true,
             has_offset: nominal.rig.model.offset.is_some(),
-            has_viscous: nominal.holds(N::ViscousFriction),
-            has_gravity: nominal.holds(N::TiltGravity) && tilt_is_angle(tracks),
+            has_viscous: nominal.has(NominalTerm::Viscous),
+            has_gravity: nominal.has(NominalTerm::Weight) && tilt_is_angle(tracks),
             is_anchored: nominal.anchor.is_some(),
             dry: machine.dry,
             per_command: machine.per_command,
@@ -127,10 +127,10 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
         })
 }
 
-/// Part of the travel over which bristles bend, where that is more than bristles do: such a spring creeps.
+/// Part of the travel over which an effect gives way after a reversal, where that is more than bristles do: such a spring creeps.
 pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
-    let part = effect.shape_or("deflection", 0.0) / span.travel();
-    (effect.name == N::PreslidingFriction && part > BRISTLES).then_some(part)
+    let part = effect.name.definition().gives_way_over(effect)? / span.travel();
+    (part > BRISTLES).then_some(part)
 }
 
 #[cfg(test)]

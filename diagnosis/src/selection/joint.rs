@@ -1,7 +1,7 @@
 //! The search for the joint between a motor and its load: the values of its law go together, have many optima, and lean on
 //! the rest of the machine. What is here moves shapes; it chooses between no effects.
 
-use crate::effects::{Effect, EffectName as N};
+use crate::effects::Effect;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::model::{Machine, Model};
@@ -27,23 +27,10 @@ fn ends_in_joint(model: &Model) -> bool {
     model.effects.last().is_some_and(is_joint)
 }
 
-/// Factors on the values of a shape that go together, to look for its optimum elsewhere.
-fn factors(name: N) -> &'static [(&'static str, &'static [f64])] {
-    match name {
-        N::RollerSlip => &[
-            ("limit", &[0.72, 0.85, 1.0, 1.2]),
-            ("coast", &[0.6, 0.8, 1.0, 1.3]),
-            ("ratio", &[0.6, 1.0, 1.7]),
-        ],
-        N::Backlash => &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])],
-        _ => &[],
-    }
-}
-
 /// Models with the shape of the last effect at every combination of its factors.
 fn elsewhere(context: &FitContext, model: &Model) -> Vec<Model> {
     let last = model.effects.len() - 1;
-    let factors = factors(model.effects[last].name);
+    let factors = model.effects[last].name.definition().start_factors();
     let movable = candidates::movable(&model.effects[last], context.span);
     let mut out = vec![model.clone()];
     for (key, factors) in factors {

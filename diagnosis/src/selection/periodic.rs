@@ -62,7 +62,8 @@ pub(crate) fn search(
     let drives: Vec<Option<Input>> = tracks
         .iter()
         .map(|track| {
-            (name == N::TorqueRipple)
+            name.definition()
+                .scales_drive()
                 .then(|| track.drive(effective_command(track, &model.effects).as_deref()))
         })
         .collect();
@@ -117,19 +118,18 @@ pub(crate) fn search(
         .collect();
     let sums = project(fit, residuals, &joined, true);
     let (chosen, gain) = forward(&sums, refined.len(), tracks.len(), (orders.len() as f64).ln());
-    if chosen.is_empty() || (whole && name == N::Cogging && chosen.iter().all(|i| refined[*i] == 1.0)) {
-        // Once per turn and nothing else is an off-centre mass.
+    let orders: Vec<f64> = chosen.iter().map(|i| refined[*i]).collect();
+    if orders.is_empty() || (whole && !name.definition().is_of_orders(&orders)) {
         return None;
     }
     let mut shape: Vec<(String, f64)> = Vec::new();
     if whole {
         shape.push(("turn".into(), turn));
-        for index in &chosen {
-            let order = refined[*index];
+        for order in orders {
             shape.push((format!("order_{order}"), order));
         }
     } else {
-        let mut periods: Vec<f64> = chosen.iter().map(|index| turn / refined[*index]).collect();
+        let mut periods: Vec<f64> = orders.iter().map(|order| turn / order).collect();
         periods.sort_by(f64::total_cmp);
         for (i, period) in periods.iter().enumerate() {
             shape.push((format!("period_{}", i + 1), *period));

@@ -1,6 +1,6 @@
 //! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
 
-use crate::effects::definition::Span;
+use crate::effects::definition::{NominalTerm, Span};
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
@@ -116,12 +116,13 @@ impl FitContext<'_> {
     ) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
         let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
-        let dry = self.nominal.holds(N::CoulombFriction) || there(N::CoulombFriction);
+        let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
+        let dry = self.nominal.has(NominalTerm::Coulomb) || now.model.effects.iter().any(is_dry);
         let no_losses = self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0));
         let best_of = |name: &N| -> Option<(Effect, f64)> {
             if there(*name)
                 || (name.definition().needs_dry() && !dry)
-                || (*name == N::MissedCounts && no_losses)
+                || (name.definition().is_of_jumps() && no_losses)
                 || !wanted(*name)
             {
                 return None;

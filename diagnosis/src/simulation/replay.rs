@@ -2,7 +2,6 @@
 //! reference. The command is held from row to row, as the contract has it.
 
 use super::{Motion, Plant, PositionLoop, Surroundings};
-use crate::effects::EffectName;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 
@@ -242,9 +241,6 @@ impl<'a> Beside<'a> {
 
 /// The travel after which a rig's periodic effects come again; none where it has none.
 fn period(rig: &Rig) -> Option<f64> {
-    use EffectName as N;
-    let periodic =
-        |name: N| matches!(name, N::Cogging | N::TorqueRipple | N::MassImbalance | N::EncoderEccentricity);
     let longest = |effect: &crate::effects::Effect| {
         let slowest =
             effect.waves().iter().map(|wave| wave.1.abs()).filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
@@ -253,7 +249,7 @@ fn period(rig: &Rig) -> Option<f64> {
     let of_waves = rig
         .effects
         .iter()
-        .filter(|e| periodic(e.name))
+        .filter(|e| e.name.definition().has_own_phase())
         .map(longest)
         .filter(|p| p.is_finite())
         .fold(0.0, f64::max);

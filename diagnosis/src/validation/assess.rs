@@ -2,6 +2,7 @@
 //! takes from a true effect what speaks for it.
 
 use crate::effects::EffectName;
+use crate::effects::definition::Definition;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
@@ -85,13 +86,14 @@ impl Assessment {
 
     /// Whether it is one of two drifts that are one of the inertia.
     fn drifts_alike(&self, assessed: &Assessed) -> bool {
-        let change = |name: EffectName| {
-            let drift = self.effects.iter().find(|e| e.found.effect.name == name)?;
-            Some(drift.parameters.get("change")?.value)
+        let definition = |assessed: &Assessed| assessed.found.effect.name.definition();
+        let change = |is_of: fn(&dyn Definition) -> bool| {
+            let is_drift = |e: &&Assessed| definition(e).drifts() && is_of(definition(e));
+            Some(self.effects.iter().find(is_drift)?.parameters.get("change")?.value)
         };
-        let [gain, friction] = [EffectName::GainDrift, EffectName::FrictionDrift];
-        [gain, friction].contains(&assessed.found.effect.name)
-            && change(gain).zip(change(friction)).is_some_and(|(gain, friction)| are_alike(gain, friction))
+        let (gain, friction) = (change(|of| of.scales_drive()), change(|of| of.needs_dry()));
+        definition(assessed).drifts()
+            && gain.zip(friction).is_some_and(|(gain, friction)| are_alike(gain, friction))
     }
 
     fn stands_for_swing(&self) -> bool {
@@ -156,8 +158,7 @@ fn same_joint(
     (name, gain): (EffectName, f64),
     mut all: impl Iterator<Item = (EffectName, f64)>,
 ) -> Option<EffectName> {
-    let of_joint =
-        |name| matches!(name, EffectName::Backlash | EffectName::DriveCompliance | EffectName::RollerSlip);
+    let of_joint = |name: EffectName| name.definition().coupling().is_some();
     let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }

@@ -3,7 +3,6 @@
 //! `prove --calibrate` finds such weights from the evidence that reports carry. The seeds that they come from may not
 //! judge.
 
-use crate::effects::EffectName as N;
 use crate::thresholds::{
     BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS,
 };
@@ -32,13 +31,14 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     // What is left and is hardly more than nothing beside the force says little.
     let of_force = log(left.of_force / LEFT_OF_FORCE.0, 1.0, LEFT_OF_FORCE.1 / LEFT_OF_FORCE.0);
     let share = log(found.share, least_share, 1.0);
+    let bends = found.effect.name.definition().bends_at_reversals();
     [
         ("least_z", log(found.least_z(), UNLIKELY_Z, SUREST_Z)),
         ("share", share),
         ("unexplained", unexplained),
         ("unexplained_of_force", unexplained * of_force),
-        // They bend to the little that any model leaves next to reversals.
-        ("share_of_bristles", if found.effect.name == N::PreslidingFriction { share } else { 0.0 }),
+        // What bends to the little that any model leaves next to reversals must take more of it.
+        ("share_of_bristles", if bends { share } else { 0.0 }),
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .into()

@@ -36,10 +36,10 @@ pub(crate) struct EffectEvidence {
 }
 
 impl EffectEvidence {
-    /// Whether it predicts surely, however few moments it acts in. Bristles bend to what any model leaves next to reversals, and
-    /// reach that on recordings in which there is nothing.
+    /// Whether it predicts surely, however few moments it acts in. What bends to what any model leaves next to reversals
+    /// reaches that on recordings in which there is nothing.
     fn predicts(&self) -> bool {
-        self.effect.name != EffectName::PreslidingFriction && self.score_z >= SURE_Z
+        !self.effect.name.definition().bends_at_reversals() && self.score_z >= SURE_Z
     }
 
     /// Whether it stands out of every stretch of the held-out recordings and surely of the others, however little it explains
@@ -82,7 +82,7 @@ impl EffectEvidence {
 
     /// Whether each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
     fn comes_in_events(&self) -> bool {
-        self.effect.name == EffectName::MissedCounts
+        self.effect.name.definition().is_of_jumps()
     }
 
     /// Whether it is nearly all that was left out and as large on every recording, or most of it and hardly differs between

@@ -83,12 +83,12 @@ pub(crate) fn judge_all(
                 sizes_on(&estimator, context.tracks, &left_fitted, &less_fitted),
                 sizes_on(&estimator, holdout, &left_held_out, &less_held_out),
             );
-            // Bristles without damping are bristles all the same.
-            let counts = |term: usize| effect.name != EffectName::PreslidingFriction || term == 0;
+            let definition = effect.name.definition();
             let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
-            let is_bound = ends.any(
-                |((key, _), _)| matches!(key, Key::Term { effect, term } if *effect == i && counts(*term)),
-            );
+            let is_bound = ends.any(|((key, _), _)| match key {
+                Key::Term { effect, term } => *effect == i && definition.is_in_doubt_at_limit(*term),
+                _ => false,
+            });
             let at_bound = is_bound
                 || candidates::is_at_end(&effect, context.span)
                 || drifts_too_far(&last.fit, i, effect.name);
@@ -139,7 +139,9 @@ fn score_z_of(
 
 /// Whether more of the dry friction goes or comes with time than warming explains.
 fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
-    let dry = fit.value(Key::Coulomb).filter(|dry| name == EffectName::FrictionDrift && *dry > 0.0);
+    let definition = name.definition();
+    let drifts = definition.drifts() && definition.needs_dry();
+    let dry = fit.value(Key::Coulomb).filter(|dry| drifts && *dry > 0.0);
     let change = fit.value(Key::Term { effect, term: 0 });
     dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }

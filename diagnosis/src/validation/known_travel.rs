@@ -1,6 +1,6 @@
 //! What held-out recordings may judge: a law of the travel says nothing of travel where no fitted recording has been.
 
-use crate::effects::EffectName as N;
+use crate::effects::Effect;
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
@@ -16,11 +16,11 @@ pub(crate) fn known<'a>(
     model: &Model,
     span: &Span,
 ) -> Cow<'a, [BlockedRecording]> {
-    let follows = |name| matches!(name, N::PositionDependentFriction | N::PositionDependentDamping);
+    let follows = |effect: &Effect| effect.name.definition().follows_travel();
     let reach = BEYOND * span.travel();
     let is_unknown = |x: &f64| *x < span.low - reach || *x > span.high + reach;
     let goes_beyond = |track: &BlockedRecording| track.x.iter().any(is_unknown);
-    if !model.effects.iter().any(|effect| follows(effect.name)) || !tracks.iter().any(goes_beyond) {
+    if !model.effects.iter().any(follows) || !tracks.iter().any(goes_beyond) {
         return Cow::Borrowed(tracks);
     }
     let mut tracks = tracks.to_vec();
@@ -64,7 +64,7 @@ pub(crate) fn beyond(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Effect;
+    use crate::effects::EffectName as N;
     use crate::estimation::model::Nominal;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;

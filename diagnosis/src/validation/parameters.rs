@@ -1,6 +1,6 @@
 //! From coefficients to the numbers of the report: values in the rig's units with intervals, by the contract's names.
 
-use crate::effects::definition::{Fitted, Reported};
+use crate::effects::definition::{Fitted, NominalTerm, Reported};
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Key, Nominal};
@@ -129,9 +129,10 @@ pub(crate) fn parameters(
         .filter(|((column, _), _)| matches!(column.key, Key::Term { effect: e, .. } if e == effect))
         .map(|((_, place), theta)| (*theta, covariance.at(*place, *place).max(0.0).sqrt()))
         .collect();
-    let friction = |key: Key, name: N| {
+    let friction = |key: Key, term: NominalTerm| {
         fit.value(key).or_else(|| {
-            let other = candidate.model.effects.iter().position(|e| e.name == name)?;
+            let is_same = |e: &Effect| e.name.definition().nominal_term() == Some(term);
+            let other = candidate.model.effects.iter().position(is_same)?;
             fit.value(Key::Term { effect: other, term: 0 })
         })
     };
@@ -143,8 +144,8 @@ pub(crate) fn parameters(
         inertia,
         common,
         ratio,
-        viscous: friction(Key::Viscous, N::ViscousFriction),
-        dry: friction(Key::Coulomb, N::CoulombFriction),
+        viscous: friction(Key::Viscous, NominalTerm::Viscous),
+        dry: friction(Key::Coulomb, NominalTerm::Coulomb),
         own_dry: fit.value(Key::Coulomb).unwrap_or(0.0),
         lost: context.tracks.iter().map(lost).sum::<f64>() * nominal.rig.encoder.counts_per_unit,
         force: kind.force(),

@@ -103,8 +103,9 @@ fn find_steps(
             return None;
         }
         asked = Asked::KNOWN;
-        let model =
-            Model { effects: vec![Effect::shaped(EffectName::MissedCounts, &[])], ..Model::default() };
+        let of_jumps = EffectName::ALL.iter().filter(|name| name.definition().is_of_jumps());
+        let effects = of_jumps.map(|name| Effect::shaped(*name, &[])).collect();
+        let model = Model { effects, ..Model::default() };
         let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
         noise = crate::estimation::noise::estimate(tracks, &totals, &noise, scale, Colour::White);
     }
@@ -137,15 +138,6 @@ struct Next {
     generalises: bool,
 }
 
-/// Forces that any machine may have, looked for together before anything else: neither of two may show without the other.
-const PLAIN: [EffectName; 6] = [
-    EffectName::CoulombFriction,
-    EffectName::ViscousFriction,
-    EffectName::TiltGravity,
-    EffectName::MassImbalance,
-    EffectName::AsymmetricFriction,
-    EffectName::PositionSpring,
-];
 /// Most plain forces taken together.
 const PLAIN_TOGETHER: usize = 3;
 /// Part of what the best of all effects gains that plain friction and weight must gain to be taken before it, and that
@@ -153,15 +145,15 @@ const PLAIN_TOGETHER: usize = 3;
 const PLAIN_ENOUGH: f64 = 0.6;
 const PLAIN_NEARLY_ALL: f64 = 0.9;
 
-/// Sets of plain forces that the rig does not hold, as models.
+/// Sets of forces that any machine may have and the rig does not hold, as models. They are looked for together before anything
+/// else: neither of two may show without the other.
 fn plain_sets(on: &FitContext) -> Vec<Model> {
-    let shapes = PLAIN.iter().flat_map(|name| {
-        let all = candidates::shapes(*name, on.span, on.nominal);
-        let two_sided = all.into_iter().filter(|effect| effect.shape_or("one_sided", 0.0) < 0.5);
-        two_sided.collect::<Vec<_>>()
-    });
+    let all = EffectName::ALL.iter().flat_map(|name| candidates::shapes(*name, on.span, on.nominal));
+    let ranked = |effect: Effect| Some((effect.name.definition().plain(&effect)?.rank, effect));
+    let mut plain: Vec<(u8, Effect)> = all.filter_map(ranked).collect();
+    plain.sort_by_key(|(rank, _)| *rank);
     let mut sets: Vec<Vec<Effect>> = vec![Vec::new()];
-    for effect in shapes {
+    for (_, effect) in plain {
         let with = |set: &Vec<Effect>| {
             let fits = set.len() < PLAIN_TOGETHER && set.iter().all(|other| other.name != effect.name);
             fits.then(|| set.iter().chain([&effect]).cloned().collect::<Vec<_>>())
@@ -190,12 +182,7 @@ fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Ne
     }
     fitted.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     for white in fitted {
-        let has_twin = |effect: &Effect| {
-            !matches!(
-                effect.name,
-                EffectName::CoulombFriction | EffectName::ViscousFriction | EffectName::TiltGravity
-            )
-        };
+        let has_twin = |effect: &Effect| effect.name.definition().plain(effect).is_some_and(|it| it.has_twin);
         let enough = if white.model.effects.iter().any(has_twin) { PLAIN_NEARLY_ALL } else { PLAIN_ENOUGH };
         let gain = white.merit - now.white.merit;
         if gain < MIN_LOG_LIKELIHOOD_GAIN || gain < enough * best {

@@ -1,0 +1,24 @@
+//! A machine in the terms of other simulators: one joint and its motor. Each effect adds what such terms can say of it.
+
+/// A joint and its motor; N·m and rad, or N and m.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct JointTerms {
+    /// Inertia, kg·m² or kg.
+    pub(crate) inertia: f64,
+    /// Force per speed, dry friction, and a force that is there all the time.
+    pub(crate) viscous: f64,
+    pub(crate) dry: f64,
+    pub(crate) bias: f64,
+    /// Force per travel of a spring, and where it is slack, from the start.
+    pub(crate) stiffness: f64,
+    pub(crate) slack: f64,
+    /// Force per unit of command.
+    pub(crate) gain: f64,
+    /// Largest |command| that is applied, where there is a limit, in units of command.
+    pub(crate) limit: Option<f64>,
+    /// Time between command and force, and time constant of their first-order lag, s.
+    pub(crate) delay: f64,
+    pub(crate) lag: f64,
+    /// What a joint and its motor cannot say.
+    pub(crate) notes: Vec<String>,
+}
