@@ -1,6 +1,9 @@
 //! What goes wrong takes torque away in time, is reported, and stays until a person starts again.
 
-use control_core::event::Fault;
+use control_core::Config;
+use control_core::event::{Fault, Limits};
+use control_core::units::MillinewtonMetres;
+use fixed::types::I16F16;
 use link::Command;
 use link::frames::EventKind;
 use tests::board::tilt::{Health, Model};
@@ -268,4 +271,38 @@ fn nothing_drives_the_motor_before_the_first_tick_after_a_reset() {
         stopped.log().put_out.iter().filter(|output| output.at > since).map(|output| output.code).collect()
     });
     assert!(codes.iter().all(|&code| code == tests::rig::ZERO_TORQUE), "{codes:?}");
+}
+
+#[test]
+fn the_motors_heat_outlives_a_reset() {
+    let mut rig = Rig::pressed();
+    rig.pc.must(&mut rig.board, Command::Stop);
+    let mut config = Config::default();
+    config.device.limits.continuous_torque = MillinewtonMetres(I16F16::const_from_int(3));
+    rig.pc.configure(&mut rig.board, &config);
+    rig.pc.must(&mut rig.board, Command::Start);
+    let is_held_down =
+        |rig: &Rig| rig.pc.heard.pose.as_ref().is_some_and(|pose| pose.limits.contains(Limits::THERMAL));
+    let from_cold_ms = (0..100).map(|step| 100 * step).find(|_| {
+        rig.pc.run_ms(&mut rig.board, 100);
+        is_held_down(&rig)
+    });
+    let from_cold_ms = from_cold_ms.expect("the winding warms");
+    report("thermal limit from cold", from_cold_ms * MILLISECOND);
+    assert!(
+        from_cold_ms >= 1_500,
+        "a cold motor takes longer than what follows the reset: {from_cold_ms} ms"
+    );
+
+    rig.board.at_stop(|stopped| stopped.reset_by_pin());
+    rig.board.run_ms(20);
+    rig.pc.connect(&mut rig.board);
+    rig.pc.must(&mut rig.board, Command::Zero);
+    let now = rig.board.now();
+    let hand = plant::path(vec![(now, PRESSED), (now + 100 * MILLISECOND, 2 * PRESSED)]);
+    rig.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::by_hand(hand))));
+    rig.pc.run_ms(&mut rig.board, 200);
+    rig.pc.must(&mut rig.board, Command::Start);
+    rig.pc.run_ms(&mut rig.board, 500);
+    assert!(is_held_down(&rig), "the motor is as warm as before: {:?}", rig.pc.heard.pose);
 }
