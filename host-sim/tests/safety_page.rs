@@ -1,0 +1,50 @@
+//! docs/safety.md names tests: each is where it says.
+
+use std::path::Path;
+
+/// What stands between backquotes in a line.
+fn quoted(line: &str) -> impl Iterator<Item = &str> {
+    line.split('`').skip(1).step_by(2)
+}
+
+/// The names of tests in a line, each with its file: the one before it in the line, or else `of_table`.
+fn named<'a>(line: &'a str, of_table: Option<&'a str>) -> Vec<(&'a str, &'a str)> {
+    let mut file = of_table;
+    let mut out = Vec::new();
+    for word in quoted(line) {
+        if word.ends_with(".rs") {
+            file = Some(word);
+        } else if let Some(file) = file.filter(|_| word.chars().all(|c| c.is_ascii_lowercase() || c == '_')) {
+            out.push((file, word));
+        }
+    }
+    out
+}
+
+#[test]
+fn every_test_that_the_page_names_is_there() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");
+    let page = std::fs::read_to_string(top.join("docs/safety.md")).expect("the page");
+    // Within a table: the file that its head names, if it does.
+    let (mut table, mut seen): (Option<Option<&str>>, u32) = (None, 0);
+    for line in page.lines() {
+        if !line.starts_with('|') {
+            table = None;
+            continue;
+        }
+        let Some(of_table) = table else {
+            table = Some(quoted(line).find(|word| word.ends_with(".rs")));
+            continue;
+        };
+        for (file, test) in named(line, of_table) {
+            let source = std::fs::read_to_string(top.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+            let is_test = source.split("#[test]").skip(1).any(|after| {
+                let head = after.split('{').next().unwrap_or_default();
+                head.contains(&format!("fn {test}("))
+            });
+            assert!(is_test, "{file} has no test `{test}`");
+            seen += 1;
+        }
+    }
+    assert!(seen > 45, "only {seen} tests were seen: the reader of the page is blind");
+}
