@@ -22,7 +22,7 @@ pub mod plant;
 pub mod procedure;
 #[path = "../../host-sim/src/profile/mod.rs"]
 pub mod profile;
-#[path = "../../host-sim/src/session.rs"]
+#[path = "../../host-sim/src/session/mod.rs"]
 pub mod session;
 
 /// The virtual device.

@@ -1,0 +1,126 @@
+//! What a picture needs to know before anything moves, and what people call its parts. Nothing here changes while it runs.
+
+use control_core::config::Tissue;
+use control_core::event::{State, VesselState};
+use serde::Serialize;
+
+/// What a picture needs to know before anything moves. Layers lie in the body: their depths are perpendicular to the skin.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scene {
+    /// Where the samples come from.
+    pub source: Source,
+    /// Name of the profile.
+    pub profile: String,
+    /// Name of the scripted procedure, where a hand follows one.
+    pub procedure: Option<String>,
+    /// The tissue, outermost layer first.
+    pub layers: Vec<SceneLayer>,
+    /// Radius of the roller in mm.
+    pub roller_radius_mm: f64,
+    /// Largest depth along the needle in mm.
+    pub travel_mm: f64,
+    /// Largest force at the roller in N.
+    pub largest_force_n: f64,
+    /// Inclination below the horizontal that the procedure begins with, in rad.
+    pub tilt_rad: f64,
+    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is what is left of the tilt.
+    pub skin_tilt_rad: f64,
+    /// The vessel, where there is one with two walls.
+    pub vessel: Option<SceneVessel>,
+    /// Whether [`Control::Drag`], [`Control::Tilt`] and [`Control::Script`] do anything: only with the virtual device.
+    pub hand: bool,
+}
+
+/// Where samples come from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Source {
+    /// The control core against the plant.
+    Virtual,
+    /// A device behind a serial port.
+    Serial {
+        /// The port.
+        path: String,
+    },
+    /// A recording.
+    Recording {
+        /// The file.
+        file: String,
+    },
+}
+
+/// A tube with its axis level with the skin and along the way that the needle points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SceneVessel {
+    /// Depth of its axis, perpendicular to the skin, in mm.
+    pub axis_mm: f64,
+    /// Diameter perpendicular to the skin in mm.
+    pub height_mm: f64,
+    /// Diameter along the skin in mm.
+    pub width_mm: f64,
+    /// How far the needle's plane passes beside the axis in mm.
+    pub offset_mm: f64,
+}
+
+/// One layer of tissue.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneLayer {
+    /// What it is called.
+    pub name: String,
+    /// Whether it is the vessel that the procedure aims at.
+    pub is_vessel: bool,
+    /// Whether it begins with the vessel's far wall.
+    pub is_far_wall: bool,
+    /// Depth of its outer face in mm, perpendicular to the skin.
+    pub depth_mm: f64,
+    /// How far its wall is pushed in along the needle before it gives way, in mm, where it has one.
+    pub puncture_travel_mm: Option<f64>,
+    /// Part of that which is left when it has just given way, 0 to 1.
+    pub spring_back: Option<f64>,
+    /// Force at which its wall gives way in N, friction not counted.
+    pub puncture_force_n: Option<f64>,
+    /// Friction gained for each mm inside it, in N/mm.
+    pub friction_n_per_mm: f64,
+}
+
+/// What people call a tissue.
+pub fn tissue_name(tissue: Tissue) -> &'static str {
+    match tissue {
+        Tissue::Skin => "skin",
+        Tissue::Fat => "fat",
+        Tissue::Muscle => "muscle",
+        Tissue::Vessel => "vessel",
+        Tissue::Other => "other",
+        Tissue::Bursa => "bursa",
+        Tissue::Tendon => "tendon",
+        Tissue::Cartilage => "cartilage",
+        Tissue::FarWall => "far wall",
+    }
+}
+
+/// What programs call the place of the tip as seen from a vessel.
+pub fn vessel_name(code: u8) -> &'static str {
+    match VesselState::from_code(code) {
+        Some(VesselState::Outside) => "outside",
+        Some(VesselState::Touching) => "touching",
+        Some(VesselState::InLumen) => "in_lumen",
+        Some(VesselState::Through) => "through",
+        Some(VesselState::Beside) => "beside",
+        None => "unknown",
+    }
+}
+
+/// What people call a state of the device.
+pub fn state_name(code: u8) -> &'static str {
+    match State::from_code(code) {
+        Some(State::Idle) => "idle",
+        Some(State::Approach) => "approach",
+        Some(State::Elastic) => "elastic",
+        Some(State::Puncture) => "puncture",
+        Some(State::Friction) => "friction",
+        Some(State::Withdrawal) => "withdrawal",
+        Some(State::Excitation) => "excitation",
+        Some(State::Fault) => "fault",
+        None => "unknown",
+    }
+}
