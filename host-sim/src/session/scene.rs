@@ -27,7 +27,7 @@ pub struct Scene {
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
-    /// Whether [`Control::Drag`], [`Control::Tilt`] and [`Control::Script`] do anything: only with the virtual device.
+    /// Whether [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] do anything: only with the virtual device.
     pub hand: bool,
 }
 
