@@ -61,16 +61,13 @@ impl Profile {
         // Only with the rotor's angle is all of a compensation fed forward.
         pc.must(&mut board, Command::Index(Some(17)));
         pc.must(&mut board, begin);
-        let handler = board.symbols().iter().find(|symbol| symbol.name == TICK);
-        let handler = handler.expect("the image has the tick's handler").address;
-        board.probe().tally().handler = Some(handler);
+        board.count_runs_of(TICK);
         while board.now() < end {
             pc.run_ms(&mut board, 1);
             meddle(&mut pc, &mut board);
         }
-        board.probe().tally().handler = None;
+        let ticks = board.counted_runs();
         pc.run_ms(&mut board, 50);
-        let ticks = std::mem::take(&mut board.probe().tally().runs);
         // The last tick of the profile and the last sample are a few apart; the state changes slowly.
         let first = pc.heard.samples.len().checked_sub(500 + ticks.len()).expect("a sample for each tick");
         for (run, (_, sample)) in ticks.iter().zip(&pc.heard.samples[first..]) {

@@ -47,12 +47,9 @@ fn it_computes_what_control_core_computes() {
 #[test]
 fn its_tick_takes_as_many_instructions_as_the_default_boards() {
     let mut rig = Rig::pressed_on(Wiring::nucleo_f429zi());
-    let handler = rig.board.symbols().iter().find(|symbol| symbol.name == "TIM4");
-    let handler = handler.expect("the image has the tick's handler").address;
-    rig.board.probe().tally().handler = Some(handler);
+    rig.board.count_runs_of("TIM4");
     rig.pc.run_ms(&mut rig.board, 200);
-    rig.board.probe().tally().handler = None;
-    let longest = rig.board.probe().tally().runs.iter().map(|run| run.instructions).max();
+    let longest = rig.board.counted_runs().iter().map(|run| run.instructions).max();
     println!("| NUCLEO-F429ZI, pressed | longest {longest:?} instructions |");
     assert!(longest.is_some_and(|longest| (300..=840).contains(&longest)), "{longest:?}");
     let (violations, stray) = rig.board.at_stop(|stopped| (stopped.violations(), stopped.stray_accesses()));

@@ -51,6 +51,55 @@ pub fn instructions(bytes: &[u8], is_it: impl Fn([u8; 4]) -> bool) -> Vec<u32> {
     .collect()
 }
 
+/// The bytes of the code from `address` on.
+fn code(bytes: &[u8], address: u32) -> Option<&[u8]> {
+    const PROGRAM: u32 = 1;
+    let sections = sections(bytes)?;
+    let holds = |section: &&[u32; 5]| {
+        section[0] == PROGRAM && (section[1]..section[1] + section[3]).contains(&address)
+    };
+    let [_, begin, offset, size, _] = *sections.iter().find(holds)?;
+    bytes.get((offset + address - begin) as usize..(offset + size) as usize)
+}
+
+/// The instructions by which the function at `address` may return, its own and those of functions that it jumps to as its
+/// last act; none where there is no such function. ARMv7-M manual, A7.7: `bx lr`, `pop {…, pc}`, `ldr pc, [sp], #4`, `b`.
+#[must_use]
+pub fn exits(bytes: &[u8], symbols: &[Symbol], address: u32) -> Vec<u32> {
+    let (mut exits, mut seen, mut open) = (vec![], vec![], vec![address]);
+    while let Some(entry) = open.pop() {
+        let function = symbols.iter().find(|symbol| symbol.address == entry && symbol.size > 0);
+        let (Some(function), false) = (function, seen.contains(&entry)) else { continue };
+        seen.push(entry);
+        let Some(code) = code(bytes, entry) else { continue };
+        let mut at = 0;
+        while let (true, Some(first)) = (at < function.size, half(code, at as usize)) {
+            let second = half(code, at as usize + 2).unwrap_or(0);
+            let is_long = first >= 0xE800;
+            let place = entry + at;
+            match (first, second) {
+                (0x4770 | 0xBD00..=0xBDFF, _) => exits.push(place),
+                (0xE8BD, 0x8000..) | (0xF85D, 0xFB04) => exits.push(place),
+                (0xF000..=0xF7FF, _) if second & 0xD000 == 0x9000 => open.push(branch(place, first, second)),
+                _ => {}
+            }
+            at += if is_long { 4 } else { 2 };
+        }
+    }
+    exits
+}
+
+/// Where the long branch at `place` leads: `b.w`, encoding T4.
+fn branch(place: u32, first: u16, second: u16) -> u32 {
+    let bit = |half: u16, at: u16| u32::from(half >> at & 1);
+    let sign = bit(first, 10);
+    let (i1, i2) = (1 ^ bit(second, 13) ^ sign, 1 ^ bit(second, 11) ^ sign);
+    let offset =
+        sign << 24 | i1 << 23 | i2 << 22 | u32::from(first & 0x3FF) << 12 | u32::from(second & 0x7FF) << 1;
+    let signed = (offset << 7) as i32 >> 7;
+    place.wrapping_add(4).wrapping_add_signed(signed)
+}
+
 /// Every function and object of the file; none for a file that is no such ELF.
 #[must_use]
 pub fn symbols(bytes: &[u8]) -> Vec<Symbol> {

@@ -37,7 +37,7 @@ use rigless::time::VirtualNanos;
 pub use amplifier::Amplifier;
 pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use processor::{Effect, HandlerRun, Probe, Upset};
+pub use processor::{Counted, Effect, HandlerRun, Probe, Upset};
 pub use run::{EncoderRead, Log, Output};
 pub use stopped::Stopped;
 pub use usb_port::UsbPort;
@@ -183,6 +183,7 @@ pub struct Board {
     thread: Option<JoinHandle<Result<(), String>>>,
     probe: Probe,
     flash: flash::Flash,
+    image: PathBuf,
     symbols: Vec<elf::Symbol>,
     stack: Option<(u64, u64)>,
     now: Nanos,
@@ -223,7 +224,8 @@ impl Board {
             let finished = emulator::run(session, &Start::new(&images), world);
             finished.map(drop).map_err(|error| error.to_string())
         });
-        Ok(Self { orders, done, thread: Some(thread), probe, flash, symbols, stack, now: 0 })
+        let image = path.to_path_buf();
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, image, symbols, stack, now: 0 })
     }
 
     fn order(&mut self, order: Order) {
@@ -290,6 +292,27 @@ impl Board {
     #[must_use]
     pub fn probe(&self) -> Probe {
         self.probe.clone()
+    }
+
+    /// Counts the instructions of each run of the interrupt handler called `name` from now on.
+    ///
+    /// # Panics
+    ///
+    /// When the image has no such handler.
+    pub fn count_runs_of(&self, name: &str) {
+        let bytes = std::fs::read(&self.image).expect("the image that runs");
+        let handler = self.symbols.iter().find(|symbol| symbol.name == name);
+        let entry = handler.unwrap_or_else(|| panic!("the image has no handler {name}")).address;
+        let exits = elf::exits(&bytes, &self.symbols, entry);
+        self.probe.tally().counted = Some(Counted { entry, exits });
+    }
+
+    /// Stops counting and returns the runs that have ended.
+    #[must_use]
+    pub fn counted_runs(&self) -> Vec<HandlerRun> {
+        let mut tally = self.probe.tally();
+        tally.counted = None;
+        std::mem::take(&mut tally.runs)
     }
 
     /// The sectors of flash that the firmware writes to.

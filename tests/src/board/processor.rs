@@ -4,7 +4,7 @@
 //!
 //! Nothing here changes what the firmware sees: the windows answer at the addresses of the manual.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rigless::emulator::{
@@ -67,18 +67,23 @@ pub enum Effect {
     Stall(u64),
 }
 
+/// An interrupt handler whose instructions are counted. Nothing may preempt it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Counted {
+    /// Its address.
+    pub entry: u32,
+    /// The instructions by which it may return.
+    pub exits: Vec<u32>,
+}
+
 /// What a probe counts and does.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// The address of the interrupt handler whose instructions are counted, if any. Nothing may
-    /// preempt it.
-    pub handler: Option<u32>,
+    /// The handler that is counted, if any.
+    pub counted: Option<Counted>,
     /// Every completed run of that handler.
     pub runs: Vec<HandlerRun>,
-    /// How often each of its instructions ran, by address.
-    pub places: BTreeMap<u32, u64>,
-    /// Where the image masks all interrupts (PRIMASK, `true`) and puts back what was before, by address. While there are
-    /// any, the core goes an instruction at a time.
+    /// Where the image masks all interrupts (PRIMASK, `true`) and restores what was before, by address.
     pub masks: BTreeMap<u32, bool>,
     /// The instruction count at which interrupts were masked, and how many times one in the other.
     masked_since: u64,
@@ -113,15 +118,26 @@ pub(super) struct Probed {
     flash: Flash,
     /// Instructions' time in which nothing ran.
     stalled: u64,
-    /// Where a breakpoint stops the core for the count.
-    breakpoint: Option<u32>,
-    /// The run of the counted handler that is under way, with the exception it runs in.
-    counting: Option<(u32, HandlerRun)>,
+    /// Where breakpoints stop the core.
+    breakpoints: BTreeSet<u32>,
+    /// The run of the counted handler that is under way.
+    counting: Option<Run>,
+}
+
+/// A run of the counted handler that is under way.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    /// The exception that it runs in.
+    exception: u32,
+    /// The instruction count at its first instruction, with the time in which nothing ran.
+    from: u64,
+    /// The same without that time.
+    retired: u64,
 }
 
 impl Probed {
     pub(super) fn new(core: Box<dyn Processor>, probe: Probe, flash: Flash) -> Self {
-        Self { core, probe, flash, stalled: 0, breakpoint: None, counting: None }
+        Self { core, probe, flash, stalled: 0, breakpoints: BTreeSet::new(), counting: None }
     }
 
     /// Has every access to the sectors the firmware writes to go over the bus.
@@ -140,73 +156,83 @@ impl Probed {
         self.register(REGISTER_XPSR) & 0x1FF
     }
 
-    /// Sets the breakpoint that the test asks for.
-    fn settle_breakpoint(&mut self) {
-        let wanted = self.probe.tally().handler;
-        if wanted == self.breakpoint {
+    /// Sets the breakpoints that the test asks for.
+    fn settle_breakpoints(&mut self) {
+        let wanted: BTreeSet<u32> = {
+            let tally = self.probe.tally();
+            let counted = tally.counted.iter().flat_map(|it| it.exits.iter().copied().chain([it.entry]));
+            counted.chain(tally.masks.keys().copied()).collect()
+        };
+        if wanted == self.breakpoints {
             return;
         }
-        if let Some(old) = self.breakpoint.take() {
+        for old in std::mem::take(&mut self.breakpoints) {
             self.core.remove_breakpoint(old.into());
-            self.counting = None;
         }
-        self.breakpoint = wanted.filter(|&new| self.core.add_breakpoint(new.into()));
+        self.counting = None;
+        self.breakpoints = wanted.into_iter().filter(|&new| self.core.add_breakpoint(new.into())).collect();
     }
 
-    /// Runs like the core, and an instruction at a time where somebody looks.
+    /// Runs like the core from breakpoint to breakpoint, and an instruction at a time while an upset is to come.
     fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
-            let (upset, masks) = {
-                let tally = self.probe.tally();
-                (tally.upset.is_some(), !tally.masks.is_empty())
-            };
-            bus.stepping = upset || masks || self.counting.is_some();
-            let place = self.core.pc() as u32;
+            bus.stepping = self.probe.tally().upset.is_some();
             let left = if bus.stepping { 1 } else { budget - retired as u32 };
-            let (exit, did) = self.core.run(left, bus);
-            retired += did;
-            if exit == Exit::Breakpoint && self.breakpoint == Some(self.core.pc() as u32) {
-                self.core.pass_breakpoint(self.core.pc());
-                let run = HandlerRun { from: self.retired(), instructions: 0 };
-                self.counting = Some((self.exception(), run));
-                continue;
+            let (mut exit, mut did) = self.core.run(left, bus);
+            let place = self.core.pc() as u32;
+            let stopped = exit == Exit::Breakpoint && self.breakpoints.contains(&place);
+            if stopped {
+                self.enter(place);
+                self.core.pass_breakpoint(place.into());
+                // The instruction itself, so that what it changed can be seen.
+                bus.stepping = true;
+                let (after, of_it) = self.core.run(1, bus);
+                (exit, did) = (after, did + of_it);
+                self.note_mask(place);
             }
+            retired += did;
+            self.leave(stopped.then_some(place));
             if bus.standstill > 0 {
                 return (Exit::Returned, retired);
             }
-            if did > 0 && masks {
-                self.note_mask(place);
-            }
             if did > 0 && bus.stepping {
-                self.count(place);
                 let stalled = self.upset();
                 if stalled > 0 {
                     // Time has passed: the run looks at what is due.
                     return (Exit::Returned, retired + stalled);
                 }
             }
-            if exit != Exit::Budget {
+            if exit != Exit::Budget && !(stopped && exit == Exit::Breakpoint) {
                 return (exit, retired);
             }
         }
         (Exit::Budget, retired)
     }
 
-    /// Counts the instruction at `place`, if it is the counted handler's. The exception changes
-    /// right after the handler's last instruction.
-    fn count(&mut self, place: u32) {
-        let exception = self.exception();
-        let Some((of, run)) = &mut self.counting else { return };
-        run.instructions += 1;
-        let (ended, run) = (*of != exception, *run);
-        let mut tally = self.probe.tally();
-        *tally.places.entry(place).or_default() += 1;
-        if ended {
-            tally.runs.push(run);
-            drop(tally);
-            self.counting = None;
+    /// Begins a run of the counted handler where it begins at `place`.
+    fn enter(&mut self, place: u32) {
+        if self.probe.tally().counted.as_ref().is_some_and(|counted| counted.entry == place) {
+            let exception = self.exception();
+            self.counting = Some(Run { exception, from: self.retired(), retired: self.core.retired() });
         }
+    }
+
+    /// Ends the run of the counted handler once the exception has changed, which the instruction that just ran at a
+    /// breakpoint, `place`, does.
+    ///
+    /// # Panics
+    ///
+    /// When the handler returned elsewhere: more than the handler was counted then.
+    fn leave(&mut self, place: Option<u32>) {
+        let Some(run) = self.counting.filter(|run| run.exception != self.exception()) else { return };
+        self.counting = None;
+        let mut tally = self.probe.tally();
+        let Some(counted) = &tally.counted else { return };
+        let is_exit = place.is_some_and(|place| counted.exits.contains(&place));
+        assert!(is_exit, "the handler at {:#x} returned by an instruction that is not known", counted.entry);
+        let instructions = (self.core.retired() - run.retired) as u32;
+        tally.runs.push(HandlerRun { from: run.from, instructions });
     }
 
     /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is one of those.
@@ -263,11 +289,8 @@ impl Processor for Probed {
         let shorted = self.probe.tally().shorted;
         let mut bus =
             Rerouted { bus, flash: &flash, stalled: self.stalled, standstill: 0, shorted, stepping: false };
-        self.settle_breakpoint();
-        let watched = {
-            let tally = self.probe.tally();
-            self.breakpoint.is_some() || tally.upset.is_some() || !tally.masks.is_empty()
-        };
+        self.settle_breakpoints();
+        let watched = !self.breakpoints.is_empty() || self.probe.tally().upset.is_some();
         let (exit, retired) =
             if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) };
         // What kept the core from its instructions is time that has passed.
