@@ -10,6 +10,7 @@ mod dac;
 pub mod elf;
 mod exti;
 pub mod flash;
+pub mod log;
 mod machine;
 pub mod otg;
 pub mod pins;

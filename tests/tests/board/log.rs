@@ -1,6 +1,6 @@
 //! What the firmware says over RTT is readable with nothing but its image: the bytes decoded as `defmt`.
 
-use defmt_decoder::{DecodeError, Table};
+use tests::board::log::Log;
 use tests::board::tilt::Health;
 use tests::board::{Board, MILLISECOND, firmware_path, plant};
 use tests::rig::{Rig, task};
@@ -9,20 +9,7 @@ use tests::scenario::board;
 /// Every line so far, with its level before it.
 fn log(board: &mut Board) -> Vec<String> {
     let image = std::fs::read(firmware_path()).expect("the image");
-    let table = Table::parse(&image).expect("the image says how it logs").expect("it logs with defmt");
-    let mut decoder = table.new_stream_decoder();
-    decoder.received(&board.at_stop(|stopped| stopped.log().rtt.clone()));
-    let mut lines = vec![];
-    loop {
-        match decoder.decode() {
-            Ok(frame) => {
-                let level = frame.level().map_or("print", |level| level.as_str());
-                lines.push(format!("{level}: {}", frame.display_message()));
-            }
-            Err(DecodeError::UnexpectedEof) => return lines,
-            Err(DecodeError::Malformed) => panic!("after {lines:?} comes what is no frame"),
-        }
-    }
+    Log::of(&image).lines(&board.at_stop(|stopped| stopped.log().rtt.clone()))
 }
 
 #[test]
