@@ -1,5 +1,5 @@
 //! A class over Zenoh, on loopback: devices and their instructor come, go and come back; a stalled instructor, a wrong token
-//! and a server that never answers cost nobody anything. Runs where the feature `class` is built: `cargo xtask class`.
+//! and a server that never answers cost nobody anything. Runs where the feature `class` is built: `cargo xtask nightly class`.
 #![cfg(all(unix, feature = "class"))]
 
 mod common;
@@ -206,10 +206,10 @@ fn cpu_s(pid: u32) -> f64 {
 }
 
 /// Thirty programs and their instructor's, each with a virtual device at 10 kHz and 1,000 poses a second: all of it within one
-/// core. Prints the row of `cargo xtask class`.
+/// core. Prints the row of `cargo xtask nightly class`.
 #[cfg(target_os = "linux")]
 #[test]
-#[ignore = "measures: needs a machine that does nothing else, `cargo xtask class` runs it"]
+#[ignore = "measures: needs a machine that does nothing else, `cargo xtask nightly class` runs it"]
 fn thirty_devices_cost_less_than_a_core() {
     const SECONDS: f64 = 10.0;
     let meeting = meeting("thirty", None);

@@ -1,6 +1,6 @@
 //! Programs that mean harm, against the instructor's listener of a class: noise, endless frames, silence, nonsense on the class'
 //! keys, a flood. The page stays up, a device's control path is never late, memory stays bounded. Runs where the feature
-//! `class` is built: `cargo xtask class`.
+//! `class` is built: `cargo xtask nightly class`.
 #![cfg(all(target_os = "linux", feature = "class"))]
 
 mod common;

@@ -1,7 +1,7 @@
 // Foxglove's live WebSocket as its own JavaScript client reads it (npm's `@foxglove/ws-protocol`), with the schemas that the
 // server sends; and whether such a client can start the torque.
 //
-// Run by `cargo xtask foxglove` with host-sim's path, built with `--features foxglove`; everything is on loopback.
+// Run by `cargo xtask nightly foxglove` with host-sim's path, built with `--features foxglove`; everything is on loopback.
 
 const assert = require("node:assert");
 const { spawn } = require("node:child_process");

@@ -6,7 +6,7 @@
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
 use crate::shell::{self, Failure, cargo};
-use crate::{boards, firmware, setup, test};
+use crate::{boards, firmware, setup};
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_EXTENSION;
 use std::fmt::Write as _;
@@ -75,9 +75,9 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
         measure("diagnosis", diagnosis());
     }
     let mut board_lines = vec![];
-    for name in test::test_programs()? {
-        if measures(&name, wants) {
-            measure(&name, test_program(&name, &mut board_lines));
+    for module in test_modules()? {
+        if measures(&module, wants) {
+            measure(&module.name, test_module(&module, &mut board_lines));
         }
     }
     let rows: Vec<(Row, f64, Option<Peer>)> = ROWS
@@ -94,15 +94,39 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
     if troubles.is_empty() { Ok(()) } else { Err(Failure::new(troubles.join("; "))) }
 }
 
-/// Tests that print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
-fn measures(name: &str, wants: impl Fn(&str) -> bool) -> bool {
-    let path = shell::top().join("tests/tests").join(name).with_extension("rs");
-    fs::read_to_string(path).is_ok_and(|text| {
-        (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
-            || ROWS.iter().filter(|row| wants(row.name)).any(|row| {
-                text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
-            })
-    })
+/// The test programs of the crate `tests`: a folder each.
+const TEST_PROGRAMS: [&str; 2] = ["board", "page"];
+
+/// A file of tests.
+struct TestModule {
+    program: &'static str,
+    name: String,
+    text: String,
+}
+
+fn test_modules() -> Result<Vec<TestModule>, Failure> {
+    let mut modules = vec![];
+    for program in TEST_PROGRAMS {
+        let folder = shell::top().join("tests/tests").join(program);
+        let unreadable = |error| Failure::new(format!("{} cannot be read: {error}", folder.display()));
+        for path in fs::read_dir(&folder).map_err(unreadable)?.flatten().map(|entry| entry.path()) {
+            let Some(name) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
+            let is_source = path.extension().is_some_and(|extension| extension == "rs");
+            if let (true, Ok(text)) = (is_source, fs::read_to_string(&path)) {
+                modules.push(TestModule { program, name: name.into(), text });
+            }
+        }
+    }
+    modules.sort_by(|a, b| (a.program, &a.name).cmp(&(b.program, &b.name)));
+    Ok(modules)
+}
+
+/// Whether the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
+fn measures(TestModule { text, .. }: &TestModule, wants: impl Fn(&str) -> bool) -> bool {
+    (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
+        || ROWS.iter().filter(|row| wants(row.name)).any(|row| {
+            text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
+        })
 }
 
 /// The lines of the board's own table; whatever the test runner wrote before a line is not part of it.
@@ -139,10 +163,11 @@ fn example(package: &str, name: &str) -> Result<Values, Failure> {
     shell::output(&mut run).map(|text| values_in(&text))
 }
 
-fn test_program(name: &str, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
+fn test_module(module: &TestModule, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
     let mut run = cargo();
     run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
-    run.args(["test", "--release", "--quiet", ANY_RUST, "-p", "tests", "--test", name, "--", "--nocapture"]);
+    run.args(["test", "--release", "--quiet", ANY_RUST, "--workspace", "--test", module.program, "--"]);
+    run.args(["--nocapture", &format!("{}::", module.name)]);
     // A test that fails its bound has printed what it measured.
     let output = run
         .stderr(Stdio::inherit())

@@ -17,19 +17,19 @@ pub(crate) fn run(board: &Board) -> Result<(), Failure> {
     }
     // The runner, probe-rs, flashes and resets for each test; the one in .cargo/config.toml is for the default board.
     let runner = format!("probe-rs run --chip {}", board.chip);
-    let mut tests = command(board, &["--", "--test-threads", "1"]);
+    let mut tests = command("test", board, &["--", "--test-threads", "1"]);
     shell::run(tests.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUNNER", runner))
 }
 
-/// Builds them: what no machine without the board can do more of.
-pub(crate) fn build(board: &Board) -> Result<(), Failure> {
-    shell::run(&mut command(board, &["--no-run"]))
+/// Compiles them: what no machine without the board can do more of.
+pub(crate) fn check(board: &Board) -> Result<(), Failure> {
+    shell::run(&mut command("check", board, &[]))
 }
 
-fn command(board: &Board, last: &[&str]) -> Command {
+fn command(subcommand: &str, board: &Board, last: &[&str]) -> Command {
     let toolchain = setup::toolchain();
     let mut cargo = match toolchain {
-        Ok(toolchain) => setup::cargo_for_board(toolchain, "test"),
+        Ok(toolchain) => setup::cargo_for_board(toolchain, subcommand),
         Err(_) => shell::cargo(),
     };
     cargo.args(firmware::arguments(board)).args(["--test", "board"]).args(last);

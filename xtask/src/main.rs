@@ -15,6 +15,7 @@ mod setup;
 mod shell;
 mod site;
 mod stack;
+mod steps;
 mod test;
 mod wasm;
 
@@ -26,17 +27,17 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt clippy doc unit firmware wasm site board browser clients parquet fuzz prove
+                                fmt clippy firmware unit doc board wasm site browser clients fuzz prove
+  cargo xtask test --quick      the inner loop: format, warnings, the tests inside the crates; three minutes
+  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class soak mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, and board-test, take --board: discovery (default), nucleo-f429zi
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
-  cargo xtask class             a class over Zenoh: its tests, and thirty devices measured; builds for minutes
-  cargo xtask foxglove          Foxglove's live stream read by Foxglove's own client; builds for minutes
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
-  cargo xtask mutants [CRATE…]  sees that the tests notice a thousand small changes of the code: half an hour
+  cargo xtask mutants [CRATE…]  changes the code a thousand times and sees that the tests notice: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
 
@@ -58,8 +59,7 @@ fn main() -> ExitCode {
         "flash" => flash::run(rest),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
-        "class" => no_more(rest).and_then(|()| test::class()),
-        "foxglove" => no_more(rest).and_then(|()| test::foxglove()),
+        "nightly" => test::nightly(rest),
         "board-test" => for_board(rest, board_test::run),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),

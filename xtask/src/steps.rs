@@ -1,0 +1,241 @@
+//! The checks of `cargo xtask test` and `cargo xtask nightly`, each a function.
+//!
+//! Everything for the PC is built once, as one selection of packages: another selection is another set of features, and builds
+//! most of them once more.
+
+use crate::boards::{self, Board};
+use crate::setup::{self, Toolchain};
+use crate::shell::{self, Failure, cargo};
+use crate::test::Step;
+use crate::{board_test, firmware, mutants, site, wasm};
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The emulator asks for a newer Rust than it needs.
+const ANY_RUST: &str = "--ignore-rust-version";
+/// The one build: what is built, and how.
+const BUILD: [&str; 3] = ["--release", "--workspace", ANY_RUST];
+/// How long damaged frames are parsed, in s.
+const FUZZ_SECONDS: &str = "10";
+const LONG_FUZZ_SECONDS: &str = "600";
+
+/// In the order that finds the most for the least time.
+pub(crate) const STEPS: [Step; 12] = [
+    step("fmt", "the sources are formatted", 5.0, fmt),
+    step("clippy", "no warning from the compiler or clippy", 95.0, clippy),
+    step("firmware", "the boards' flash images build, without warnings, and fit", 90.0, image),
+    step("unit", "the crates' tests, and the build that all later steps share", 340.0, unit),
+    step("doc", "the documentation builds without warnings, its examples run", 45.0, doc),
+    step("board", "the flash images on the emulated boards", 130.0, board),
+    step("wasm", "the page's WebAssembly is built from its sources", 2.0, page_wasm),
+    step("site", "the device in a browser gives the same bits as host-sim's", 35.0, same_bits),
+    step("browser", "the page in a real browser", 50.0, browser),
+    step("clients", "streams and exported rigs as other people's programs read them", 30.0, clients),
+    step("fuzz", "the frame parser, on damaged frames", 12.0, fuzz),
+    step("prove", "the small proof of the diagnosis", 65.0, prove),
+];
+
+/// The inner loop.
+pub(crate) const QUICK: [Step; 3] = [
+    step("fmt", "the sources are formatted", 5.0, fmt),
+    step("clippy", "no warning from the compiler or clippy", 95.0, clippy),
+    step("libraries", "the tests inside the crates", 80.0, libraries),
+];
+
+/// What takes longer than the tests may.
+pub(crate) const NIGHTLY: [Step; 7] = [
+    step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
+    step("parquet", "import reads Parquet, which the default build leaves out", 300.0, parquet),
+    step("foxglove", "Foxglove's live stream read by Foxglove's own client", 400.0, foxglove),
+    step("class", "devices and their instructor over Zenoh, and thirty devices measured", 900.0, class),
+    step("soak", "the frame parser, ten minutes of damaged frames", 620.0, soak),
+    step("mutants", "the tests notice a thousand small changes of the code", 2400.0, mutated),
+    step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),
+];
+
+const fn step(
+    name: &'static str,
+    shows: &'static str,
+    bound_s: f64,
+    run: fn() -> Result<(), Failure>,
+) -> Step {
+    Step { name, shows, bound_s, run }
+}
+
+fn fmt() -> Result<(), Failure> {
+    shell::run(cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn clippy() -> Result<(), Failure> {
+    shell::run(cargo().arg("clippy").args(BUILD).args(["--all-targets", "--", "-D", "warnings"]))
+}
+
+fn doc() -> Result<(), Failure> {
+    let mut build = cargo();
+    build.env("RUSTDOCFLAGS", "-D warnings");
+    shell::run(build.arg("doc").args(BUILD).arg("--no-deps"))?;
+    shell::run(cargo().arg("test").args(BUILD).args(["--doc", "--quiet"]))
+}
+
+fn unit() -> Result<(), Failure> {
+    if has_nextest() {
+        // Built with what the other steps run, so that they find it.
+        return shell::run(tests().args(["-E", "not package(tests)"]));
+    }
+    shell::run(tests().args(["--exclude", "tests"]))
+}
+
+fn libraries() -> Result<(), Failure> {
+    shell::run(tests().arg("--lib"))
+}
+
+/// The tests that say why they run at night.
+fn slow() -> Result<(), Failure> {
+    if has_nextest() {
+        return shell::run(tests().args(["--run-ignored", "only", "-E", "not package(tests)"]));
+    }
+    shell::run(tests().args(["--exclude", "tests", "--", "--ignored"]))
+}
+
+/// The image of every board, and the same warnings for it as for everything else.
+fn image() -> Result<(), Failure> {
+    boards::ALL.iter().try_for_each(image_of)
+}
+
+fn image_of(board: &Board) -> Result<(), Failure> {
+    firmware::report(board, &firmware::build(board)?)?;
+    let toolchain = setup::toolchain()?;
+    if toolchain == Toolchain::Debian {
+        // Debian's compiler comes without clippy; the host's clippy has seen all but the tasks.
+        return board_test::check(board);
+    }
+    let mut clippy = setup::cargo_for_board(toolchain, "clippy");
+    clippy.args(firmware::arguments(board)).args(["--bin", "firmware", "--test", "board"]);
+    shell::run(clippy.args(["--", "-D", "warnings"]))
+}
+
+fn page_wasm() -> Result<(), Failure> {
+    eprintln!("checked {}", wasm::check()?);
+    Ok(())
+}
+
+fn same_bits() -> Result<(), Failure> {
+    site::check()
+}
+
+fn board() -> Result<(), Failure> {
+    // The tests find the other boards' beside the default one's.
+    for board in &boards::ALL {
+        firmware::build(board)?;
+    }
+    let mut tests = tests();
+    tests.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
+    if has_nextest() {
+        return shell::run(tests.args(["-E", "package(tests) and not binary(page)"]));
+    }
+    shell::run(tests.args(["--test", "board"]))
+}
+
+fn browser() -> Result<(), Failure> {
+    setup::browser()?;
+    site::build()?;
+    shell::run(tests().args(["--test", "page"]))
+}
+
+/// Libraries of other people, each at the version that the check was written against.
+const CLIENTS: [&str; 4] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0"];
+
+fn clients() -> Result<(), Failure> {
+    let python = setup::python(&CLIENTS)?;
+    setup::mono()?;
+    let program = built(&["--bin", "host-sim"], "host-sim")?;
+    for script in ["streams.py", "recording.py", "documented.py", "mujoco_rig.py"] {
+        shell::run(Command::new(&python).arg(shell::top().join("tests/clients").join(script)).arg(&program))?;
+    }
+    Ok(())
+}
+
+fn fuzz() -> Result<(), Failure> {
+    fuzz_for(FUZZ_SECONDS)
+}
+
+fn soak() -> Result<(), Failure> {
+    fuzz_for(LONG_FUZZ_SECONDS)
+}
+
+fn fuzz_for(seconds: &str) -> Result<(), Failure> {
+    let program = built(&["--example", "fuzz_frames"], "examples/fuzz_frames")?;
+    shell::run(Command::new(program).args(["--seconds", seconds]))
+}
+
+fn prove() -> Result<(), Failure> {
+    proof(&["--quick"])
+}
+
+fn whole_proof() -> Result<(), Failure> {
+    proof(&[])
+}
+
+fn proof(flags: &[&str]) -> Result<(), Failure> {
+    let program = built(&["--bin", "prove"], "prove")?;
+    shell::run(Command::new(program).args(flags).current_dir(shell::top()))
+}
+
+fn mutated() -> Result<(), Failure> {
+    mutants::run(&[])
+}
+
+/// Apart from `unit`: forty packages more.
+fn parquet() -> Result<(), Failure> {
+    let mut import = cargo();
+    import.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/parquet", "--test", "import"]);
+    shell::run(&mut import)
+}
+
+/// The tests of a class, which need a build of their own, and the measurement of thirty devices.
+fn class() -> Result<(), Failure> {
+    let features = ["--features", "host-sim/class"];
+    let mut clippy = cargo();
+    clippy.arg("clippy").args(BUILD).arg("--all-targets").args(features);
+    shell::run(clippy.args(["--", "-D", "warnings"]))?;
+    let mut test = cargo();
+    test.arg("test").args(BUILD).args(features).args(["--test", "class", "--test", "class_hostile"]);
+    // One after the other: what is measured must not share the machine.
+    test.args(["--", "--include-ignored", "--nocapture", "--test-threads", "1"]);
+    shell::run(&mut test)
+}
+
+/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the version that the check was
+/// written against.
+const FOXGLOVE_CLIENT: [&str; 3] = ["@foxglove/ws-protocol@0.8.0", "ws@8.23.0", "protobufjs@8.8.1"];
+
+/// Foxglove's live stream read by Foxglove's own client; needs a build of its own.
+fn foxglove() -> Result<(), Failure> {
+    let modules = setup::node_packages(&FOXGLOVE_CLIENT)?;
+    shell::run(cargo().args(["build", "--release", "-p", "host-sim", "--features", "foxglove", ANY_RUST]))?;
+    let mut node = Command::new("node");
+    node.env("NODE_PATH", modules).arg(shell::top().join("tests/clients/foxglove.cjs"));
+    shell::run(node.arg(shell::target().join("release/host-sim")))
+}
+
+fn has_nextest() -> bool {
+    shell::is_on_path("cargo-nextest")
+}
+
+/// Runs tests of the one build: by nextest where it is installed, else by cargo's own runner.
+fn tests() -> Command {
+    let mut command = cargo();
+    if has_nextest() {
+        command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
+    } else {
+        command.args(["test", "--no-fail-fast", "--quiet"]);
+    }
+    command.args(BUILD);
+    command
+}
+
+/// Builds a program of the one build; where it lies below the build's folder.
+fn built(which: &[&str], below: &str) -> Result<PathBuf, Failure> {
+    shell::run(cargo().args(["build", "--quiet"]).args(BUILD).args(which))?;
+    Ok(shell::target().join("release").join(below))
+}
