@@ -84,6 +84,11 @@ fn trials(count: usize) -> impl Iterator<Item = f64> {
     (1..=count).map(|k| (k as f64 * 0.754_877_666).fract())
 }
 
+/// Text that lives as long as the program, as the name of an effect does.
+fn leaked(text: String) -> &'static str {
+    Box::leak(text.into_boxed_str())
+}
+
 impl Formula {
     /// Reads, checks and registers a formula; the reason where it cannot be used.
     pub fn register(text: FormulaText) -> Result<EffectName, String> {
@@ -99,6 +104,28 @@ impl Formula {
     }
 
     fn new(text: FormulaText) -> Result<Self, String> {
+        let expression = Self::checked(&text)?;
+        let words = if text.words.is_empty() { text.title.replace('_', " ") } else { text.words.clone() };
+        let bounds = |(name, [low, high]): (&String, &[f64; 2])| (leaked(name.clone()), *low, *high);
+        let mut formula = Self {
+            name: leaked(text.title.clone()),
+            words: leaked(words),
+            expression,
+            sources: Vec::new(),
+            linear: Vec::new(),
+            shape: text.parameters.iter().map(bounds).collect(),
+            is_dry: false,
+            text,
+        };
+        formula.place();
+        formula.is_finite()?;
+        formula.find_linear();
+        formula.is_dry = formula.turns_with_speed();
+        Ok(formula)
+    }
+
+    /// Checks the text of a formula and parses its expression; the reason where it cannot be used.
+    fn checked(text: &FormulaText) -> Result<FlatEx<f64>, String> {
         if text.title.is_empty() || !text.title.chars().all(|c| c.is_alphanumeric() || c == '_') {
             return Err(format!("the name \"{}\" must be of letters, digits and underscores", text.title));
         }
@@ -138,27 +165,7 @@ impl Formula {
                 text.formula
             ));
         }
-        let mut formula = Self {
-            name: Box::leak(text.title.clone().into_boxed_str()),
-            words: Box::leak(
-                if text.words.is_empty() { text.title.replace('_', " ") } else { text.words.clone() }
-                    .into_boxed_str(),
-            ),
-            expression,
-            sources: Vec::new(),
-            linear: Vec::new(),
-            shape: parameters
-                .iter()
-                .map(|(name, [low, high])| (&*Box::leak((*name).clone().into_boxed_str()), *low, *high))
-                .collect(),
-            is_dry: false,
-            text,
-        };
-        formula.place();
-        formula.is_finite()?;
-        formula.find_linear();
-        formula.is_dry = formula.turns_with_speed();
-        Ok(formula)
+        Ok(expression)
     }
 
     /// Sets where the expression's variables come from.

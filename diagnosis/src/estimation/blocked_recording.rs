@@ -3,22 +3,12 @@
 //! A block's position is the mean of its rows; an input is held row by row and enters as what it does to velocity, to
 //! position and to the block's mean, so that time stamps are used as they stand and nothing is resampled.
 
+use crate::estimation::input::{Input, Total};
 use crate::estimation::reading_lag::LagStep;
 use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use std::sync::Arc;
-
-/// What an input does over each block, from the state at the block's start.
-#[derive(Debug, Clone)]
-pub(crate) enum Input {
-    /// Acceleration held over each block, rad/s² or m/s² per unit.
-    Held(Vec<f64>),
-    /// Change of velocity and position over the block and of the block's mean position.
-    Rows { dv: Vec<f64>, dq: Vec<f64>, dz: Vec<f64> },
-    /// Travel that the encoder reads beside the position.
-    Sensor(Vec<f64>),
-}
 
 /// A recording in blocks. All vectors have one entry per block unless said otherwise.
 #[derive(Debug, Clone)]
@@ -260,6 +250,39 @@ impl BlockedRecording {
         effective.map_or_else(|| Input::clone(&self.command_input), |command| self.rows_input(command))
     }
 
+    /// Adds `factor` times an input to a total; where the axis is stuck, no force acts.
+    pub(crate) fn add_input(&self, total: &mut Total, input: &Input, factor: f64) {
+        match input {
+            Input::Held(a) => {
+                for (j, a) in a.iter().enumerate().filter(|(j, _)| !self.stuck[*j]) {
+                    let (a, h) = (a * factor, self.span[j]);
+                    total.dv[j] += a * h;
+                    total.dq[j] += 0.5 * a * h * h;
+                    total.dz[j] += a * self.tau2[j];
+                }
+            }
+            Input::Rows { dv, dq, dz } => {
+                for j in (0..dv.len()).filter(|j| !self.stuck[*j]) {
+                    total.dv[j] += factor * dv[j];
+                    total.dq[j] += factor * dq[j];
+                    total.dz[j] += factor * dz[j];
+                }
+            }
+            Input::Sensor(a) => {
+                for (z, a) in total.dz.iter_mut().zip(a) {
+                    *z += factor * a;
+                }
+            }
+        }
+    }
+
+    /// What the command alone does, with `gain` the acceleration per unit of it.
+    pub(crate) fn command_total(&self, gain: f64) -> Total {
+        let mut total = Total::zero(self.blocks());
+        self.add_input(&mut total, &self.command_input, gain);
+        total
+    }
+
     /// What a signal held row by row does over each block.
     pub(crate) fn rows_input(&self, signal: &[f64]) -> Input {
         let m = self.rows_per_block;
@@ -329,65 +352,6 @@ impl BlockedRecording {
 fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<f64> {
     let mut laws = rig.known_command_laws();
     command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, *h))).collect()
-}
-
-impl Input {
-    /// The same input with each block scaled.
-    pub(crate) fn scaled(&self, by: &[f64]) -> Self {
-        let times = |a: &[f64]| a.iter().zip(by).map(|(a, b)| a * b).collect();
-        match self {
-            Self::Held(a) => Self::Held(times(a)),
-            Self::Rows { dv, dq, dz } => Self::Rows { dv: times(dv), dq: times(dq), dz: times(dz) },
-            Self::Sensor(a) => Self::Sensor(times(a)),
-        }
-    }
-
-    /// Adds `factor` times this input to a total.
-    pub(crate) fn add_to(&self, total: &mut Total, track: &BlockedRecording, factor: f64) {
-        match self {
-            Self::Held(a) => {
-                for (j, a) in a.iter().enumerate().filter(|(j, _)| !track.stuck[*j]) {
-                    let (a, h) = (a * factor, track.span[j]);
-                    total.dv[j] += a * h;
-                    total.dq[j] += 0.5 * a * h * h;
-                    total.dz[j] += a * track.tau2[j];
-                }
-            }
-            Self::Rows { dv, dq, dz } => {
-                for j in (0..dv.len()).filter(|j| !track.stuck[*j]) {
-                    total.dv[j] += factor * dv[j];
-                    total.dq[j] += factor * dq[j];
-                    total.dz[j] += factor * dz[j];
-                }
-            }
-            Self::Sensor(a) => {
-                for (z, a) in total.dz.iter_mut().zip(a) {
-                    *z += factor * a;
-                }
-            }
-        }
-    }
-}
-
-/// The sum of all inputs of a model.
-#[derive(Debug, Clone)]
-pub(crate) struct Total {
-    pub(crate) dv: Vec<f64>,
-    pub(crate) dq: Vec<f64>,
-    pub(crate) dz: Vec<f64>,
-}
-
-impl Total {
-    pub(crate) fn zero(n: usize) -> Self {
-        Self { dv: vec![0.0; n], dq: vec![0.0; n], dz: vec![0.0; n] }
-    }
-
-    /// What the command alone does, with `gain` the acceleration per unit of it.
-    pub(crate) fn of_command(track: &BlockedRecording, gain: f64) -> Self {
-        let mut total = Self::zero(track.blocks());
-        track.command_input.add_to(&mut total, track, gain);
-        total
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@
 //! Because an innovation only holds what the past did not tell, a command that reacts to a disturbance is not mistaken
 //! for its cause (prediction-error identification in closed loop, Ljung 1999, chapter 13).
 
-use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::input::{Input, Total};
 use crate::estimation::reading_lag::LagStep;
 use std::ops::Range;
 

@@ -1,7 +1,8 @@
 //! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, robust_loss};
+use crate::estimation::input::Total;
 use crate::estimation::model::{Column, Key, Model, Nominal, total};
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Prior, Solution, Square, bounded};

@@ -3,8 +3,9 @@
 //! A fixed-interval smoother whose disturbance state is a random walk is a low-pass of sixth order without phase, exact
 //! under uneven time stamps; its bandwidth is what the report states.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Knows, Noise, motion};
+use crate::estimation::input::Total;
 use std::f64::consts::TAU;
 
 /// Largest bandwidth, Hz.

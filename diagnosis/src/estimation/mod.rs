@@ -4,6 +4,7 @@ pub(crate) mod blocked_recording;
 pub(crate) mod filter;
 pub(crate) mod fit;
 pub(crate) mod force_residual;
+pub(crate) mod input;
 pub(crate) mod lost_counts;
 pub(crate) mod model;
 pub(crate) mod noise;

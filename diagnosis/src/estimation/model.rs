@@ -2,9 +2,9 @@
 
 use crate::effects::definition::{Allowed, NominalTerm};
 use crate::effects::{CommandLaw, Effect, EffectName};
-use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
-use crate::estimation::fit::Fit;
+use crate::estimation::input::{Input, Total};
 use crate::estimation::regressors::effect_inputs;
 use crate::io::rig::Rig;
 use crate::numerics::linear::Prior;
@@ -233,10 +233,10 @@ impl Nominal {
         dry / self.known_inertia()
     }
 
-    /// What the law of a joint takes from the whole machine: as fitted, or as the rig has it.
-    pub(crate) fn machine(&self, fit: Option<&Fit>) -> Machine {
+    /// What the law of a joint takes from the whole machine: each value as `fitted` has it, or as the rig has it.
+    pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> Machine {
         let model = &self.rig.model;
-        let fitted = |key: Key, otherwise: f64| fit.and_then(|fit| fit.value(key)).unwrap_or(otherwise);
+        let fitted = |key: Key, otherwise: f64| fitted(key).unwrap_or(otherwise);
         let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
         Machine {
             per_command: fitted(Key::Gain, self.known_gain()),
@@ -374,7 +374,7 @@ pub(crate) fn total(track: &BlockedRecording, columns: &[Column], theta: &[f64])
     let mut total = Total::zero(track.blocks());
     for (column, theta) in columns.iter().zip(theta) {
         if *theta != 0.0 {
-            column.input.add_to(&mut total, track, *theta);
+            track.add_input(&mut total, &column.input, *theta);
         }
     }
     total

@@ -1,7 +1,8 @@
 //! How large sensor noise and disturbance are: maximum likelihood of the innovations, by a deterministic pattern search.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Input, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, robust_loss};
+use crate::estimation::input::{Input, Total};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -118,18 +119,6 @@ pub(crate) fn estimate(
     let floor = scale * scale * 1e-12;
     let lower = [0.3_f64.ln(), (floor * span).ln(), floor.ln(), TAU.0.ln()];
     let upper = [1e9_f64.ln(), (scale * scale * 10.0 * span).ln(), (scale * scale * 10.0).ln(), TAU.1.ln()];
-    let noise_at = |at: &[f64; 4]| Noise {
-        sensor: at[0].exp(),
-        white: at[1].exp(),
-        slow: at[2].exp(),
-        tau: at[3].exp(),
-        rest: from.rest,
-    };
-    let mut step = [1.5, 2.0, 2.0, 1.0];
-    let moved_values = match colour {
-        Colour::White => 2,
-        Colour::Slow => 4,
-    };
     if colour == Colour::White {
         at[2] = lower[2];
     } else if at[2] <= lower[2] + 1e-9 {
@@ -139,7 +128,30 @@ pub(crate) fn estimate(
     for i in 0..4 {
         at[i] = at[i].clamp(lower[i], upper[i]);
     }
-    let mut best = log_likelihood(&parts, &noise_at(&at));
+    let noise_at = |at: &[f64; 4]| Noise {
+        sensor: at[0].exp(),
+        white: at[1].exp(),
+        slow: at[2].exp(),
+        tau: at[3].exp(),
+        rest: from.rest,
+    };
+    let moved_values = match colour {
+        Colour::White => 2,
+        Colour::Slow => 4,
+    };
+    let value = |at: &[f64; 4]| log_likelihood(&parts, &noise_at(at));
+    noise_at(&pattern_search(at, (lower, upper), moved_values, &value))
+}
+
+/// Where a pattern search for the largest value ends within bounds; only the first `moved_values` values move.
+fn pattern_search(
+    mut at: [f64; 4],
+    (lower, upper): ([f64; 4], [f64; 4]),
+    moved_values: usize,
+    value: &dyn Fn(&[f64; 4]) -> f64,
+) -> [f64; 4] {
+    let mut step = [1.5, 2.0, 2.0, 1.0];
+    let mut best = value(&at);
     for _ in 0..14 {
         let mut moved = false;
         for i in 0..moved_values {
@@ -149,7 +161,7 @@ pub(crate) fn estimate(
                 if trial[i] == at[i] {
                     continue;
                 }
-                let value = log_likelihood(&parts, &noise_at(&trial));
+                let value = value(&trial);
                 if value > best + 0.05 {
                     best = value;
                     at = trial;
@@ -168,7 +180,7 @@ pub(crate) fn estimate(
             }
         }
     }
-    noise_at(&at)
+    at
 }
 
 /// Where the search starts before anything is known: `scale` is the acceleration that the command makes.

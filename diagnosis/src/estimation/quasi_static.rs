@@ -4,8 +4,9 @@
 //! same inertia added to rig and command alike, `(J + ΔJ)·q̈ = (u + ΔJ·q̈/gain)·gain − …`, changes no force and gives the left side
 //! a size that no refit can take away. The acceleration is that of the recording, smoothed; nothing here fits.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
+use crate::estimation::input::Total;
 use crate::estimation::model::Nominal;
 use crate::estimation::noise;
 use crate::estimation::refit::seen_acceleration;

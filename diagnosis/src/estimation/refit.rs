@@ -1,8 +1,9 @@
 //! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Knows, Noise, motion};
 use crate::estimation::fit::Fit;
+use crate::estimation::input::Total;
 use crate::estimation::model::{Key, Model, Nominal};
 use crate::estimation::noise::{self, Colour};
 use crate::numerics::linear::{Prior, Square, bounded};
@@ -180,7 +181,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> 
     let mut scale = acceleration_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    let totals: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let totals: Vec<Total> = tracks.iter().map(|track| track.command_total(nominal.gain())).collect();
     noise = noise::estimate(tracks, &totals, &noise, scale, Colour::Slow);
     estimate_motion(tracks, &totals, &noise, count, Knows::All);
     let model = Model::default();

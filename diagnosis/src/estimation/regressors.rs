@@ -2,7 +2,8 @@
 
 use crate::effects::definition::Coupling;
 use crate::effects::{Effect, Law, State, Variable};
-use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::input::Input;
 
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
 /// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.

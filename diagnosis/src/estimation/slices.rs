@@ -1,7 +1,7 @@
 //! Rows of a block taken together, for laws that are faster than a block and slower than a row. They hold time stamps as
 //! they stand and nothing of what a law makes of them.
 
-use crate::estimation::blocked_recording::Input;
+use crate::estimation::input::Input;
 use std::ops::Range;
 
 /// Some rows on end, with what a force held over them does to the block's mean.

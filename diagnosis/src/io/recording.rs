@@ -41,6 +41,94 @@ fn foreign(header: &str) -> Option<String> {
     between(';', "semicolons").or_else(|| between('\t', "tabs"))
 }
 
+/// The rows of a recording as they are read.
+struct Rows {
+    /// Where each known column is in a row.
+    place: [Option<usize>; 6],
+    /// Which known column each field of a row is.
+    wanted: Vec<Option<usize>>,
+    columns: [Vec<f64>; 6],
+    /// The first empty line: an error if a row comes after it.
+    blank: Option<usize>,
+}
+
+impl Rows {
+    /// No rows yet, under a header line.
+    fn new(header: &str) -> Result<Self, String> {
+        foreign(header).map_or(Ok(()), Err)?;
+        let names: Vec<&str> = header.split(',').map(|name| name.trim().trim_matches('"')).collect();
+        let mut place = [None; 6];
+        for (index, name) in names.iter().enumerate() {
+            if let Some(known) = COLUMNS.iter().position(|column| column == name)
+                && place[known].replace(index).is_some()
+            {
+                return Err(format!("the column {name} stands there twice; keep one of them"));
+            }
+        }
+        if let Some(needed) = (0..3).find(|needed| place[*needed].is_none()) {
+            let name = COLUMNS[needed];
+            return Err(format!("the column {name} is missing; name it in the header line"));
+        }
+        let wanted = (0..names.len()).map(|index| place.iter().position(|p| *p == Some(index))).collect();
+        Ok(Self { place, wanted, columns: Default::default(), blank: None })
+    }
+
+    /// Makes room for so many rows.
+    fn reserve(&mut self, rows: usize) {
+        for (column, place) in self.columns.iter_mut().zip(self.place) {
+            if place.is_some() {
+                column.reserve(rows);
+            }
+        }
+    }
+
+    /// Reads one more row; the line that is wrong, and why, where it cannot be used.
+    fn push(&mut self, line: usize, row: &str) -> Result<(), (usize, String)> {
+        if row.trim().is_empty() {
+            self.blank = self.blank.or(Some(line));
+            return Ok(());
+        }
+        if row.starts_with(['#', '%']) {
+            return Err((line, "a comment line; take it out, or let host-sim import read the file".into()));
+        }
+        if let Some(blank) = self.blank {
+            return Err((blank, "an empty line between rows; remove it or restore the row".into()));
+        }
+        let mut count = 0;
+        for field in row.split(',') {
+            if let Some(Some(known)) = self.wanted.get(count) {
+                let field = field.trim();
+                let value = field.parse::<f64>().ok().filter(|x| x.is_finite() && x.abs() < LARGEST);
+                let Some(value) = value else {
+                    let name = COLUMNS[*known];
+                    let field: String = field.chars().take(24).collect();
+                    let what =
+                        format!("{name} is \"{field}\", not a usable number; correct or cut the recording");
+                    return Err((line, what));
+                };
+                self.columns[*known].push(value);
+            }
+            count += 1;
+        }
+        if count != self.wanted.len() {
+            let what = format!(
+                "{count} fields where the header names {}; restore the row or cut the recording before it",
+                self.wanted.len()
+            );
+            return Err((line, what));
+        }
+        if let [.., before, now] = self.columns[0][..]
+            && now <= before
+        {
+            let what = format!(
+                "the time {now} s does not come after {before} s; times must increase from row to row"
+            );
+            return Err((line, what));
+        }
+        Ok(())
+    }
+}
+
 /// Rest at an end that is idle, and how much of it is kept, s.
 const IDLE_S: f64 = 1.0;
 const MARGIN_S: f64 = 0.3;
@@ -66,91 +154,16 @@ impl Recording {
     /// Checks the text of a recording; `file` is what errors call it.
     pub fn parse(text: &str, file: &str) -> Result<Self, InputError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let at = |line: usize, what: String| InputError::new(format!("{file}, line {line}: {what}"));
+        let at = |(line, what): (usize, String)| InputError::new(format!("{file}, line {line}: {what}"));
         let mut lines = text.lines();
         let header = lines.next().unwrap_or("");
-        foreign(header).map_or(Ok(()), |what| Err(at(1, what)))?;
-        let names: Vec<&str> = header.split(',').map(|name| name.trim().trim_matches('"')).collect();
-        let mut place = [None; 6];
-        for (index, name) in names.iter().enumerate() {
-            if let Some(known) = COLUMNS.iter().position(|column| column == name)
-                && place[known].replace(index).is_some()
-            {
-                return Err(at(1, format!("the column {name} stands there twice; keep one of them")));
-            }
-        }
-        for needed in 0..3 {
-            if place[needed].is_none() {
-                let name = COLUMNS[needed];
-                return Err(at(1, format!("the column {name} is missing; name it in the header line")));
-            }
-        }
-        let wanted: Vec<Option<usize>> =
-            (0..names.len()).map(|index| place.iter().position(|p| *p == Some(index))).collect();
-        let mut columns: [Vec<f64>; 6] = Default::default();
-        let guess = text.len() / header.len().max(12);
-        for (column, place) in columns.iter_mut().zip(place) {
-            if place.is_some() {
-                column.reserve(guess);
-            }
-        }
-        let mut blank = None;
+        let mut rows = Rows::new(header).map_err(|what| at((1, what)))?;
+        rows.reserve(text.len() / header.len().max(12));
         for (index, row) in lines.enumerate() {
-            let line = index + 2;
-            if row.trim().is_empty() {
-                blank = blank.or(Some(line));
-                continue;
-            }
-            if row.starts_with(['#', '%']) {
-                return Err(at(
-                    line,
-                    "a comment line; take it out, or let host-sim import read the file".into(),
-                ));
-            }
-            if let Some(blank) = blank {
-                return Err(at(blank, "an empty line between rows; remove it or restore the row".into()));
-            }
-            let mut count = 0;
-            for field in row.split(',') {
-                if let Some(Some(known)) = wanted.get(count) {
-                    let field = field.trim();
-                    let value = field.parse::<f64>().ok().filter(|x| x.is_finite() && x.abs() < LARGEST);
-                    let Some(value) = value else {
-                        let name = COLUMNS[*known];
-                        let field: String = field.chars().take(24).collect();
-                        return Err(at(
-                            line,
-                            format!(
-                                "{name} is \"{field}\", not a usable number; correct or cut the recording"
-                            ),
-                        ));
-                    };
-                    columns[*known].push(value);
-                }
-                count += 1;
-            }
-            if count != names.len() {
-                return Err(at(
-                    line,
-                    format!(
-                        "{count} fields where the header names {}; restore the row or cut the recording before it",
-                        names.len()
-                    ),
-                ));
-            }
-            let times = &columns[0];
-            if let [.., before, now] = times[..]
-                && now <= before
-            {
-                return Err(at(
-                    line,
-                    format!(
-                        "the time {now} s does not come after {before} s; times must increase from row to row"
-                    ),
-                ));
-            }
+            rows.push(index + 2, row).map_err(at)?;
         }
-        let [time_s, command, position_counts, tilt, reference, force] = columns;
+        let place = rows.place;
+        let [time_s, command, position_counts, tilt, reference, force] = rows.columns;
         if time_s.len() < 2 {
             return Err(InputError::new(format!(
                 "{file}: fewer than two rows; record some seconds of motion"

@@ -184,14 +184,13 @@ impl Rig {
         if let Some(what) = text.parse().ok().as_ref().and_then(known_keys::unknown) {
             return Err(InputError::new(format!("{file}: {what}")));
         }
-        rig.check(file)?;
+        rig.check().map_err(|what| InputError::new(format!("{file}: {what}")))?;
         Ok(rig)
     }
 
-    fn check(&self, file: &str) -> Result<(), InputError> {
-        let refuse = |what: String| Err(InputError::new(format!("{file}: {what}")));
+    fn check(&self) -> Result<(), String> {
         if self.format != 1 {
-            return refuse(format!("format is {}; this tool reads format 1", self.format));
+            return Err(format!("format is {}; this tool reads format 1", self.format));
         }
         let positive = [
             ("model.inertia", Some(self.model.inertia)),
@@ -201,23 +200,37 @@ impl Rig {
         ];
         for (key, value) in positive {
             if value.is_some_and(f64::is_nan) {
-                return refuse(format!(
+                return Err(format!(
                     "{key} is still to be filled in: no recording tells it; put in what your simulation has"
                 ));
             }
             if value.is_some_and(|x| !(x.is_finite() && x > 0.0 && x < 1e30)) {
-                return refuse(format!("{key} must be a number above zero; correct it"));
+                return Err(format!("{key} must be a number above zero; correct it"));
             }
         }
+        self.check_gain()?;
+        self.check_signed_values()?;
+        for effect in &self.effects {
+            effect.check().map_err(|reason| format!("effect {}: {reason}; correct it", effect.name))?;
+        }
+        Ok(())
+    }
+
+    fn check_gain(&self) -> Result<(), String> {
         let gain = self.actuator.gain;
         if gain.is_nan() {
-            return refuse(
+            return Err(
                 "actuator.gain is still to be filled in: it is the force for one unit of command, and no recording tells it".into(),
             );
         }
         if !(gain.is_finite() && gain != 0.0 && gain.abs() < 1e30) {
-            return refuse("actuator.gain must be a number other than zero; correct it".into());
+            return Err("actuator.gain must be a number other than zero; correct it".into());
         }
+        Ok(())
+    }
+
+    /// Checks the values that may be zero, and those that may have either sign.
+    fn check_signed_values(&self) -> Result<(), String> {
         let u = &self.uncertainty;
         let not_negative = [
             ("model.viscous", self.model.viscous),
@@ -237,12 +250,12 @@ impl Rig {
         ];
         for (key, value) in not_negative {
             if value.is_some_and(|x| !(x.is_finite() && (0.0..1e30).contains(&x))) {
-                return refuse(format!("{key} must be a number not below zero; correct it"));
+                return Err(format!("{key} must be a number not below zero; correct it"));
             }
         }
         if self.model.gravity.is_some_and(|x| x != 0.0) && !self.encoder.absolute {
-            return refuse(
-                "model.gravity needs counts of one zero; set encoder.absolute = true or take it out".into(),
+            return Err(
+                "model.gravity needs counts of one zero; set encoder.absolute = true or take it out".into()
             );
         }
         for (key, value) in [
@@ -252,12 +265,7 @@ impl Rig {
             ("model.gravity_zero", self.model.gravity_zero),
         ] {
             if value.is_some_and(|x| !(x.is_finite() && x.abs() < 1e30)) {
-                return refuse(format!("{key} must be a finite number; correct it"));
-            }
-        }
-        for effect in &self.effects {
-            if let Err(reason) = effect.check() {
-                return refuse(format!("effect {}: {reason}; correct it", effect.name));
+                return Err(format!("{key} must be a finite number; correct it"));
             }
         }
         Ok(())

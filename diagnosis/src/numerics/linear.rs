@@ -165,6 +165,38 @@ pub(crate) struct Solution {
     pub(crate) prior_cost: f64,
 }
 
+/// Solves for the coefficients that are not fixed; gives their places, the factor of their matrix and the solution.
+fn solve_free(full: &Square, right: &[f64], fixed: &[Option<f64>]) -> (Vec<usize>, Factor, Vec<f64>) {
+    let free: Vec<usize> = (0..fixed.len()).filter(|i| fixed[*i].is_none()).collect();
+    let mut part = Square::zero(free.len());
+    let mut rhs = vec![0.0; free.len()];
+    for (a, i) in free.iter().enumerate() {
+        rhs[a] = right[*i];
+        for (j, value) in fixed.iter().enumerate() {
+            if let Some(value) = value {
+                rhs[a] -= full.at(*i, j) * value;
+            }
+        }
+        for (b, j) in free.iter().enumerate() {
+            part.a[a * free.len() + b] = full.at(*i, *j);
+        }
+    }
+    let factor = Factor::new(&part);
+    let solution = factor.solve(&rhs);
+    (free, factor, solution)
+}
+
+/// The free coefficient that is furthest outside its bounds, if one is.
+fn worst_outside(free: &[usize], x: &[f64], priors: &[Prior]) -> Option<usize> {
+    let outside = |i: usize| {
+        let out = (priors[i].low - x[i]).max(x[i] - priors[i].high).max(0.0);
+        let width = priors[i].high - priors[i].low;
+        (i, out / if width.is_finite() { width } else { x[i].abs().max(1e-300) })
+    };
+    let all = free.iter().map(|i| outside(*i)).filter(|(_, out)| *out > 0.0);
+    all.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}
+
 /// Minimises ½ xᵀMx − bᵀx plus the priors within bounds, by an active set.
 pub(crate) fn bounded(m: &Square, b: &[f64], priors: &[Prior]) -> Solution {
     let n = m.n;
@@ -181,51 +213,26 @@ pub(crate) fn bounded(m: &Square, b: &[f64], priors: &[Prior]) -> Solution {
     let mut x = vec![0.0; n];
     let mut covariance = Square::zero(n);
     for _ in 0..=n {
-        let free: Vec<usize> = (0..n).filter(|i| fixed[*i].is_none()).collect();
-        let mut part = Square::zero(free.len());
-        let mut rhs = vec![0.0; free.len()];
-        for (a, i) in free.iter().enumerate() {
-            rhs[a] = right[*i];
-            for (j, value) in fixed.iter().enumerate() {
-                if let Some(value) = value {
-                    rhs[a] -= full.at(*i, j) * value;
-                }
-            }
-            for (b, j) in free.iter().enumerate() {
-                part.a[a * free.len() + b] = full.at(*i, *j);
-            }
-        }
-        let factor = Factor::new(&part);
-        let y = factor.solve(&rhs);
+        let (free, factor, y) = solve_free(&full, &right, &fixed);
         for (i, value) in fixed.iter().enumerate() {
             if let Some(value) = value {
                 x[i] = *value;
             }
         }
-        for (a, i) in free.iter().enumerate() {
-            x[*i] = y[a];
+        for (i, y) in free.iter().zip(y) {
+            x[*i] = y;
         }
-        let worst = free
-            .iter()
-            .map(|i| {
-                let out = (priors[*i].low - x[*i]).max(x[*i] - priors[*i].high).max(0.0);
-                let width = priors[*i].high - priors[*i].low;
-                (*i, out / if width.is_finite() { width } else { x[*i].abs().max(1e-300) })
-            })
-            .filter(|(_, out)| *out > 0.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        match worst {
-            Some((i, _)) => fixed[i] = Some(x[i].clamp(priors[i].low, priors[i].high)),
-            None => {
-                let inverse = factor.inverse();
-                for (a, i) in free.iter().enumerate() {
-                    for (b, j) in free.iter().enumerate() {
-                        covariance.a[i * n + j] = inverse.at(a, b);
-                    }
-                }
-                break;
+        if let Some(i) = worst_outside(&free, &x, priors) {
+            fixed[i] = Some(x[i].clamp(priors[i].low, priors[i].high));
+            continue;
+        }
+        let inverse = factor.inverse();
+        for (a, i) in free.iter().enumerate() {
+            for (b, j) in free.iter().enumerate() {
+                covariance.a[i * n + j] = inverse.at(a, b);
             }
         }
+        break;
     }
     let mut prior_cost = 0.0;
     for (x, prior) in x.iter().zip(priors) {

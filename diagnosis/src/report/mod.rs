@@ -15,6 +15,7 @@ pub(crate) mod patched_rig;
 pub(crate) mod run_forward;
 pub mod simulation_page;
 pub(crate) mod verdict;
+mod write;
 
 pub use crate::io::schema::{
     Both, ByModel, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report, Simulation,

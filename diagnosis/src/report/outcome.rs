@@ -6,14 +6,11 @@ use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
 use crate::numerics::digits::short;
-use crate::report::html;
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::io;
-use std::path::Path;
 
 /// Residuals of one recording over time, per block of at most 1 kHz.
 #[derive(Debug, Clone)]
@@ -201,46 +198,6 @@ impl Outcome {
             rate_hz: None,
         };
         Self { report, evidence, nominal_rig: rig.clone(), refit_rig: rig.clone(), patched_rig: rig.clone() }
-    }
-
-    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and `residuals.csv`, each whole or not at all.
-    pub fn write(&self, dir: &Path) -> io::Result<()> {
-        std::fs::create_dir_all(dir)?;
-        let json = serde_json::to_string_pretty(&self.report).map_err(io::Error::other)?;
-        let files = [
-            ("residuals.csv", self.residuals_csv()),
-            ("nominal-rig.toml", self.nominal_rig.to_toml()),
-            ("refit-rig.toml", self.refit_rig.to_toml()),
-            ("patched-rig.toml", self.patched_rig.to_toml()),
-            ("report.html", html::page(self)),
-            ("diagnosis.json", json + "\n"),
-        ];
-        for (name, text) in files {
-            let half = dir.join(format!(".{name}.part"));
-            std::fs::write(&half, text)?;
-            std::fs::rename(&half, dir.join(name))?;
-        }
-        Ok(())
-    }
-
-    fn residuals_csv(&self) -> String {
-        let mut out = String::from("recording,time_s,velocity,nominal,refit,patched\n");
-        for series in &self.evidence.series {
-            let file = series.file.replace([',', '"', '\n', '\r'], "_");
-            for j in 0..series.time_s.len() {
-                let _ = write!(out, "{file},{:.6},{:e}", series.time_s[j], series.velocity[j]);
-                for column in [&series.nominal, &series.refit, &series.patched] {
-                    match column[j] {
-                        Some(x) => {
-                            let _ = write!(out, ",{x:e}");
-                        }
-                        None => out.push(','),
-                    }
-                }
-                out.push('\n');
-            }
-        }
-        out
     }
 
     /// Ten lines for the terminal.

@@ -4,7 +4,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Key, total};
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch};
-use crate::selection::search::FittedModel;
+use crate::selection::context::FittedModel;
 use crate::validation::parameters;
 use crate::validation::residual_maps;
 use crate::validation::stepwise::Search;

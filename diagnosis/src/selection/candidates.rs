@@ -45,7 +45,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         t.command.iter().zip(t.row_hold.iter()).map(|(u, hold)| u * u * hold).sum()
     };
     let fast = speeds[speeds.len() * 99 / 100];
-    let machine = nominal.machine(None);
+    let machine = nominal.machine(&|_| None);
     let mut span = Span {
         slow: moving.get(moving.len() / 12).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
         speed: fast,
@@ -136,8 +136,8 @@ pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::blocked_recording::{Input, Total};
     use crate::estimation::filter::{Gains, Knows, Noise};
+    use crate::estimation::input::{Input, Total};
     use crate::estimation::refit::estimate_motion;
     use crate::estimation::regressors::effect_inputs;
     use crate::io::recording::Recording;
@@ -160,7 +160,7 @@ mod tests {
         let rig = Rig::of_values(0.01, 0.02, 0.05);
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let mut tracks = [BlockedRecording::new(&recording, &nominal.rig)];
-        let totals = [Total::of_command(&tracks[0], nominal.gain())];
+        let totals = [tracks[0].command_total(nominal.gain())];
         estimate_motion(&mut tracks, &totals, &NOISE, 1e-3, knows);
         let [track] = tracks;
         let [total] = totals;

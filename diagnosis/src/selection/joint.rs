@@ -7,7 +7,7 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::{Machine, Model};
 use crate::estimation::noise::Colour;
 use crate::selection::candidates;
-use crate::selection::search::{FitContext, FittedModel};
+use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::shape_search::descend;
 use rayon::prelude::*;
 
@@ -94,7 +94,7 @@ pub(crate) fn settle(
     }
     for _ in 0..ROUNDS {
         let fit = Fit::new(&model, context.nominal, context.tracks, noise);
-        let mut trial = on(&context.nominal.machine(Some(&fit)), &model);
+        let mut trial = on(&context.nominal.machine(&|key| fit.value(key)), &model);
         trial.bias = (0..context.tracks.len()).map(|r| fit.bias(r)).collect();
         let start = merit(&trial);
         let (value, trial) = descend(context, trial, noise, start, merit);

@@ -2,6 +2,7 @@
 //! sees a held-out recording.
 
 pub(crate) mod candidates;
+pub(crate) mod context;
 pub(crate) mod excitation;
 pub(crate) mod free_form;
 pub(crate) mod joint;

@@ -2,12 +2,14 @@
 
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N, wave_mean};
-use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
+use crate::estimation::input::Input;
 use crate::estimation::model::{Model, Nominal, effective_command};
 use crate::numerics::golden::golden;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
+use crate::selection::context::FitContext;
 use crate::selection::score_test::{Sums, Terms, project};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -47,94 +49,122 @@ fn wave_inputs(track: &BlockedRecording, wave: f64, drive: Option<&Input>) -> [I
     }
 }
 
-/// Finds the orders of cogging or torque ripple in the residual of a fit; the gain counts every recording's own phases.
-pub(crate) fn search(
-    name: N,
-    fit: &Fit,
-    residuals: &[Vec<f64>],
-    model: &Model,
-    tracks: &[BlockedRecording],
-    span: &Span,
-    nominal: &Nominal,
-) -> Option<(Effect, f64)> {
-    let (turn, orders) = candidates(span, nominal)?;
-    let whole = nominal.rig.turn().is_some_and(|known| known == turn);
-    let drives: Vec<Option<Input>> = tracks
-        .iter()
-        .map(|track| {
-            name.definition()
-                .scales_drive()
-                .then(|| track.drive(effective_command(track, &model.effects).as_deref()))
-        })
-        .collect();
-    let terms_of = |order: f64| -> Terms {
-        tracks
+/// Everything that a search for waves looks at.
+pub(crate) struct Searched<'a> {
+    pub(crate) fit: &'a Fit,
+    pub(crate) residuals: &'a [Vec<f64>],
+    pub(crate) model: &'a Model,
+}
+
+/// Waves along the travel: orders of a turn where it is known, otherwise cycles over the travel, with their responses.
+struct Waves<'a> {
+    context: &'a FitContext<'a>,
+    searched: &'a Searched<'a>,
+    /// The command's input of each recording, where the waves are in proportion to it.
+    drives: Vec<Option<Input>>,
+    /// Travel over which orders are counted, rad or m.
+    turn: f64,
+    orders: Vec<f64>,
+    /// True if orders are whole because the turn is known.
+    whole: bool,
+}
+
+impl<'a> Waves<'a> {
+    /// The waves worth trying for an effect; none where the recordings cannot show any.
+    fn new(name: N, context: &'a FitContext, searched: &'a Searched) -> Option<Self> {
+        let (turn, orders) = candidates(context.span, context.nominal)?;
+        let whole = context.nominal.rig.turn().is_some_and(|known| known == turn);
+        let scales_drive = name.definition().scales_drive();
+        let drive = |track: &BlockedRecording| {
+            scales_drive.then(|| track.drive(effective_command(track, &searched.model.effects).as_deref()))
+        };
+        let drives = context.tracks.iter().map(drive).collect();
+        Some(Self { context, searched, drives, turn, orders, whole })
+    }
+
+    /// Whitened responses to cosine and sine of one order.
+    fn terms(&self, order: f64) -> Terms {
+        self.context
+            .tracks
             .iter()
-            .zip(&fit.prepared)
-            .zip(&drives)
+            .zip(&self.searched.fit.prepared)
+            .zip(&self.drives)
             .map(|((track, one), drive)| {
-                let inputs = wave_inputs(track, order * TAU / turn, drive.as_ref());
+                let inputs = wave_inputs(track, order * TAU / self.turn, drive.as_ref());
                 inputs.iter().map(|input| one.gains.response(track, input)).collect()
             })
             .collect()
-    };
-    let single: Vec<f64> = orders
-        .par_iter()
-        .map(|order| {
-            let sums = project(fit, residuals, &terms_of(*order), true);
-            gain_of(&sums)
-        })
-        .collect();
-    // Only the best by themselves are fitted together.
-    let mut ranked: Vec<usize> = (0..orders.len()).collect();
-    ranked.sort_by(|a, b| single[*b].total_cmp(&single[*a]).then(a.cmp(b)));
-    let mut kept: Vec<usize> = Vec::new();
-    for index in ranked {
-        // Neighbours on a fine grid are the same peak.
-        let apart = whole || kept.iter().all(|k| (orders[*k] - orders[index]).abs() > 1.2);
-        if apart && single[index] > 3.0 {
-            kept.push(index);
-        }
-        if kept.len() >= if whole { 2 * MOST } else { MOST } {
-            break;
-        }
     }
-    if kept.is_empty() {
-        return None;
+
+    fn project(&self, terms: &Terms) -> Sums {
+        project(self.searched.fit, self.searched.residuals, terms, true)
     }
-    let refined: Vec<f64> = if whole {
-        kept.iter().map(|k| orders[*k]).collect()
-    } else {
-        kept.par_iter()
-            .map(|k| {
-                let at = |order: f64| gain_of(&project(fit, residuals, &terms_of(order), true));
-                golden(orders[*k] - 0.5, orders[*k] + 0.5, 7, at)
-            })
-            .collect()
-    };
-    let columns: Vec<Terms> = refined.par_iter().map(|order| terms_of(*order)).collect();
-    let joined: Terms = (0..tracks.len())
-        .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())
-        .collect();
-    let sums = project(fit, residuals, &joined, true);
-    let (chosen, gain) = forward(&sums, refined.len(), tracks.len(), (orders.len() as f64).ln());
-    let orders: Vec<f64> = chosen.iter().map(|i| refined[*i]).collect();
-    if orders.is_empty() || (whole && !name.definition().is_of_orders(&orders)) {
-        return None;
+
+    fn gain(&self, order: f64) -> f64 {
+        gain_of(&self.project(&self.terms(order)))
     }
-    let mut shape: Vec<(String, f64)> = Vec::new();
-    if whole {
-        shape.push(("turn".into(), turn));
-        for order in orders {
-            shape.push((format!("order_{order}"), order));
+
+    /// The orders that gain most by themselves, apart from each other, each moved to where it gains most.
+    fn best_alone(&self) -> Vec<f64> {
+        let orders = &self.orders;
+        let single: Vec<f64> = orders.par_iter().map(|order| self.gain(*order)).collect();
+        let mut ranked: Vec<usize> = (0..orders.len()).collect();
+        ranked.sort_by(|a, b| single[*b].total_cmp(&single[*a]).then(a.cmp(b)));
+        let mut kept: Vec<usize> = Vec::new();
+        for index in ranked {
+            // Neighbours on a fine grid are the same peak.
+            let apart = self.whole || kept.iter().all(|k| (orders[*k] - orders[index]).abs() > 1.2);
+            if apart && single[index] > 3.0 {
+                kept.push(index);
+            }
+            if kept.len() >= if self.whole { 2 * MOST } else { MOST } {
+                break;
+            }
         }
-    } else {
-        let mut periods: Vec<f64> = orders.iter().map(|order| turn / order).collect();
+        if self.whole {
+            return kept.iter().map(|k| orders[*k]).collect();
+        }
+        let refined = |k: &usize| golden(orders[*k] - 0.5, orders[*k] + 0.5, 7, |order| self.gain(order));
+        kept.par_iter().map(refined).collect()
+    }
+
+    /// The orders that gain most together, out of some, and their gain.
+    fn best_together(&self, orders: &[f64]) -> (Vec<f64>, f64) {
+        let columns: Vec<Terms> = orders.par_iter().map(|order| self.terms(*order)).collect();
+        let recordings = self.context.tracks.len();
+        let joined: Terms = (0..recordings)
+            .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())
+            .collect();
+        let sums = self.project(&joined);
+        let (chosen, gain) = forward(&sums, orders.len(), recordings, (self.orders.len() as f64).ln());
+        (chosen.iter().map(|i| orders[*i]).collect(), gain)
+    }
+
+    /// The shape of an effect that is made of some orders.
+    fn shape(&self, orders: &[f64]) -> Vec<(String, f64)> {
+        if self.whole {
+            let waves = orders.iter().map(|order| (format!("order_{order}"), *order));
+            return std::iter::once(("turn".to_owned(), self.turn)).chain(waves).collect();
+        }
+        let mut periods: Vec<f64> = orders.iter().map(|order| self.turn / order).collect();
         periods.sort_by(f64::total_cmp);
-        for (i, period) in periods.iter().enumerate() {
-            shape.push((format!("period_{}", i + 1), *period));
-        }
+        periods.into_iter().enumerate().map(|(i, period)| (format!("period_{}", i + 1), period)).collect()
     }
+}
+
+/// Finds the orders of cogging or torque ripple in the residual of a fit; the gain counts every recording's own phases.
+pub(crate) fn search(name: N, context: &FitContext, searched: &Searched) -> Option<(Effect, f64)> {
+    let waves = Waves::new(name, context, searched)?;
+    // Only the best by themselves are fitted together.
+    let alone = waves.best_alone();
+    if alone.is_empty() {
+        return None;
+    }
+    let (orders, gain) = waves.best_together(&alone);
+    if orders.is_empty() || (waves.whole && !name.definition().is_of_orders(&orders)) {
+        return None;
+    }
+    let shape = waves.shape(&orders);
     let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
     Some((Effect::shaped(name, &shape), gain))
 }

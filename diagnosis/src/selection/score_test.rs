@@ -1,13 +1,14 @@
 //! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
 
 use crate::effects::Effect;
-use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::{Fit, Prepared};
+use crate::estimation::input::Input;
 use crate::estimation::model::{Model, Nominal, effective_command, effective_commands};
 use crate::estimation::regressors::effect_inputs;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
-use crate::selection::search::PER_COEFFICIENT;
+use crate::selection::context::PER_COEFFICIENT;
 use rayon::prelude::*;
 
 /// What a score test says.

@@ -1,42 +1,19 @@
 //! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
 
-use crate::effects::definition::{NominalTerm, Span};
+use crate::effects::definition::NominalTerm;
 use crate::effects::{Effect, EffectName as N};
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
-use crate::estimation::model::{Model, Nominal, effective_commands};
-use crate::estimation::noise::{self, Colour};
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
 use crate::numerics::golden::golden;
 use crate::selection::candidates;
+use crate::selection::context::{FitContext, FittedModel, cost};
 use crate::selection::joint;
-use crate::selection::periodic;
+use crate::selection::periodic::{self, Searched};
 use crate::selection::score_test;
 use crate::selection::shape_search::descend;
 use rayon::prelude::*;
 
-/// A model fitted with the noise that goes with it.
-pub(crate) struct FittedModel {
-    pub(crate) model: Model,
-    pub(crate) noise: Noise,
-    pub(crate) fit: Fit,
-    /// Log-likelihood less what its freedom costs.
-    pub(crate) merit: f64,
-}
-
-/// Everything that selection works on.
-pub(crate) struct FitContext<'a> {
-    pub(crate) nominal: &'a Nominal,
-    pub(crate) tracks: &'a [BlockedRecording],
-    pub(crate) span: &'a Span,
-    /// Acceleration that the command makes: the scale of the noise search.
-    pub(crate) scale: f64,
-}
-
-/// What one value that is fitted costs in log-likelihood: half the logarithm of the number of independent stretches is
-/// about 3; shapes are searched and cost more.
-pub(crate) const PER_COEFFICIENT: f64 = 2.5;
-const PER_SHAPE: f64 = 4.0;
 /// How many effects are fitted in full at each step.
 const FINALISTS: usize = 8;
 /// How many of them have their shapes moved in full fits.
@@ -50,16 +27,6 @@ const MOVED_AGAIN: usize = 2;
 const FARTHER: usize = 4;
 /// How often waves are looked for again under the noise that they leave.
 const SEARCHES: usize = 3;
-/// Most effects that are named together.
-pub(crate) const MOST: usize = 3;
-
-/// What an effect's freedom costs.
-fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
-    let movable = candidates::movable(effect, span).len() as f64;
-    let coefficients = effect.name.definition().freedom(effect, tracks);
-    PER_COEFFICIENT * coefficients as f64 + PER_SHAPE * movable
-}
-
 /// The largest value along one value of a shape between two ends, in its logarithm, and the effect that has it.
 fn along(
     effect: &Effect,
@@ -81,33 +48,6 @@ fn along(
 }
 
 impl FitContext<'_> {
-    /// Fits a model with noise of its own, starting from known noise.
-    pub(crate) fn fit(&self, model: Model, from: &Noise, colour: Colour) -> FittedModel {
-        let first = Fit::new(&model, self.nominal, self.tracks, from);
-        let totals = first.totals(self.tracks);
-        let noise = noise::estimate(self.tracks, &totals, from, self.scale, colour);
-        let fit = Fit::new(&model, self.nominal, self.tracks, &noise);
-        let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
-        let merit = fit.log_likelihood - spent;
-        FittedModel { model, noise, fit, merit }
-    }
-
-    /// Fits a model under known noise.
-    pub(crate) fn fit_at(&self, model: Model, noise: &Noise) -> FittedModel {
-        let fit = Fit::new(&model, self.nominal, self.tracks, noise);
-        let spent: f64 = model.effects.iter().map(|e| cost(e, self.tracks.len(), self.span)).sum();
-        let merit = fit.log_likelihood - spent;
-        FittedModel { model, noise: *noise, fit, merit }
-    }
-
-    /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
-    /// what a disturbance explains are two optima.
-    pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
-        let fits =
-            starts.par_iter().map(|from| self.fit(model.clone(), from, Colour::Slow)).collect::<Vec<_>>();
-        fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
-    }
-
     /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
     pub(crate) fn screen(
         &self,
@@ -129,15 +69,10 @@ impl FitContext<'_> {
             }
             let best = match name {
                 name if !candidates::is_seen(*name, self.nominal) => None,
-                name if name.definition().is_periodic() => periodic::search(
-                    *name,
-                    &now.fit,
-                    &residuals,
-                    &now.model,
-                    self.tracks,
-                    self.span,
-                    self.nominal,
-                ),
+                name if name.definition().is_periodic() => {
+                    let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
+                    periodic::search(*name, self, &searched)
+                }
                 _ => {
                     let grid = candidates::shapes(*name, self.span, self.nominal);
                     score_test::best_on_grid(
@@ -222,8 +157,8 @@ impl FitContext<'_> {
             let name = model.effects.pop()?.name;
             let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
             let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
-            let (effect, _) =
-                periodic::search(name, &base, &residuals, &model, self.tracks, self.span, self.nominal)?;
+            let searched = Searched { fit: &base, residuals: &residuals, model: &model };
+            let (effect, _) = periodic::search(name, self, &searched)?;
             model.effects.push(effect);
             Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
         };
@@ -233,17 +168,6 @@ impl FitContext<'_> {
             best = found;
         }
         best
-    }
-
-    /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
-    pub(crate) fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
-        let effect = model.effects.last().expect("there is an effect to polish");
-        let effective = effective_commands(self.tracks, &model.effects);
-        let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);
-        if !effect.name.definition().is_possible(effect) || effective.is_some_and(ignores) {
-            return f64::NEG_INFINITY;
-        }
-        Fit::new(model, self.nominal, self.tracks, noise).log_likelihood
     }
 
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.

@@ -1,13 +1,13 @@
 //! Moves all values of a shape together: Gauss–Newton on whitened innovations, with the coefficients projected out.
 
-use crate::estimation::blocked_recording::Input;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
+use crate::estimation::input::Input;
 use crate::estimation::model::{Model, total};
 use crate::numerics::linear::Factor;
 use crate::selection::candidates;
+use crate::selection::context::FitContext;
 use crate::selection::score_test::{Terms, project};
-use crate::selection::search::FitContext;
 use rayon::prelude::*;
 
 /// Most steps, and the longest, as a change of a value's logarithm.

@@ -62,9 +62,23 @@ impl Plant {
         for law in &mut self.commands {
             effective = law.step(effective, dt);
         }
+        let (free, dry) = self.forces(effective, around, dt);
+        let before = self.velocity;
+        self.velocity = self.velocity_after(free, dry.max(0.0), dt);
+        // The mean speed of the step: with the last one the reading would be half a step early, which shows without noise.
+        let mean = 0.5 * (before + self.velocity);
+        self.position += mean * dt;
+        if let Some(filter) = self.filter_s() {
+            let settled = filter * mean;
+            self.lag = settled + (self.lag - settled) * (-dt / filter).exp();
+        }
+        self.time += dt;
+    }
+
+    /// The force on the axis without its dry friction, and how much dry friction there is.
+    fn forces(&mut self, effective: f64, around: Surroundings, dt: f64) -> (f64, f64) {
         let drive = self.rig.actuator.gain * effective;
         let model = &self.rig.model;
-        let coulomb = model.coulomb.unwrap_or(0.0);
         // While stuck the laws see the direction in which the drive pushes, so that breakaway is against friction.
         let push = drive + around.external;
         let velocity = if self.velocity == 0.0 { push.signum() * f64::MIN_POSITIVE } else { self.velocity };
@@ -81,7 +95,7 @@ impl Plant {
             dt,
             ..State::default()
         };
-        let mut dry = coulomb;
+        let mut dry = model.coulomb.unwrap_or(0.0);
         let mut free = push - model.viscous.unwrap_or(0.0) * self.velocity + model.offset.unwrap_or(0.0)
             - model.gravity.unwrap_or(0.0) * (self.position - model.gravity_zero.unwrap_or(0.0)).sin()
             + model.weight.unwrap_or(0.0) * around.tilt.sin();
@@ -102,32 +116,26 @@ impl Plant {
                 free += sum + holds * velocity.signum();
             }
         }
-        let dry = dry.max(0.0);
-        let inertia = model.inertia;
-        let before = self.velocity;
+        (free, dry)
+    }
+
+    /// The velocity after a step. Dry friction stops the axis; it never turns it round within a step.
+    fn velocity_after(&self, free: f64, dry: f64, dt: f64) -> f64 {
+        let inertia = self.rig.model.inertia;
         if self.velocity == 0.0 {
-            if free.abs() > dry {
-                self.velocity = (free - free.signum() * dry) / inertia * dt;
-            }
+            return if free.abs() > dry {
+                (free - free.signum() * dry) / inertia * dt
+            } else {
+                self.velocity
+            };
+        }
+        let next = self.velocity + (free - self.velocity.signum() * dry) / inertia * dt;
+        let coasting = self.velocity + free / inertia * dt;
+        if next * self.velocity < 0.0 && (coasting * self.velocity > 0.0 || free.abs() <= dry) {
+            0.0
         } else {
-            let next = self.velocity + (free - self.velocity.signum() * dry) / inertia * dt;
-            // Dry friction stops the axis; it never turns it round within a step.
-            let coasting = self.velocity + free / inertia * dt;
-            self.velocity =
-                if next * self.velocity < 0.0 && (coasting * self.velocity > 0.0 || free.abs() <= dry) {
-                    0.0
-                } else {
-                    next
-                };
+            next
         }
-        // The mean speed of the step: with the last one the reading would be half a step early, which shows without noise.
-        let mean = 0.5 * (before + self.velocity);
-        self.position += mean * dt;
-        if let Some(filter) = self.filter_s() {
-            let settled = filter * mean;
-            self.lag = settled + (self.lag - settled) * (-dt / filter).exp();
-        }
-        self.time += dt;
     }
 
     /// True position, rad or m.

@@ -100,44 +100,60 @@ fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
         out
     };
     let usable = |theta: &[f64]| at(theta).model.inertia > 0.05 * rig.model.inertia;
-    let n = moved.len();
-    let mut theta = vec![0.0; n];
-    let mut off = residuals(rig, besides, seconds);
+    let off = |theta: &[f64]| residuals(&at(theta), besides, seconds);
+    let (start, at_start) = (vec![0.0; moved.len()], residuals(rig, besides, seconds));
+    at(&least_squares((start, at_start), &off, &usable))
+}
+
+/// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by differences.
+fn normal_equations(
+    theta: &[f64],
+    at_theta: &[f64],
+    off: &(dyn Fn(&[f64]) -> Vec<f64> + Sync),
+) -> (Square, Vec<f64>) {
+    let n = theta.len();
+    let columns: Vec<Vec<f64>> = (0..n)
+        .into_par_iter()
+        .map(|k| {
+            let mut there = theta.to_vec();
+            there[k] += APART;
+            off(&there).iter().zip(at_theta).map(|(a, b)| (a - b) / APART).collect()
+        })
+        .collect();
+    let mut information = Square::zero(n);
+    let mut score = vec![0.0; n];
+    for i in 0..n {
+        score[i] = -dot(&columns[i], at_theta);
+        for j in 0..n {
+            information.add(i, j, dot(&columns[i], &columns[j]));
+        }
+    }
+    (information, score)
+}
+
+/// Minimises the sum of squares of residuals by Levenberg–Marquardt, from values with their residuals; `off` gives the residuals
+/// of other values, of which only those that are `usable` are taken.
+fn least_squares(
+    (mut theta, mut at_theta): (Vec<f64>, Vec<f64>),
+    off: &(dyn Fn(&[f64]) -> Vec<f64> + Sync),
+    usable: &dyn Fn(&[f64]) -> bool,
+) -> Vec<f64> {
     let mut damping = 1e-2;
     for _ in 0..ITERATIONS {
-        let columns: Vec<Vec<f64>> = (0..n)
-            .into_par_iter()
-            .map(|k| {
-                let mut there = theta.clone();
-                there[k] += APART;
-                residuals(&at(&there), besides, seconds)
-                    .iter()
-                    .zip(&off)
-                    .map(|(a, b)| (a - b) / APART)
-                    .collect()
-            })
-            .collect();
-        let mut information = Square::zero(n);
-        let mut score = vec![0.0; n];
-        for i in 0..n {
-            score[i] = -dot(&columns[i], &off);
-            for j in 0..n {
-                information.add(i, j, dot(&columns[i], &columns[j]));
-            }
-        }
-        let before = dot(&off, &off);
+        let (information, score) = normal_equations(&theta, &at_theta, off);
+        let before = dot(&at_theta, &at_theta);
         let mut better = false;
         for _ in 0..TRIES {
             let mut damped = information.clone();
-            for i in 0..n {
+            for i in 0..theta.len() {
                 damped.add(i, i, damping * information.at(i, i) + 1e-30);
             }
             let step = Factor::new(&damped).solve(&score);
             let trial: Vec<f64> = theta.iter().zip(&step).map(|(a, b)| a + b.clamp(-0.5, 0.5)).collect();
             if usable(&trial) {
-                let there = residuals(&at(&trial), besides, seconds);
+                let there = off(&trial);
                 if dot(&there, &there) < before {
-                    (theta, off) = (trial, there);
+                    (theta, at_theta) = (trial, there);
                     damping = (0.3 * damping).max(1e-9);
                     better = true;
                     break;
@@ -145,9 +161,9 @@ fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
             }
             damping *= 5.0;
         }
-        if !better || before - dot(&off, &off) < ENOUGH * before {
+        if !better || before - dot(&at_theta, &at_theta) < ENOUGH * before {
             break;
         }
     }
-    at(&theta)
+    theta
 }

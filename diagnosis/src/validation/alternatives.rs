@@ -4,17 +4,17 @@ use crate::effects::definition::Shown;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
-use crate::estimation::model::Nominal;
+use crate::estimation::model::{Model, Nominal};
 use crate::estimation::noise::Colour;
 use crate::io::rig::Kind;
 use crate::numerics::bootstrap::bootstrap;
+use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
-use crate::selection::search::{FitContext, FittedModel};
 use crate::thresholds::{BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, MOST_IN_CLASS};
 use crate::validation::evidence::{EffectEvidence, Rival};
 use crate::validation::held_out::HeldOut;
-use crate::validation::judge::evaluate_all;
+use crate::validation::holdout::evaluate_all;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use rayon::prelude::*;
@@ -42,7 +42,33 @@ pub(crate) fn fit_rivals(
     found: &mut [EffectEvidence],
 ) {
     let best = context.fit(last.model.clone(), &last.noise, Colour::White);
-    for i in 0..found.len() {
+    let contest = Contest { context, best: &best, slow, holdout };
+    for (i, found) in found.iter_mut().enumerate() {
+        found.rivals = contest.rivals_of(i);
+    }
+}
+
+/// What rivals of the effects of a model compete under.
+struct Contest<'a> {
+    context: &'a FitContext<'a>,
+    /// The model under white noise.
+    best: &'a FittedModel,
+    /// The model under coloured noise.
+    slow: &'a FittedModel,
+    holdout: &'a HeldOut,
+}
+
+/// A model with one more effect.
+fn with(base: &Model, effect: &Effect) -> Model {
+    let mut model = base.clone();
+    model.effects.push(effect.clone());
+    model
+}
+
+impl Contest<'_> {
+    /// The best others in the place of effect `i`, with how far behind they are.
+    fn rivals_of(&self, i: usize) -> Vec<Rival> {
+        let Self { context, best, .. } = *self;
         let mut less = best.model.clone();
         less.effects.remove(i);
         let name = best.model.effects[i].name;
@@ -54,57 +80,56 @@ pub(crate) fn fit_rivals(
             .into_iter()
             .take(RIVALS)
             .collect();
-        let with = |effect: &Effect| {
-            let mut model = base.model.clone();
-            model.effects.push(effect.clone());
-            model
+        let mut rivals: Vec<Rival> =
+            others.par_iter().map(|(effect, _)| self.rival(&base.model, effect)).collect();
+        self.tell_apart_by_slow_noise(&base.model, &others, &mut rivals);
+        rivals
+    }
+
+    /// One effect fitted beside the others of the model, with how far behind it is.
+    fn rival(&self, base: &Model, effect: &Effect) -> Rival {
+        let Self { context, best, .. } = *self;
+        let model = with(base, effect);
+        let fit = Fit::new(&model, context.nominal, context.tracks, &best.noise);
+        let mut rival = FittedModel { model, noise: best.noise, fit, merit: 0.0 };
+        // Both are judged where both know something.
+        let holdout = self.holdout.judging(&best.model, context.span);
+        let holdout = known(&holdout, &rival.model, context.span);
+        let own = costs(best, context.nominal, &holdout);
+        let lead = |rival: &FittedModel| {
+            let theirs = costs(rival, context.nominal, &holdout);
+            let leads: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
+            let fitted = rival.fit.prepared.iter().map(|one| one.segments.len()).sum::<usize>();
+            (bootstrap(&leads), leads[fitted..].iter().sum::<f64>())
         };
-        let mut out: Vec<Rival> = others
-            .par_iter()
-            .map(|(effect, _)| {
-                let model = with(effect);
-                let fit = Fit::new(&model, context.nominal, context.tracks, &best.noise);
-                let rival = FittedModel { model, noise: best.noise, fit, merit: 0.0 };
-                // Both are judged where both know something.
-                let holdout = holdout.judging(&best.model, context.span);
-                let holdout = known(&holdout, &rival.model, context.span);
-                let own = costs(&best, context.nominal, &holdout);
-                let lead = |rival: &FittedModel| {
-                    let theirs = costs(rival, context.nominal, &holdout);
-                    let leads: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
-                    let fitted = rival.fit.prepared.iter().map(|one| one.segments.len()).sum::<usize>();
-                    (bootstrap(&leads), leads[fitted..].iter().sum::<f64>())
-                };
-                let (mut gain, mut held_out) = lead(&rival);
-                let mut rival = rival;
-                if gain.z < WITHIN_REACH {
-                    // A rival that may be near is fitted as well as the winner was.
-                    let polished = FittedModel { noise: best.noise, ..context.polish_one(&rival) };
-                    let again = lead(&polished);
-                    if again.0.sum < gain.sum {
-                        ((gain, held_out), rival) = (again, polished);
-                    }
-                }
-                let last = rival.model.effects.len() - 1;
-                let absence =
-                    (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
-                Rival { name: effect.name, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
-            })
-            .collect();
-        // Needed only where a rival comes near, and the same for all of them.
+        let (mut gain, mut held_out) = lead(&rival);
+        if gain.z < WITHIN_REACH {
+            // A rival that may be near is fitted as well as the winner was.
+            let polished = FittedModel { noise: best.noise, ..context.polish_one(&rival) };
+            let again = lead(&polished);
+            if again.0.sum < gain.sum {
+                ((gain, held_out), rival) = (again, polished);
+            }
+        }
+        let last = rival.model.effects.len() - 1;
+        let absence = (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
+        Rival { name: effect.name, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
+    }
+
+    /// Puts those near rivals behind that only a white noise takes for as good as the winner.
+    fn tell_apart_by_slow_noise(&self, base: &Model, others: &[(Effect, f64)], rivals: &mut [Rival]) {
+        let merit = |model: Model| self.context.fit_slow(model, &[&self.slow.noise]).merit;
+        // Needed only where a rival is near, and the same for all of them.
         let mut without = None;
-        for (rival, (effect, _)) in out.iter_mut().zip(&others).filter(|(rival, _)| rival.z < BEHIND_Z) {
-            // What only a white noise takes for as good is behind.
-            let theirs = context.fit_slow(with(effect), &[&slow.noise]).merit;
-            let without =
-                *without.get_or_insert_with(|| context.fit_slow(base.model.clone(), &[&slow.noise]).merit);
-            let behind = slow.merit - theirs;
-            if behind > 0.5 * (slow.merit - without) && behind > BEHIND_SLOW_NATS {
+        for (rival, (effect, _)) in rivals.iter_mut().zip(others).filter(|(rival, _)| rival.z < BEHIND_Z) {
+            let theirs = merit(with(base, effect));
+            let without = *without.get_or_insert_with(|| merit(base.clone()));
+            let behind = self.slow.merit - theirs;
+            if behind > 0.5 * (self.slow.merit - without) && behind > BEHIND_SLOW_NATS {
                 rival.z = BEHIND_SLOW_Z;
                 rival.lead = rival.lead.max(behind);
             }
         }
-        found[i].rivals = out;
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::io::schema::{Both, FitTable};
-use crate::selection::search::{FitContext, FittedModel};
+use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::known_travel::known;
 use crate::validation::residuals::{Residuals, relative_gain, residuals};
 

@@ -2,13 +2,14 @@
 //! row, and how large a force is left is best told from all rows.
 
 use crate::effects::definition::Span;
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Knows;
+use crate::estimation::input::Total;
 use crate::estimation::model::{Model, Nominal};
 use crate::estimation::noise::guess;
 use crate::estimation::refit::estimate_motion;
-use crate::selection::search::FittedModel;
-use crate::validation::judge::evaluate_all;
+use crate::selection::context::FittedModel;
+use crate::validation::holdout::evaluate_all;
 use crate::validation::known_travel::known;
 use std::borrow::Cow;
 
@@ -64,7 +65,7 @@ fn follow(
 ) {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
-    let drives: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let drives: Vec<Total> = tracks.iter().map(|track| track.command_total(nominal.gain())).collect();
     let first = guess(tracks, scale);
     estimate_motion(tracks, &drives, &first, count, knows);
     for _ in 0..3 {

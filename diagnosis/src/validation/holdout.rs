@@ -2,15 +2,16 @@
 //! encoder's zero, on which the phase of periodic effects rests). For likelihoods that is found on other stretches of the
 //! recording than those it judges, as it is on fitted recordings, so that no freedom on held-out rows speaks for an effect.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
+use crate::estimation::input::Total;
 use crate::estimation::model::{Key, Model, Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
+use crate::selection::context::FittedModel;
 use crate::selection::joint;
 use crate::selection::predictive::{FOLDS, fold_of};
-use crate::selection::search::FittedModel;
 use rayon::prelude::*;
 
 /// A model laid on one held-out recording.
@@ -124,6 +125,16 @@ pub(crate) fn evaluate(
         }
     }
     evaluated
+}
+
+/// Lays a model on every held-out recording.
+pub(crate) fn evaluate_all(
+    c: &FittedModel,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+) -> Vec<HoldoutFit> {
+    tracks.iter().map(|track| evaluate(c, nominal, track, noise)).collect()
 }
 
 /// How often the force that is there all the time is found anew.

@@ -2,35 +2,27 @@
 //! says what is enough to be named.
 
 use crate::effects::EffectName;
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::force_residual::Estimator;
-use crate::estimation::model::{Key, Model, Nominal};
+use crate::estimation::input::Total;
+use crate::estimation::model::{Key, Model};
 use crate::numerics::bootstrap::bootstrap;
 use crate::selection::candidates;
+use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::periodic;
 use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
-use crate::selection::search::{FitContext, FittedModel};
 use crate::thresholds::DRIFT;
 use crate::validation::evidence::EffectEvidence;
 use crate::validation::held_out::HeldOut;
-use crate::validation::holdout::{self, HoldoutFit};
+use crate::validation::holdout::{self, evaluate_all};
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
 
 /// Part of a refit's mean square that counts as above the noise at the least: how much of it the noise is, is itself unsure.
 const LEAST_EXPLAINABLE: f64 = 0.2;
-/// Lays a model on every held-out recording.
-pub(crate) fn evaluate_all(
-    c: &FittedModel,
-    nominal: &Nominal,
-    tracks: &[BlockedRecording],
-    noise: &Noise,
-) -> Vec<HoldoutFit> {
-    tracks.iter().map(|track| holdout::evaluate(c, nominal, track, noise)).collect()
-}
 
 /// What speaks for each effect of a model fitted under white noise; its score is that under `slow`.
 pub(crate) fn judge_all(

@@ -3,8 +3,8 @@
 use crate::effects::{Effect, Variable};
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
+use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
-use crate::selection::search::{FitContext, FittedModel};
 use crate::validation::assess::Assessment;
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;

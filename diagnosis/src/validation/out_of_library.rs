@@ -7,7 +7,7 @@ use crate::effects::{Effect, EffectName};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::selection::search::{FitContext, FittedModel, PER_COEFFICIENT};
+use crate::selection::context::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;

@@ -6,7 +6,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Key, Nominal};
 use crate::io::schema::Parameter;
 use crate::numerics::linear::Square;
-use crate::selection::search::{FitContext, FittedModel};
+use crate::selection::context::{FitContext, FittedModel};
 use std::collections::BTreeMap;
 
 /// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and the relative standard

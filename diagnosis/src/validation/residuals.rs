@@ -1,12 +1,13 @@
 //! Residual forces as people see them: under the nominal, the refitted and the patched model, and what one takes from
 //! the other.
 
-use crate::estimation::blocked_recording::{BlockedRecording, Total};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
+use crate::estimation::input::Total;
 use crate::estimation::model::{Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
-use crate::selection::search::FittedModel;
-use crate::validation::judge::evaluate_all;
+use crate::selection::context::FittedModel;
+use crate::validation::holdout::evaluate_all;
 use crate::validation::parameters;
 
 /// Residual force of a model over recordings, per block.
@@ -32,7 +33,7 @@ pub(crate) fn drive_force(
     estimator: &Estimator,
     tracks: &[BlockedRecording],
 ) -> Vec<Vec<f64>> {
-    let drive: Vec<Total> = tracks.iter().map(|track| Total::of_command(track, nominal.gain())).collect();
+    let drive: Vec<Total> = tracks.iter().map(|track| track.command_total(nominal.gain())).collect();
     let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
     let j0 = nominal.rig.model.inertia;
     let all = forces(estimator, tracks, &none, j0);

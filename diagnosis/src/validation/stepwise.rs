@@ -14,7 +14,7 @@ use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
-use crate::selection::search::{FitContext, FittedModel, MOST};
+use crate::selection::context::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use crate::validation::evidence::EffectEvidence;

@@ -2,7 +2,8 @@
 //! regression with a prior (Solin and Särkkä 2020, doi 10.1007/s11222-019-09886-w). Nothing here is fitted.
 
 use crate::effects::Variable;
-use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::input::Input;
 use std::f64::consts::{PI, TAU};
 
 /// The inputs of one free form.

@@ -3,9 +3,10 @@
 use super::basis::{self, Basis, Inputs, Point, Warps};
 use super::compare::{Densities, Density};
 use super::shape::{Coefficients, Shape};
-use crate::estimation::blocked_recording::{BlockedRecording, Input};
+use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise};
 use crate::estimation::fit::{Prepared, layout};
+use crate::estimation::input::Input;
 use crate::estimation::model::{Key, Model, Nominal};
 use crate::numerics::linear::{Factor, Square, dot};
 use rayon::prelude::*;
