@@ -6,7 +6,6 @@
 //! Because an innovation only holds what the past did not tell, a command that reacts to a disturbance is not mistaken
 //! for its cause (prediction-error identification in closed loop, Ljung 1999, chapter 13).
 
-use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::input::{Input, Total};
 use crate::estimation::reading_lag::LagStep;
 use std::ops::Range;
@@ -24,6 +23,31 @@ pub(crate) struct Noise {
     pub(crate) tau: f64,
     /// White acceleration at rest, where friction is a reaction, (rad/s²)²·s.
     pub(crate) rest: f64,
+}
+
+/// What the filter needs of a recording, block by block.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observed<'a> {
+    /// Start and length of each block, s.
+    pub(crate) start: &'a [f64],
+    pub(crate) span: &'a [f64],
+    /// Mean over the rows of the time since the block's start, s, and of half its square, s².
+    pub(crate) tau1: &'a [f64],
+    pub(crate) tau2: &'a [f64],
+    /// How the reading lags, where the rig declares a filter in it.
+    pub(crate) reading_lag: &'a [LagStep],
+    /// Mean reading, and its variance from quantisation alone.
+    pub(crate) z: &'a [f64],
+    pub(crate) quantum: &'a [f64],
+    /// Blocks where the axis rests, and where it is stuck.
+    pub(crate) rest: &'a [bool],
+    pub(crate) stuck: &'a [bool],
+}
+
+impl Observed<'_> {
+    fn blocks(&self) -> usize {
+        self.span.len()
+    }
 }
 
 /// Gains of the filter over one recording; they do not depend on the data.
@@ -49,7 +73,7 @@ struct Step<const N: usize> {
 }
 
 impl<const N: usize> Step<N> {
-    fn new(track: &BlockedRecording, noise: &Noise, j: usize) -> Self {
+    fn new(track: &Observed, noise: &Noise, j: usize) -> Self {
         let h = track.span[j];
         let white = if track.rest[j] { noise.rest.max(noise.white) } else { noise.white };
         let rho = (-h / noise.tau).exp();
@@ -79,7 +103,7 @@ impl<const N: usize> Step<N> {
 /// Variance of the place at the start over that of one reading: as good as unknown, and far from rounding.
 const DIFFUSE: f64 = 1e4;
 
-fn initial<const N: usize>(track: &BlockedRecording, noise: &Noise) -> Covariance<N> {
+fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
     let reach = track.z.iter().fold(0.0_f64, |m, z| m.max(z.abs())).max(1e-12);
     let duration = track.start[track.blocks() - 1].max(1e-3);
     let speed = 100.0 * reach / duration.min(1.0);
@@ -153,14 +177,14 @@ pub(crate) fn robust_loss(mean_square: f64) -> (f64, f64) {
 }
 
 /// Innovations at the start that only find the state.
-fn settling(track: &BlockedRecording) -> usize {
+fn settling(track: &Observed) -> usize {
     if track.reading_lag.is_empty() { 3 } else { 4 }
 }
 
 /// The filter's state on its way through a recording.
 struct Walk<'a> {
     gains: &'a Gains,
-    track: &'a BlockedRecording,
+    track: &'a Observed<'a>,
     settling: usize,
     position: f64,
     speed: f64,
@@ -169,7 +193,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn new(gains: &'a Gains, track: &'a BlockedRecording, position: f64) -> Self {
+    fn new(gains: &'a Gains, track: &'a Observed<'a>, position: f64) -> Self {
         Self { gains, track, settling: settling(track), position, speed: 0.0, disturbance: 0.0, lag: 0.0 }
     }
 
@@ -196,11 +220,11 @@ impl<'a> Walk<'a> {
 
 impl Gains {
     /// Runs the covariance over a recording.
-    pub(crate) fn new(track: &BlockedRecording, noise: &Noise) -> Self {
+    pub(crate) fn new(track: &Observed, noise: &Noise) -> Self {
         if track.reading_lag.is_empty() { Self::of::<3>(track, noise) } else { Self::of::<4>(track, noise) }
     }
 
-    fn of<const N: usize>(track: &BlockedRecording, noise: &Noise) -> Self {
+    fn of<const N: usize>(track: &Observed, noise: &Noise) -> Self {
         let n = track.blocks();
         let mut gains = Self {
             k: Vec::with_capacity(n),
@@ -227,7 +251,7 @@ impl Gains {
     }
 
     /// Whitened innovations of the data under a model's total input.
-    pub(crate) fn innovations(&self, track: &BlockedRecording, total: &Total) -> Vec<f64> {
+    pub(crate) fn innovations(&self, track: &Observed, total: &Total) -> Vec<f64> {
         let mut walk = Walk::new(self, track, track.z[0]);
         (0..track.blocks())
             .map(|j| walk.step(j, track.z[j], [total.dv[j], total.dq[j], total.dz[j]]))
@@ -235,7 +259,7 @@ impl Gains {
     }
 
     /// What one unit of an input does to the whitened innovations, with the sign of a regressor.
-    pub(crate) fn response(&self, track: &BlockedRecording, input: &Input) -> Vec<f64> {
+    pub(crate) fn response(&self, track: &Observed, input: &Input) -> Vec<f64> {
         let all = 0..track.blocks();
         let free = |j: usize| !track.stuck[j];
         match input {
@@ -251,12 +275,12 @@ impl Gains {
     }
 
     /// What a reading that jumps by one from block `over.start` on does there.
-    pub(crate) fn response_to_jump(&self, track: &BlockedRecording, over: Range<usize>) -> Vec<f64> {
+    pub(crate) fn response_to_jump(&self, track: &Observed, over: Range<usize>) -> Vec<f64> {
         self.response_over(track, over, |_| [0.0, 0.0, 1.0])
     }
 
     /// What a jump of speed by one within block `over.start` does there.
-    pub(crate) fn response_to_impact(&self, track: &BlockedRecording, over: Range<usize>) -> Vec<f64> {
+    pub(crate) fn response_to_impact(&self, track: &Observed, over: Range<usize>) -> Vec<f64> {
         let (at, h) = (over.start, track.span[over.start]);
         let impact = [1.0, 0.5 * h, track.tau2[at] / h];
         self.response_over(track, over, |j| if j == at { impact } else { [0.0; 3] })
@@ -265,7 +289,7 @@ impl Gains {
     /// What changes of speed, of position and of the reading in some blocks do to the innovations there.
     fn response_over(
         &self,
-        track: &BlockedRecording,
+        track: &Observed,
         over: Range<usize>,
         input: impl Fn(usize) -> [f64; 3],
     ) -> Vec<f64> {
@@ -313,7 +337,7 @@ pub(crate) enum Knows {
 }
 
 /// The motion under the model's input.
-pub(crate) fn motion(track: &BlockedRecording, noise: &Noise, total: &Total, knows: Knows) -> Motion {
+pub(crate) fn motion(track: &Observed, noise: &Noise, total: &Total, knows: Knows) -> Motion {
     if track.reading_lag.is_empty() {
         motion_of::<3>(track, noise, total, knows)
     } else {
@@ -321,7 +345,7 @@ pub(crate) fn motion(track: &BlockedRecording, noise: &Noise, total: &Total, kno
     }
 }
 
-fn motion_of<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total, knows: Knows) -> Motion {
+fn motion_of<const N: usize>(track: &Observed, noise: &Noise, total: &Total, knows: Knows) -> Motion {
     let filtered = filter::<N>(track, noise, total);
     if knows == Knows::All {
         return smooth(track, noise, total, &filtered);
@@ -344,7 +368,7 @@ struct Filtered<const N: usize> {
 }
 
 /// What the filter knows after each block's reading.
-fn filter<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total) -> Vec<Filtered<N>> {
+fn filter<const N: usize>(track: &Observed, noise: &Noise, total: &Total) -> Vec<Filtered<N>> {
     let n = track.blocks();
     let mut filtered: Vec<Filtered<N>> = Vec::with_capacity(n);
     let mut p = initial::<N>(track, noise);
@@ -375,7 +399,7 @@ fn filter<const N: usize>(track: &BlockedRecording, noise: &Noise, total: &Total
 /// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
 /// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
 fn smooth<const N: usize>(
-    track: &BlockedRecording,
+    track: &Observed,
     noise: &Noise,
     total: &Total,
     filtered: &[Filtered<N>],

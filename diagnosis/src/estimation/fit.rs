@@ -31,13 +31,15 @@ pub(crate) struct Prepared {
 impl Prepared {
     pub(crate) fn new(model: &Model, nominal: &Nominal, track: &BlockedRecording, noise: &Noise) -> Self {
         let columns = model.columns(nominal, track, noise);
-        let gains = Gains::new(track, noise);
+        let observed = track.observed();
+        let gains = Gains::new(&observed, noise);
         let reference: Vec<f64> = columns.iter().map(|c| c.prior.mean).collect();
         let at_reference = total(track, &columns, &reference);
-        let residual = gains.innovations(track, &at_reference);
-        let responses: Vec<Vec<f64>> = columns.par_iter().map(|c| gains.response(track, &c.input)).collect();
+        let residual = gains.innovations(&observed, &at_reference);
+        let responses: Vec<Vec<f64>> =
+            columns.par_iter().map(|c| gains.response(&observed, &c.input)).collect();
         let segments = grams(track, &responses, &residual);
-        let bounds = track.segments.clone();
+        let bounds = track.blocks.segments.clone();
         let weight = vec![1.0; segments.len()];
         let surcharges = surcharges(track, model);
         Self { columns, reference, residual, responses, gains, segments, surcharges, bounds, weight }
@@ -119,11 +121,11 @@ impl Prepared {
 /// What a model with lost counts pays in each segment of a recording for the jumps found in it, in log-likelihood.
 fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
     let has_jumps = model.effects.iter().any(|effect| effect.name.definition().is_of_jumps());
-    let paid = |bounds: &[usize]| match track.loss_price.get(bounds[0]..bounds[1]) {
+    let paid = |bounds: &[usize]| match track.jumps.price.get(bounds[0]..bounds[1]) {
         Some(prices) if has_jumps => prices.iter().sum(),
         _ => 0.0,
     };
-    track.segments.windows(2).map(paid).collect()
+    track.blocks.segments.windows(2).map(paid).collect()
 }
 
 /// Gram matrices of the columns and the residual, per segment.
@@ -132,7 +134,7 @@ fn grams(track: &BlockedRecording, responses: &[Vec<f64>], residual: &[f64]) -> 
     (0..track.segment_count())
         .into_par_iter()
         .map(|s| {
-            let (a, b) = (track.segments[s], track.segments[s + 1]);
+            let (a, b) = (track.blocks.segments[s], track.blocks.segments[s + 1]);
             let mut m = Square::zero(p + 1);
             let column = |i: usize| if i == p { &residual[a..b] } else { &responses[i][a..b] };
             for i in 0..=p {

@@ -4,7 +4,7 @@
 //! under uneven time stamps; its bandwidth is what the report states.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Knows, Noise, motion};
+use crate::estimation::filter::{Knows, Noise, Observed, motion};
 use crate::estimation::input::Total;
 use std::f64::consts::TAU;
 
@@ -33,11 +33,15 @@ impl Estimator {
 
     /// Acceleration that the inputs do not explain, per block.
     pub(crate) fn residual(&self, track: &BlockedRecording, total: &Total) -> Vec<f64> {
-        let mut even = track.clone();
+        self.residual_of(track, &track.blocks.z, total)
+    }
+
+    /// The same of other readings of the recording.
+    fn residual_of(&self, track: &BlockedRecording, z: &[f64], total: &Total) -> Vec<f64> {
         // The same filter everywhere: neither quantisation nor rest changes it.
         let h = 1.0 / track.block_rate();
-        even.quantum.fill(1.0);
-        even.rest.fill(false);
+        let n = track.block_count();
+        let even = Observed { z, quantum: &vec![1.0; n], rest: &vec![false; n], ..track.observed() };
         let tau = 1e3;
         let walk = (TAU * self.bandwidth_hz).powi(6) * h;
         let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0 };
@@ -51,10 +55,10 @@ fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
     let mut count = 0.0;
     for track in tracks {
         let h = 1.0 / track.block_rate();
-        let mut quantum: Vec<f64> = track.quantum.clone();
+        let mut quantum: Vec<f64> = track.blocks.quantum.clone();
         quantum.sort_by(f64::total_cmp);
         // Behind a filter of the reading the axis is known that much worse, at the end of the band.
-        let lag = track.filter_s.map_or(0.0, |s| TAU * hz * s);
+        let lag = track.blocks.filter_s.map_or(0.0, |s| TAU * hz * s);
         sum += noise.sensor * quantum[quantum.len() / 2] * h * (1.0 + lag * lag);
         count += 1.0;
     }
@@ -69,10 +73,10 @@ impl Estimator {
     /// rest friction is a reaction, and a low-pass would carry it over.
     pub(crate) fn moving(&self, track: &BlockedRecording) -> Vec<bool> {
         let reach = (0.4 / self.bandwidth_hz * track.block_rate()).ceil() as usize;
-        let n = track.blocks();
+        let n = track.block_count();
         let mut out = vec![true; n];
         for j in 0..n {
-            if track.rest[j] || track.unknown[j] || track.stops_within(j) {
+            if track.motion.rest[j] || track.unknown[j] || track.stops_within(j) {
                 out[j.saturating_sub(reach)..(j + reach + 1).min(n)].fill(false);
             }
         }
@@ -81,7 +85,13 @@ impl Estimator {
         out[..end].fill(false);
         out[n - end..].fill(false);
         if out.iter().filter(|x| **x).count() * 20 < n {
-            return track.rest.iter().zip(&track.unknown).map(|(rest, unknown)| !rest && !unknown).collect();
+            return track
+                .motion
+                .rest
+                .iter()
+                .zip(&track.unknown)
+                .map(|(rest, unknown)| !rest && !unknown)
+                .collect();
         }
         out
     }
@@ -92,9 +102,9 @@ impl Estimator {
         let errors: Vec<Vec<f64>> = tracks
             .iter()
             .map(|track| {
-                let mut read = track.clone();
-                read.z = (0..track.blocks()).map(|j| track.counting_error(j, count)).collect();
-                self.residual(&read, &Total::zero(track.blocks()))
+                let read: Vec<f64> =
+                    (0..track.block_count()).map(|j| track.counting_error(j, count)).collect();
+                self.residual_of(track, &read, &Total::zero(track.block_count()))
             })
             .collect();
         self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
@@ -146,7 +156,7 @@ mod tests {
         }
         let track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
         let estimator = Estimator { bandwidth_hz: 20.0 };
-        let residual = estimator.residual(&track, &Total::zero(track.blocks()));
+        let residual = estimator.residual(&track, &Total::zero(track.block_count()));
         let inner = &residual[50..residual.len() - 50];
         let rms = (inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64).sqrt();
         let said = estimator.white(&Noise { sensor: 1.0, white, slow: 0.0, tau: 1.0, rest: 0.0 });

@@ -62,7 +62,7 @@ pub(crate) fn find(
     asked: Asked,
     spread: Option<f64>,
 ) -> Losses {
-    let n = track.blocks();
+    let n = track.block_count();
     let (gains, residual) = (&alone.prepared[0].gains, alone.residual(0));
     let mut jumps: Vec<Jump> = Vec::new();
     let mut left = residual.clone();
@@ -111,14 +111,14 @@ fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     if jumps.len() < TELLING {
         return false;
     }
-    let mean = track.block_mean(&track.command);
+    let mean = track.block_mean(&track.rows.command);
     let reach = ((JUST_BEFORE_S * track.block_rate()).round() as usize).max(1);
     let change = |j: usize| {
         let before = &mean[j.saturating_sub(reach + 1)..j.max(1)];
         let fold = |start: f64, pick: fn(f64, f64) -> f64| before.iter().copied().fold(start, pick);
         fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
     };
-    let mut all: Vec<f64> = (1..track.blocks()).filter(|j| !track.rest[*j]).map(change).collect();
+    let mut all: Vec<f64> = (1..track.block_count()).filter(|j| !track.motion.rest[*j]).map(change).collect();
     all.sort_by(f64::total_cmp);
     let rank = |x: f64| {
         let (below, up_to) = (all.partition_point(|y| *y < x), all.partition_point(|y| *y <= x));
@@ -131,10 +131,10 @@ fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
 
 /// Whether jumps come at one angle of the turn: that is a fault of the scale, told as what it is.
 fn follows_angle(track: &BlockedRecording, jumps: &[Jump]) -> bool {
-    let Some(turn) = track.turn.filter(|_| jumps.len() >= TELLING) else { return false };
-    let angle = |jump: &Jump| std::f64::consts::TAU * track.x[jump.block] / turn;
+    let Some(turn) = track.blocks.turn.filter(|_| jumps.len() >= TELLING) else { return false };
+    let angle = |jump: &Jump| std::f64::consts::TAU * track.motion.x[jump.block] / turn;
     let sum = |of: fn(f64) -> f64| jumps.iter().map(|jump| of(angle(jump))).sum::<f64>() / jumps.len() as f64;
-    let travel = track.x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let travel = track.motion.x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     travel > turn && sum(f64::cos).hypot(sum(f64::sin)) > FOLLOWS
 }
 
@@ -145,18 +145,20 @@ fn after(blocks: usize, response: Vec<f64>) -> Vec<f64> {
 
 /// Blocks at which a jump of the reading stands out, the clearest first.
 fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: f64) -> Vec<(usize, Pair)> {
+    let observed = track.observed();
     let mut found: Vec<(usize, Pair)> = Vec::new();
     let n = residual.len();
-    for j in (5..n.saturating_sub(FEWEST_AFTER)).filter(|j| !track.rest[*j]) {
+    for j in (5..n.saturating_sub(FEWEST_AFTER)).filter(|j| !track.motion.rest[*j]) {
         let window = j - 1..(j + REACH).min(n);
         let left = &residual[window.clone()];
-        let jump = |at: usize| after(at - window.start, gains.response_to_jump(track, at..window.end));
+        let jump = |at: usize| after(at - window.start, gains.response_to_jump(&observed, at..window.end));
         let jump = Pair::new(&jump(j), &jump(j + 1), left);
         // What is lost is lost on the way: the reading falls behind the motion.
-        if jump.gain <= least_gain || jump.size() * track.v[j] >= 0.0 {
+        if jump.gain <= least_gain || jump.size() * track.motion.v[j] >= 0.0 {
             continue;
         }
-        let impact = |at: usize| after(at - window.start, gains.response_to_impact(track, at..window.end));
+        let impact =
+            |at: usize| after(at - window.start, gains.response_to_impact(&observed, at..window.end));
         let [before, now, next] = [j - 1, j, j + 1].map(impact);
         let impact = Pair::new(&before, &now, left).gain.max(Pair::new(&now, &next, left).gain);
         if jump.gain > OVER_IMPACT * impact {
@@ -222,8 +224,9 @@ struct Jump {
 
 impl Jump {
     fn new(track: &BlockedRecording, gains: &Gains, block: usize, later: f64) -> Self {
-        let n = track.blocks();
-        let responses = [block, block + 1].map(|at| after(at, gains.response_to_jump(track, at..n)));
+        let n = track.block_count();
+        let observed = track.observed();
+        let responses = [block, block + 1].map(|at| after(at, gains.response_to_jump(&observed, at..n)));
         Self { block, later, size: 0.0, responses }
     }
 
@@ -324,12 +327,12 @@ mod tests {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let count = 1.0 / rig.encoder.counts_per_unit;
         let mut tracks = [BlockedRecording::new(&recording, &rig)];
-        tracks[0].v.fill(3.0);
+        tracks[0].motion.v.fill(3.0);
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
         let lost = find(&tracks[0], &fit, count, asked, None).lost;
-        (lost.iter().map(|lost| lost / count).collect(), tracks[0].start.clone())
+        (lost.iter().map(|lost| lost / count).collect(), tracks[0].blocks.start.clone())
     }
 
     #[test]
@@ -369,8 +372,8 @@ mod tests {
             let rig = Rig::of_values(0.01, 0.0, 0.0);
             let count = 1.0 / rig.encoder.counts_per_unit;
             let mut tracks = [BlockedRecording::new(&recording, &rig)];
-            tracks[0].v.fill(3.0);
-            tracks[0].rest.fill(false);
+            tracks[0].motion.v.fill(3.0);
+            tracks[0].motion.rest.fill(false);
             let nominal =
                 Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
             let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
@@ -378,7 +381,7 @@ mod tests {
             let found = find(&tracks[0], &fit, count, any, Some(2.0 * count));
             jumps += found.sizes.len();
             paid += found.price.iter().sum::<f64>();
-            (tracks[0].lost, tracks[0].loss_price) = (found.lost, found.price);
+            (tracks[0].jumps.lost, tracks[0].jumps.price) = (found.lost, found.price);
             let effects = vec![Effect::shaped(EffectName::MissedCounts, &[])];
             let with = Fit::new(&Model { effects, ..Model::default() }, &nominal, &tracks, &noise);
             gained += with.log_likelihood - fit.log_likelihood;
@@ -398,11 +401,11 @@ mod tests {
             ..Recording::default()
         };
         let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
-        track.rest.fill(false);
+        track.motion.rest.fill(false);
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
-        let gains = Gains::new(&track, &noise);
+        let gains = Gains::new(&track.observed(), &noise);
         let at = |time: f64| {
-            let block = track.start.partition_point(|start| *start < time);
+            let block = track.blocks.start.partition_point(|start| *start < time);
             Jump::new(&track, &gains, block, 0.0)
         };
         let switched: Vec<Jump> = (1..12).map(|i| at(0.1 * f64::from(i) + 0.006)).collect();

@@ -221,8 +221,8 @@ impl Nominal {
     pub(crate) fn ignores_too_much(&self, tracks: &[BlockedRecording], effective: &[Vec<f64>]) -> bool {
         let (mut taken, mut whole) = (0.0, 0.0);
         for (track, effective) in tracks.iter().zip(effective) {
-            taken += effective.iter().zip(track.command.iter()).map(|(a, b)| (a - b).abs()).sum::<f64>();
-            whole += track.command.iter().map(|u| u.abs()).sum::<f64>();
+            taken += effective.iter().zip(track.rows.command.iter()).map(|(a, b)| (a - b).abs()).sum::<f64>();
+            whole += track.rows.command.iter().map(|u| u.abs()).sum::<f64>();
         }
         taken > self.most_ignored() * whole
     }
@@ -277,9 +277,9 @@ pub(crate) fn effective_command(track: &BlockedRecording, effects: &[Effect]) ->
     }
     // A delay alone is what most trials are of.
     if let [CommandLaw::Delay { delay, .. }] = laws.as_slice() {
-        return Some(delayed(&track.command, &track.row_hold, *delay));
+        return Some(delayed(&track.rows.command, &track.rows.hold, *delay));
     }
-    let holdout = track.command.iter().zip(track.row_hold.iter());
+    let holdout = track.rows.command.iter().zip(track.rows.hold.iter());
     Some(holdout.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
 }
 
@@ -311,7 +311,13 @@ fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
 
 /// Sign of the velocity where it is known, per block.
 pub(crate) fn direction(track: &BlockedRecording) -> Vec<f64> {
-    track.v.iter().zip(&track.rest).map(|(v, rest)| if *rest { 0.0 } else { v.signum() }).collect()
+    track
+        .motion
+        .v
+        .iter()
+        .zip(&track.motion.rest)
+        .map(|(v, rest)| if *rest { 0.0 } else { v.signum() })
+        .collect()
 }
 
 impl Model {
@@ -323,7 +329,7 @@ impl Model {
     /// The columns of this model over a recording, nominal terms first.
     pub(crate) fn columns(&self, nominal: &Nominal, track: &BlockedRecording, noise: &Noise) -> Vec<Column> {
         let effective = effective_command(track, &self.effects);
-        let command = effective.as_deref().unwrap_or(&track.command);
+        let command = effective.as_deref().unwrap_or(&track.rows.command);
         let drive = track.drive(effective.as_deref());
         let direction = direction(track);
         let mut columns = Vec::new();
@@ -331,20 +337,24 @@ impl Model {
             columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
         };
         if nominal.has(NominalTerm::Viscous) {
-            push(Key::Viscous, Input::Held(track.v.iter().map(|v| -v).collect()), false);
+            push(Key::Viscous, Input::Held(track.motion.v.iter().map(|v| -v).collect()), false);
         }
         if nominal.has(NominalTerm::Coulomb) {
             push(Key::Coulomb, Input::Held(direction.iter().map(|s| -s).collect()), false);
         }
-        push(Key::Offset, Input::Held(vec![1.0; track.blocks()]), true);
-        if let (true, Some(tilt)) = (nominal.has(NominalTerm::Weight), &track.tilt) {
+        push(Key::Offset, Input::Held(vec![1.0; track.block_count()]), true);
+        if let (true, Some(tilt)) = (nominal.has(NominalTerm::Weight), &track.blocks.tilt) {
             push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
         }
         if nominal.has(NominalTerm::Gravity) {
-            let zero = nominal.rig.model.gravity_zero.unwrap_or(0.0) - track.origin;
-            push(Key::Gravity, Input::Held(track.x.iter().map(|x| -(x - zero).sin()).collect()), false);
+            let zero = nominal.rig.model.gravity_zero.unwrap_or(0.0) - track.blocks.origin;
+            push(
+                Key::Gravity,
+                Input::Held(track.motion.x.iter().map(|x| -(x - zero).sin()).collect()),
+                false,
+            );
         }
-        if let Some(force) = &track.force {
+        if let Some(force) = &track.blocks.force {
             push(Key::External, Input::Held(force.clone()), false);
         }
         for (index, effect) in self.effects.iter().enumerate() {
@@ -371,7 +381,7 @@ impl Model {
 
 /// The total input of columns with their coefficients.
 pub(crate) fn total(track: &BlockedRecording, columns: &[Column], theta: &[f64]) -> Total {
-    let mut total = Total::zero(track.blocks());
+    let mut total = Total::zero(track.block_count());
     for (column, theta) in columns.iter().zip(theta) {
         if *theta != 0.0 {
             track.add_input(&mut total, &column.input, *theta);

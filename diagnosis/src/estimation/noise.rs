@@ -1,10 +1,10 @@
 //! How large sensor noise and disturbance are: maximum likelihood of the innovations, by a deterministic pattern search.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise, robust_loss};
-use crate::estimation::input::{Input, Total};
+use crate::estimation::filter::{Gains, Noise, Observed, robust_loss};
+use crate::estimation::input::Total;
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::ops::Range;
 
 /// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
 const LOOKED_AT: usize = 8000;
@@ -13,72 +13,60 @@ const LOOKED_AT: usize = 8000;
 const STRETCH: usize = 100;
 
 /// A stretch of a recording with the input of the current model.
-struct Excerpt {
-    track: BlockedRecording,
+struct Excerpt<'a> {
+    track: &'a BlockedRecording,
+    over: Range<usize>,
+    /// Start of each block, s, and its mean reading, both counted from the stretch's first.
+    start: Vec<f64>,
+    z: Vec<f64>,
     total: Total,
 }
 
-fn excerpts(track: &BlockedRecording, total: &Total) -> Vec<Excerpt> {
-    let n = track.blocks();
+fn excerpts<'a>(track: &'a BlockedRecording, total: &Total) -> Vec<Excerpt<'a>> {
+    let n = track.block_count();
     if n <= LOOKED_AT {
-        return vec![excerpt(track, total, 0, n)];
+        return vec![Excerpt::new(track, total, 0..n)];
     }
     let half = LOOKED_AT / 2;
     let first = (n / 2 - half) / 2;
     let second = n - half - first;
-    vec![excerpt(track, total, first, first + half), excerpt(track, total, second, second + half)]
+    [first, second].map(|from| Excerpt::new(track, total, from..from + half)).into()
 }
 
-fn excerpt(track: &BlockedRecording, total: &Total, from: usize, to: usize) -> Excerpt {
-    let cut = |column: &[f64]| column[from..to].to_vec();
-    let z0 = track.z[from];
-    let mut part = BlockedRecording {
-        file: String::new(),
-        lead_s: 0.0,
-        turn: None,
-        origin: 0.0,
-        rows_per_block: track.rows_per_block,
-        start: track.start[from..to].iter().map(|t| t - track.start[from]).collect(),
-        span: cut(&track.span),
-        tau1: cut(&track.tau1),
-        tau2: cut(&track.tau2),
-        filter_s: track.filter_s,
-        reading_lag: track.reading_lag.get(from..to).map_or_else(Vec::new, <[_]>::to_vec),
-        z: track.z[from..to].iter().map(|z| z - z0).collect(),
-        quantum: cut(&track.quantum),
-        row_time: [].into(),
-        row_hold: [].into(),
-        command: [].into(),
-        command_input: Arc::new(Input::Held(Vec::new())),
-        of_contact: Arc::default(),
-        of_grip: Arc::default(),
-        tilt: None,
-        force: None,
-        reference: None,
-        x: Vec::new(),
-        v: Vec::new(),
-        rest: track.rest[from..to].to_vec(),
-        stuck: track.stuck[from..to].to_vec(),
-        unknown: vec![false; to - from],
-        segments: vec![0, to - from],
-        place: None,
-        bias: 0.0,
-        lost: Vec::new(),
-        loss_price: Vec::new(),
-        speed_floor: track.speed_floor,
-        stops_from: track.stops_from,
-    };
-    part.x = Vec::new();
-    let total = Total { dv: cut(&total.dv), dq: cut(&total.dq), dz: cut(&total.dz) };
-    Excerpt { track: part, total }
+impl<'a> Excerpt<'a> {
+    fn new(track: &'a BlockedRecording, total: &Total, over: Range<usize>) -> Self {
+        let since_first =
+            |column: &[f64]| column[over.clone()].iter().map(|x| x - column[over.start]).collect();
+        let (start, z) = (since_first(&track.blocks.start), since_first(&track.blocks.z));
+        let cut = |column: &[f64]| column[over.clone()].to_vec();
+        let total = Total { dv: cut(&total.dv), dq: cut(&total.dq), dz: cut(&total.dz) };
+        Self { track, over, start, z, total }
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        let Observed { span, tau1, tau2, reading_lag, quantum, rest, stuck, .. } = self.track.observed();
+        let over = self.over.clone();
+        Observed {
+            start: &self.start,
+            span: &span[over.clone()],
+            tau1: &tau1[over.clone()],
+            tau2: &tau2[over.clone()],
+            reading_lag: reading_lag.get(over.clone()).unwrap_or_default(),
+            z: &self.z,
+            quantum: &quantum[over.clone()],
+            rest: &rest[over.clone()],
+            stuck: &stuck[over],
+        }
+    }
 }
 
 fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
     let each: Vec<f64> = parts
         .par_iter()
         .map(|part| {
-            let gains = Gains::new(&part.track, noise);
-            let e = gains.innovations(&part.track, &part.total);
+            let observed = part.observed();
+            let gains = Gains::new(&observed, noise);
+            let e = gains.innovations(&observed, &part.total);
             let cost: f64 = e
                 .chunks(STRETCH)
                 .map(|e| {
@@ -114,7 +102,7 @@ pub(crate) fn estimate(
 ) -> Noise {
     let parts: Vec<Excerpt> =
         tracks.iter().zip(totals).flat_map(|(track, total)| excerpts(track, total)).collect();
-    let span = tracks[0].span.iter().sum::<f64>() / tracks[0].blocks() as f64;
+    let span = tracks[0].blocks.span.iter().sum::<f64>() / tracks[0].block_count() as f64;
     let mut at = [from.sensor.ln(), from.white.ln(), from.slow.ln(), from.tau.ln()];
     let floor = scale * scale * 1e-12;
     let lower = [0.3_f64.ln(), (floor * span).ln(), floor.ln(), TAU.0.ln()];
@@ -185,7 +173,7 @@ fn pattern_search(
 
 /// Where the search starts before anything is known: `scale` is the acceleration that the command makes.
 pub(crate) fn guess(tracks: &[BlockedRecording], scale: f64) -> Noise {
-    let span = tracks[0].span.iter().sum::<f64>() / tracks[0].blocks() as f64;
+    let span = tracks[0].blocks.span.iter().sum::<f64>() / tracks[0].block_count() as f64;
     Noise {
         sensor: 1.0,
         white: (0.01 * scale).powi(2) * span,

@@ -25,8 +25,8 @@ pub(crate) fn add_inertia(
     holdout: &mut [BlockedRecording],
 ) {
     let gain = nominal.rig.actuator.gain;
-    let square: f64 = fit.iter().flat_map(|track| track.command.iter()).map(|u| u * u).sum();
-    let rows: f64 = fit.iter().map(|track| track.command.len() as f64).sum();
+    let square: f64 = fit.iter().flat_map(|track| track.rows.command.iter()).map(|u| u * u).sum();
+    let rows: f64 = fit.iter().map(|track| track.rows.command.len() as f64).sum();
     let drive = gain.abs() * (square / rows).sqrt();
     let seen = fit.iter().map(seen_acceleration).fold(0.0, f64::max);
     let inertia = nominal.rig.model.inertia;
@@ -35,7 +35,7 @@ pub(crate) fn add_inertia(
     }
     let estimator = Estimator::new(fit, &noise::guess(fit, seen), seen);
     let accelerations = |tracks: &[BlockedRecording]| -> Vec<Vec<f64>> {
-        tracks.iter().map(|track| estimator.residual(track, &Total::zero(track.blocks()))).collect()
+        tracks.iter().map(|track| estimator.residual(track, &Total::zero(track.block_count()))).collect()
     };
     let on_fit = accelerations(fit);
     let smooth = estimator.rms(&on_fit, fit);
@@ -45,15 +45,15 @@ pub(crate) fn add_inertia(
     }
     let on_holdout = accelerations(holdout);
     for (track, acceleration) in fit.iter_mut().zip(&on_fit).chain(holdout.iter_mut().zip(&on_holdout)) {
-        let m = track.rows_per_block;
+        let m = track.rows.per_block;
         let command: Vec<f64> = track
+            .rows
             .command
             .iter()
             .enumerate()
             .map(|(row, u)| u + added / gain * acceleration[(row / m).min(acceleration.len() - 1)])
             .collect();
-        track.command = command.into();
-        track.command_input = track.rows_input(&track.command).into();
+        track.set_command(command);
     }
     // How unsure the machine's own inertia is matters as little as the inertia itself.
     let own = nominal.rig.inertia_sd().min(1.0) * inertia / (inertia + added);

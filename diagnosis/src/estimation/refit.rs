@@ -20,15 +20,15 @@ const CONTRADICTED: f64 = 2.0;
 /// Blocks at rest whatever a filter makes of the speed `v`: the encoder gives no count for a while, or for less where by
 /// that speed it should have given some.
 fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
-    let n = track.blocks();
+    let n = track.block_count();
     let reach = ((STILL_S * track.block_rate()).ceil() as usize).max(2);
     let mut out = vec![false; n];
     let mut from = 0;
     while from < n {
         // The mean of a block within which a count falls is no whole count.
-        let same = |j: &usize| (track.z[*j] - track.z[from]).abs() <= 1e-3 * count;
+        let same = |j: &usize| (track.blocks.z[*j] - track.blocks.z[from]).abs() <= 1e-3 * count;
         let to = (from + 1..n).take_while(same).last().unwrap_or(from);
-        let passed: f64 = (from..=to).map(|j| v[j] * track.span[j]).sum();
+        let passed: f64 = (from..=to).map(|j| v[j] * track.blocks.span[j]).sum();
         if to - from >= reach || (to > from && passed.abs() > CONTRADICTED * count) {
             out[from..=to].fill(true);
         }
@@ -47,9 +47,14 @@ pub(crate) fn estimate_motion(
     knows: Knows,
 ) {
     for (track, total) in tracks.iter_mut().zip(totals) {
-        let state = motion(track, noise, total, knows);
-        let mut sd: Vec<f64> =
-            state.v_sd.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(sd, _)| *sd).collect();
+        let state = motion(&track.observed(), noise, total, knows);
+        let mut sd: Vec<f64> = state
+            .v_sd
+            .iter()
+            .zip(&track.motion.rest)
+            .filter(|(_, rest)| !**rest)
+            .map(|(sd, _)| *sd)
+            .collect();
         if sd.len() < 10 {
             sd = state.v_sd.clone();
         }
@@ -64,16 +69,16 @@ pub(crate) fn estimate_motion(
         let n = still.len();
         let slow: Vec<bool> =
             state.v.iter().zip(&still).map(|(v, still)| *still || v.abs() < floor).collect();
-        track.rest = (0..n)
+        track.motion.rest = (0..n)
             .map(|j| {
                 let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
                 slow[a..=b].iter().any(|slow| *slow) || state.v[a] * state.v[b] <= 0.0
             })
             .collect();
-        track.stuck = still;
-        track.speed_floor = floor;
-        track.x = state.x;
-        track.v = state.v;
+        track.motion.stuck = still;
+        track.motion.speed_floor = floor;
+        track.motion.x = state.x;
+        track.motion.v = state.v;
     }
 }
 
@@ -132,8 +137,8 @@ fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
 pub(crate) fn acceleration_scale(nominal: &Nominal, tracks: &[BlockedRecording]) -> f64 {
     let (mut square, mut rows) = (0.0, 0.0);
     for track in tracks {
-        square += track.command.iter().map(|u| u * u).sum::<f64>();
-        rows += track.command.len() as f64;
+        square += track.rows.command.iter().map(|u| u * u).sum::<f64>();
+        rows += track.rows.command.len() as f64;
     }
     let of_command = nominal.known_gain().abs() * (square / rows).sqrt();
     let of_motion = tracks.iter().map(seen_acceleration).fold(0.0, f64::max);
@@ -143,8 +148,8 @@ pub(crate) fn acceleration_scale(nominal: &Nominal, tracks: &[BlockedRecording])
 
 /// Whether the command drives the motion, rather than weight or a push at the start.
 pub(crate) fn is_driven(nominal: &Nominal, tracks: &[BlockedRecording]) -> bool {
-    let square: f64 = tracks.iter().flat_map(|track| track.command.iter()).map(|u| u * u).sum();
-    let rows: f64 = tracks.iter().map(|track| track.command.len() as f64).sum();
+    let square: f64 = tracks.iter().flat_map(|track| track.rows.command.iter()).map(|u| u * u).sum();
+    let rows: f64 = tracks.iter().map(|track| track.rows.command.len() as f64).sum();
     let seen = tracks.iter().map(seen_acceleration).fold(0.0, f64::max);
     nominal.known_gain().abs() * (square / rows).sqrt() >= DRIVEN_ELSEWHERE * seen
 }
@@ -156,17 +161,19 @@ const CLEAR: f64 = 5.0;
 
 /// Acceleration that positions show over the shortest time that shows any, root mean square.
 pub(crate) fn seen_acceleration(track: &BlockedRecording) -> f64 {
-    let n = track.blocks();
+    let n = track.block_count();
     let h = 1.0 / track.block_rate();
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), x| (sum + x, count + 1.0));
         sum / count.max(1.0)
     };
-    let error = mean(&mut track.quantum.iter().copied());
+    let error = mean(&mut track.blocks.quantum.iter().copied());
     let mut reach = 1;
     while 8 * reach < n {
         let step = (reach as f64 * h).powi(2);
-        let second = |j: usize| (track.z[j + reach] - 2.0 * track.z[j] + track.z[j - reach]) / step;
+        let second = |j: usize| {
+            (track.blocks.z[j + reach] - 2.0 * track.blocks.z[j] + track.blocks.z[j - reach]) / step
+        };
         let square = mean(&mut (reach..n - reach).map(|j| second(j).powi(2)));
         if square > CLEAR * CLEAR * 6.0 * error / (step * step) {
             return square.sqrt();
@@ -226,9 +233,9 @@ mod tests {
     #[test]
     fn an_axis_rests_where_the_smoothed_speed_promises_counts_that_do_not_come() {
         let track = stopped_for_a_moment();
-        let count = track.z[1] - track.z[0];
+        let count = track.blocks.z[1] - track.blocks.z[0];
         let at = |counts_per_block: f64| {
-            let v: Vec<f64> = track.span.iter().map(|h| counts_per_block * count / h).collect();
+            let v: Vec<f64> = track.blocks.span.iter().map(|h| counts_per_block * count / h).collect();
             still(&track, &v, count)
         };
         let resting = |at: &[bool]| (0..at.len()).filter(|j| at[*j]).collect::<Vec<_>>();

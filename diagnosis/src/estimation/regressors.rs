@@ -16,14 +16,14 @@ pub(crate) fn effect_inputs(
 ) -> Vec<Input> {
     let definition = effect.name.definition();
     if definition.is_of_jumps() {
-        return vec![Input::Sensor(track.lost.clone())];
+        return vec![Input::Sensor(track.jumps.lost.clone())];
     }
     let Some(mut law) = Law::new(effect) else { return Vec::new() };
     if let Some(coupling) = definition.coupling() {
         return vec![of_second_mass(track, coupling, &mut law, command, bias)];
     }
     let count = law.names().len();
-    let n = track.blocks();
+    let n = track.block_count();
     let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
         || effect.name.formula().is_some_and(|formula| formula.uses("u"));
     let of_drive = effect.shape.contains_key("of_drive");
@@ -34,17 +34,17 @@ pub(crate) fn effect_inputs(
     let mut out = vec![0.0; count];
     for j in 0..n {
         let state = State {
-            position: track.x[j],
-            velocity: track.v[j],
+            position: track.motion.x[j],
+            velocity: track.motion.v[j],
             acceleration: track.acceleration(j),
-            rest: track.rest[j],
+            rest: track.motion.rest[j],
             // What scales the drive scales its whole input below.
             drive: carried.as_ref().filter(|_| !scales_drive).map_or(1.0, |carried| carried[j]),
             command: carried.as_ref().map_or(1.0, |carried| carried[j]),
             tilt: track.tilt_at(j),
             external: track.force_at(j),
-            time: track.start[j] + 0.5 * track.span[j],
-            dt: track.span[j],
+            time: track.blocks.start[j] + 0.5 * track.blocks.span[j],
+            dt: track.blocks.span[j],
             ..State::default()
         };
         law.terms(&state, &mut out);
@@ -77,15 +77,15 @@ fn of_second_mass(
     bias: f64,
 ) -> Input {
     let slices = match coupling {
-        Coupling::Grip => &track.of_grip,
-        Coupling::Stiff => &track.of_contact,
+        Coupling::Grip => &track.rows.of_grip,
+        Coupling::Stiff => &track.rows.of_contact,
     };
     let mut out = [0.0];
     let mut signal = Vec::new();
     for (j, slices) in slices.blocks().enumerate() {
         let (tilt, external) = (track.tilt_at(j), track.force_at(j));
         for slice in slices {
-            let (command, hold) = (&command[slice.rows.clone()], &track.row_hold[slice.rows.clone()]);
+            let (command, hold) = (&command[slice.rows.clone()], &track.rows.hold[slice.rows.clone()]);
             let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / slice.span;
             let velocity = track.velocity_within(j, slice.start + 0.5 * slice.span);
             let dt = slice.span;

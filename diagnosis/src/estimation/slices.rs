@@ -17,7 +17,7 @@ pub(crate) struct Slice {
 }
 
 /// A recording's slices, as many in every block.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Slices {
     per_block: usize,
     rows_per_block: usize,
@@ -86,7 +86,7 @@ mod tests {
             ..Recording::default()
         };
         let track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
-        let slices = Slices::new(&track.row_hold, track.rows_per_block, 7);
+        let slices = Slices::new(&track.rows.hold, track.rows.per_block, 7);
         let signal: Vec<f64> = (0..slices.slices.len()).map(|i| (0.7 * i as f64).sin()).collect();
         let by_row: Vec<f64> = slices
             .slices
@@ -95,12 +95,12 @@ mod tests {
             .flat_map(|(slice, a)| std::iter::repeat_n(*a, slice.rows.len()))
             .collect();
         let (Input::Rows { dv, dq, dz }, Input::Rows { dv: dv_row, dq: dq_row, dz: dz_row }) =
-            (slices.input(&signal), track.rows_input(&by_row))
+            (slices.input(&signal), track.rows.input(&by_row))
         else {
             panic!("both are held by rows");
         };
         for (some, by_row) in [(dv, dv_row), (dq, dq_row), (dz, dz_row)] {
-            assert_eq!(some.len(), track.blocks());
+            assert_eq!(some.len(), track.block_count());
             let largest = by_row.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             assert!(some.iter().zip(&by_row).all(|(a, b)| (a - b).abs() < 1e-12 * largest));
         }

@@ -231,8 +231,8 @@ fn refitted(patched: &Rig) -> BTreeMap<String, f64> {
 fn top_place(holdout: &[BlockedRecording], left: &[Vec<f64>], maps: &[Map]) -> Place {
     let stretch = |(track, left): (&BlockedRecording, &Vec<f64>)| {
         let weight: Vec<f64> =
-            left.iter().zip(&track.rest).map(|(x, rest)| if *rest { 0.0 } else { x * x }).collect();
-        Stretch { file: track.file.clone(), intervals_s: residual_maps::intervals(track, &weight) }
+            left.iter().zip(&track.motion.rest).map(|(x, rest)| if *rest { 0.0 } else { x * x }).collect();
+        Stretch { file: track.blocks.file.clone(), intervals_s: residual_maps::intervals(track, &weight) }
     };
     Place { recordings: holdout.iter().zip(left).map(stretch).collect(), states: strongest(maps) }
 }

@@ -46,10 +46,16 @@ impl Series {
         let moving =
             |column: &[f64]| column.iter().zip(moves).map(|(x, moves)| moves.then_some(*x)).collect();
         Self {
-            file: track.file.clone(),
+            file: track.blocks.file.clone(),
             held_out,
-            time_s: track.start.iter().zip(&track.span).map(|(t, h)| track.lead_s + t + 0.5 * h).collect(),
-            velocity: track.v.clone(),
+            time_s: track
+                .blocks
+                .start
+                .iter()
+                .zip(&track.blocks.span)
+                .map(|(t, h)| track.blocks.lead_s + t + 0.5 * h)
+                .collect(),
+            velocity: track.motion.v.clone(),
             nominal: moving(nominal),
             refit: moving(refit),
             patched: moving(patched),

@@ -43,10 +43,11 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
         let definition = effect.name.definition();
         if definition.is_of_jumps() {
             // The steps of the recording with the most, as they happened.
-            let steps = |track: &&BlockedRecording| track.lost.windows(2).filter(|w| w[0] != w[1]).count();
+            let steps =
+                |track: &&BlockedRecording| track.jumps.lost.windows(2).filter(|w| w[0] != w[1]).count();
             let track = s.fit_tracks.iter().max_by_key(steps).expect("something was fitted");
-            let jumped = track.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
-            let jumps: Vec<_> = jumped.map(|(i, w)| (track.start[i + 1], w[1] - w[0])).collect();
+            let jumped = track.jumps.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
+            let jumps: Vec<_> = jumped.map(|(i, w)| (track.blocks.start[i + 1], w[1] - w[0])).collect();
             definition.put_jumps(&mut effect, &jumps);
         } else if let Some(law) = crate::effects::Law::new(&effect) {
             for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
@@ -95,11 +96,11 @@ pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
             })
             .collect();
         let without = total(track, &columns, &without);
-        let weight: Vec<f64> = (0..track.blocks())
+        let weight: Vec<f64> = (0..track.block_count())
             .map(|j| {
-                let force = (with.dv[j] - without.dv[j]) / track.span[j];
+                let force = (with.dv[j] - without.dv[j]) / track.blocks.span[j];
                 let travel = with.dz[j] - without.dz[j];
-                if track.rest[j] {
+                if track.motion.rest[j] {
                     0.0
                 } else if last.model.effects[index].name.subsystem() == crate::effects::Subsystem::Sensor {
                     travel * travel
@@ -110,17 +111,20 @@ pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
             .collect();
         let intervals = residual_maps::intervals(track, &weight);
         if !intervals.is_empty() {
-            place.recordings.push(Stretch { file: track.file.clone(), intervals_s: intervals });
+            place.recordings.push(Stretch { file: track.blocks.file.clone(), intervals_s: intervals });
         }
         let states: Vec<f64> = match variable {
-            "command" => track.block_mean(&track.command).iter().map(|u| u.abs()).collect(),
-            "travel" => track.x.clone(),
-            "angle" => {
-                track.x.iter().map(|x| s.nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn))).collect()
-            }
-            "time" => track.start.clone(),
-            "tilt" => track.tilt.clone().unwrap_or_default(),
-            _ => track.v.iter().map(|v| v.abs()).collect(),
+            "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),
+            "travel" => track.motion.x.clone(),
+            "angle" => track
+                .motion
+                .x
+                .iter()
+                .map(|x| s.nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn)))
+                .collect(),
+            "time" => track.blocks.start.clone(),
+            "tilt" => track.blocks.tilt.clone().unwrap_or_default(),
+            _ => track.motion.v.iter().map(|v| v.abs()).collect(),
         };
         pooled.extend(states.into_iter().zip(weight));
     }

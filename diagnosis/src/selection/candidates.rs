@@ -14,9 +14,9 @@ const SAME_ANGLE: f64 = 0.98;
 
 /// Whether the tilt of every recording follows its travel.
 fn tilt_is_angle(tracks: &[BlockedRecording]) -> bool {
-    tracks
-        .iter()
-        .all(|track| track.tilt.as_ref().is_some_and(|tilt| correlation(tilt, &track.x).abs() > SAME_ANGLE))
+    tracks.iter().all(|track| {
+        track.blocks.tilt.as_ref().is_some_and(|tilt| correlation(tilt, &track.motion.x).abs() > SAME_ANGLE)
+    })
 }
 
 fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
@@ -28,40 +28,40 @@ fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
 
 /// What recordings span whose motion is smoothed, and what the rig says of their machine.
 pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
-    let mut speeds: Vec<f64> = tracks.iter().flat_map(|t| t.v.iter().map(|v| v.abs())).collect();
+    let mut speeds: Vec<f64> = tracks.iter().flat_map(|t| t.motion.v.iter().map(|v| v.abs())).collect();
     speeds.sort_by(f64::total_cmp);
     let fold =
         |pick: &dyn Fn(&BlockedRecording) -> f64| tracks.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
-    let rows: f64 = tracks.iter().map(|t| t.row_hold.len() as f64).sum();
-    let blocks: f64 = tracks.iter().map(|t| t.blocks() as f64).sum();
-    let seconds: f64 = tracks.iter().map(|t| t.row_time.last().copied().unwrap_or(0.0)).sum();
+    let rows: f64 = tracks.iter().map(|t| t.rows.hold.len() as f64).sum();
+    let blocks: f64 = tracks.iter().map(|t| t.block_count() as f64).sum();
+    let seconds: f64 = tracks.iter().map(|t| t.rows.time.last().copied().unwrap_or(0.0)).sum();
     let mut moving: Vec<f64> = tracks
         .iter()
-        .flat_map(|t| t.v.iter().zip(&t.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()))
+        .flat_map(|t| t.motion.v.iter().zip(&t.motion.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()))
         .collect();
     moving.sort_by(f64::total_cmp);
-    let command = fold(&|t| t.command.iter().fold(0.0, |m: f64, u| m.max(u.abs())));
+    let command = fold(&|t| t.rows.command.iter().fold(0.0, |m: f64, u| m.max(u.abs())));
     let square = |t: &BlockedRecording| -> f64 {
-        t.command.iter().zip(t.row_hold.iter()).map(|(u, hold)| u * u * hold).sum()
+        t.rows.command.iter().zip(t.rows.hold.iter()).map(|(u, hold)| u * u * hold).sum()
     };
     let fast = speeds[speeds.len() * 99 / 100];
     let machine = nominal.machine(&|_| None);
     let mut span = Span {
         slow: moving.get(moving.len() / 12).copied().unwrap_or(0.3 * fast).min(0.3 * fast),
         speed: fast,
-        speed_floor: fold(&|t| t.speed_floor),
-        low: -fold(&|t| -t.x.iter().copied().fold(f64::INFINITY, f64::min)),
-        high: fold(&|t| t.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        speed_floor: fold(&|t| t.motion.speed_floor),
+        low: -fold(&|t| -t.motion.x.iter().copied().fold(f64::INFINITY, f64::min)),
+        high: fold(&|t| t.motion.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         command,
         mean_square: tracks.iter().map(square).sum::<f64>() / seconds,
-        duration: fold(&|t| t.row_time.last().copied().unwrap_or(0.0)),
+        duration: fold(&|t| t.rows.time.last().copied().unwrap_or(0.0)),
         row: seconds / rows,
         block: seconds / blocks,
         count: 1.0 / nominal.rig.encoder.counts_per_unit,
         clip: if nominal.anchor.is_some() { 0.45 } else { 0.27 },
         dead: nominal.most_ignored() * command,
-        tilt: varies(tracks.iter().flat_map(|t| column(&t.tilt))),
-        force: varies(tracks.iter().flat_map(|t| column(&t.force))),
+        tilt: varies(tracks.iter().flat_map(|t| column(&t.blocks.tilt))),
+        force: varies(tracks.iter().flat_map(|t| column(&t.blocks.force))),
         rig: Believed {
             turn: nominal.rig.turn(),
             axis_turn: (nominal.rig.kind == Kind::Rotary).then_some(TAU),
@@ -188,8 +188,10 @@ mod tests {
             let [(a, nominal, total), (b, _, other)] =
                 [false, true].map(|is_mirrored| followed(is_mirrored, knows));
             // An acceleration takes the neighbours of its block, a second mass those between which its speed lies.
-            let until = a.start.partition_point(|start| *start < 2.0) - 3;
-            let before = |total: &Total| Gains::new(&a, &NOISE).innovations(&a, total)[..until].to_vec();
+            let until = a.blocks.start.partition_point(|start| *start < 2.0) - 3;
+            let before = |total: &Total| {
+                Gains::new(&a.observed(), &NOISE).innovations(&a.observed(), total)[..until].to_vec()
+            };
             assert_eq!(before(&total), before(&other), "the command is the same until then");
             let span = span_of(std::slice::from_ref(&a), &nominal);
             let mut shapes = name.definition().grid(name, &span);
@@ -197,7 +199,7 @@ mod tests {
                 shapes.push(Effect::shaped(name, &[("turn", TAU), ("order_3", 3.0)]));
             }
             let inputs = |track: &BlockedRecording, effect: &Effect| {
-                effect_inputs(track, effect, &track.command, 0.0, || track.drive(None))
+                effect_inputs(track, effect, &track.rows.command, 0.0, || track.drive(None))
             };
             let apart = |effect: &Effect| {
                 let both = inputs(&a, effect).into_iter().zip(inputs(&b, effect));

@@ -35,19 +35,21 @@ fn ratio(mut values: Vec<f64>, part: f64) -> f64 {
 fn strokes(track: &BlockedRecording, least: f64) -> Vec<f64> {
     let mut out = Vec::new();
     let mut from: Option<(usize, f64)> = None;
-    for (j, (v, rest)) in track.v.iter().zip(&track.rest).enumerate() {
+    for (j, (v, rest)) in track.motion.v.iter().zip(&track.motion.rest).enumerate() {
         if *rest {
             continue;
         }
         match from {
             Some((_, sign)) if sign == v.signum() => {}
             _ => {
-                out.extend(from.map(|(start, _)| (track.x[j] - track.x[start]).abs()));
+                out.extend(from.map(|(start, _)| (track.motion.x[j] - track.motion.x[start]).abs()));
                 from = Some((j, v.signum()));
             }
         }
     }
-    out.extend(from.map(|(start, _)| (track.x[track.blocks() - 1] - track.x[start]).abs()));
+    out.extend(
+        from.map(|(start, _)| (track.motion.x[track.block_count() - 1] - track.motion.x[start]).abs()),
+    );
     out.retain(|length| *length > least);
     out
 }
@@ -56,12 +58,20 @@ impl Excitation {
     /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the motor's, rad or m.
     pub(crate) fn of(tracks: &[BlockedRecording], count: f64, turn: Option<f64>) -> Self {
         let moving = |track: &BlockedRecording| -> Vec<f64> {
-            track.v.iter().zip(&track.rest).filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()).collect()
+            track
+                .motion
+                .v
+                .iter()
+                .zip(&track.motion.rest)
+                .filter(|(_, rest)| !**rest)
+                .map(|(v, _)| v.abs())
+                .collect()
         };
         let speeds = ratio(tracks.iter().flat_map(moving).collect(), 0.05);
         let strokes = ratio(tracks.iter().flat_map(|t| strokes(t, STROKE_COUNTS * count)).collect(), 0.1);
         let travel = |track: &BlockedRecording| {
-            let fold = |start: f64, pick: fn(f64, f64) -> f64| track.x.iter().copied().fold(start, pick);
+            let fold =
+                |start: f64, pick: fn(f64, f64) -> f64| track.motion.x.iter().copied().fold(start, pick);
             fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
         };
         let turns = turn.map_or(f64::INFINITY, |turn| {

@@ -40,8 +40,14 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
 }
 
 fn wave_inputs(track: &BlockedRecording, wave: f64, drive: Option<&Input>) -> [Input; 2] {
-    let (cos, sin): (Vec<f64>, Vec<f64>) = (0..track.blocks())
-        .map(|j| wave_mean(wave, track.x[j], if track.rest[j] { 0.0 } else { track.v[j] * track.span[j] }))
+    let (cos, sin): (Vec<f64>, Vec<f64>) = (0..track.block_count())
+        .map(|j| {
+            wave_mean(
+                wave,
+                track.motion.x[j],
+                if track.motion.rest[j] { 0.0 } else { track.motion.v[j] * track.blocks.span[j] },
+            )
+        })
         .unzip();
     match drive {
         Some(drive) => [drive.scaled(&cos), drive.scaled(&sin)],
@@ -91,7 +97,8 @@ impl<'a> Waves<'a> {
             .zip(&self.drives)
             .map(|((track, one), drive)| {
                 let inputs = wave_inputs(track, order * TAU / self.turn, drive.as_ref());
-                inputs.iter().map(|input| one.gains.response(track, input)).collect()
+                let observed = track.observed();
+                inputs.iter().map(|input| one.gains.response(&observed, input)).collect()
             })
             .collect()
     }

@@ -126,13 +126,13 @@ mod tests {
             v += a * h;
         }
         let mut track = BlockedRecording::new(&recording, &rig);
-        let v: Vec<f64> = (0..track.blocks())
+        let v: Vec<f64> = (0..track.block_count())
             .map(|j| {
-                let (a, b) = (j.saturating_sub(3), (j + 3).min(track.blocks() - 1));
-                (track.z[b] - track.z[a]) / (track.start[b] - track.start[a])
+                let (a, b) = (j.saturating_sub(3), (j + 3).min(track.block_count() - 1));
+                (track.blocks.z[b] - track.blocks.z[a]) / (track.blocks.start[b] - track.blocks.start[a])
             })
             .collect();
-        track.v = v;
+        track.motion.v = v;
         let tracks = [track];
         let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
         let noise = Noise { sensor: 1.0, white: 2e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };

@@ -30,10 +30,10 @@ fn added_inputs(
     after: Option<&Vec<f64>>,
 ) -> Vec<Input> {
     let before = effective_command(track, &model.effects);
-    let command = before.as_deref().unwrap_or(&track.command);
+    let command = before.as_deref().unwrap_or(&track.rows.command);
     if let Some(after) = after {
         let change: Vec<f64> = after.iter().zip(command).map(|(a, b)| a - b).collect();
-        return vec![track.rows_input(&change)];
+        return vec![track.rows.input(&change)];
     }
     effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
@@ -102,7 +102,8 @@ pub(crate) fn score(
     let response = |(r, (track, one)): (usize, (&BlockedRecording, &Prepared))| -> Vec<Vec<f64>> {
         let after = effective.as_ref().map(|all| &all[r]);
         let inputs = added_inputs(model, track, effect, after);
-        inputs.iter().map(|input| one.gains.response(track, input)).collect()
+        let observed = track.observed();
+        inputs.iter().map(|input| one.gains.response(&observed, input)).collect()
     };
     let terms: Terms = tracks.par_iter().zip(&fit.prepared).enumerate().map(response).collect();
     let sums = project(fit, residuals, &terms, effect.name.definition().has_own_phase());

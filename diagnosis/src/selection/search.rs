@@ -58,7 +58,7 @@ impl FitContext<'_> {
         let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || now.model.effects.iter().any(is_dry);
-        let no_losses = self.tracks.iter().all(|t| t.lost.iter().all(|x| *x == 0.0));
+        let no_losses = self.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
         let best_of = |name: &N| -> Option<(Effect, f64)> {
             if there(*name)
                 || (name.definition().needs_dry() && !dry)

@@ -83,7 +83,7 @@ fn step(context: &FitContext, model: &Model, noise: &Noise) -> Vec<f64> {
                     dq: per(&there.dq, &here.dq),
                     dz: per(&there.dz, &here.dz),
                 };
-                one.gains.response(track, &input)
+                one.gains.response(&track.observed(), &input)
             };
             moved.par_iter().map(derivative).collect()
         })

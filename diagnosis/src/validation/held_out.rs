@@ -39,8 +39,8 @@ impl HeldOut {
     /// Takes the jumps of the reading that were found in the filtered motion for both.
     pub(crate) fn share_jumps(&mut self) {
         for (smoothed, filtered) in self.smoothed.iter_mut().zip(&self.filtered) {
-            smoothed.lost.clone_from(&filtered.lost);
-            smoothed.loss_price.clone_from(&filtered.loss_price);
+            smoothed.jumps.lost.clone_from(&filtered.jumps.lost);
+            smoothed.jumps.price.clone_from(&filtered.jumps.price);
         }
     }
 

@@ -19,13 +19,13 @@ pub(crate) fn known<'a>(
     let follows = |effect: &Effect| effect.name.definition().follows_travel();
     let reach = BEYOND * span.travel();
     let is_unknown = |x: &f64| *x < span.low - reach || *x > span.high + reach;
-    let goes_beyond = |track: &BlockedRecording| track.x.iter().any(is_unknown);
+    let goes_beyond = |track: &BlockedRecording| track.motion.x.iter().any(is_unknown);
     if !model.effects.iter().any(follows) || !tracks.iter().any(goes_beyond) {
         return Cow::Borrowed(tracks);
     }
     let mut tracks = tracks.to_vec();
     for track in &mut tracks {
-        track.unknown = track.x.iter().map(is_unknown).collect();
+        track.unknown = track.motion.x.iter().map(is_unknown).collect();
     }
     Cow::Owned(tracks)
 }
@@ -44,12 +44,12 @@ pub(crate) fn beyond(
     let known = known(tracks, model, span);
     let is_told = |track: &BlockedRecording| {
         let unknown = track.unknown.iter().filter(|unknown| **unknown).count();
-        unknown as f64 > TOLD * track.blocks() as f64
+        unknown as f64 > TOLD * track.block_count() as f64
     };
     if !known.iter().any(is_told) {
         return None;
     }
-    let all = || known.iter().flat_map(|track| track.x.iter().copied());
+    let all = || known.iter().flat_map(|track| track.motion.x.iter().copied());
     let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
     let tidy = |x: f64| short_within(x, span.travel());
     Some(format!(
@@ -90,7 +90,7 @@ mod tests {
         let unknown = |to: f64, name| {
             let tracks = [slide(to)];
             let tracks = known(&tracks, &model(name), &span);
-            tracks[0].unknown.iter().filter(|x| **x).count() as f64 / tracks[0].blocks() as f64
+            tracks[0].unknown.iter().filter(|x| **x).count() as f64 / tracks[0].block_count() as f64
         };
         assert_eq!(unknown(10.2, N::PositionDependentFriction), 0.0);
         assert!((unknown(20.0, N::PositionDependentFriction) - 0.485).abs() < 0.02);

@@ -136,7 +136,8 @@ pub(crate) fn parameters(
             fit.value(Key::Term { effect: other, term: 0 })
         })
     };
-    let lost = |track: &BlockedRecording| track.lost.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>();
+    let lost =
+        |track: &BlockedRecording| track.jumps.lost.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>();
     let kind = nominal.rig.kind;
     let fitted = Fitted {
         effect: found,

@@ -26,9 +26,9 @@ struct Sampled {
 fn sampled(track: &BlockedRecording, residual: &[f64], moving: &[bool]) -> Sampled {
     let every = ((track.block_rate() / RATE_HZ).round() as usize).max(1);
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-    let rate: Vec<f64> = match &track.reference {
+    let rate: Vec<f64> = match &track.blocks.reference {
         Some(reference) => reference.windows(2).map(|w| w[1] - w[0]).chain([0.0]).collect(),
-        None => track.v.clone(),
+        None => track.motion.v.clone(),
     };
     let left: Vec<f64> =
         residual.iter().zip(moving).map(|(x, moving)| if *moving { *x } else { 0.0 }).collect();
@@ -106,6 +106,7 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
     use crate::numerics::bootstrap::Random;
+    use std::sync::Arc;
 
     /// A motion to and fro that starts `late`, with a residual of time since its start.
     fn track(late: f64, residual: impl FnMut(f64) -> f64) -> (BlockedRecording, Vec<f64>) {
@@ -117,14 +118,14 @@ mod tests {
             ..Recording::default()
         };
         let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
-        let since: Vec<f64> = track.start.iter().map(|t| t - late).collect();
-        track.v = since.iter().map(|t| (1.1 * t * t.abs().sqrt()).sin()).collect();
+        let since: Vec<f64> = track.blocks.start.iter().map(|t| t - late).collect();
+        track.motion.v = since.iter().map(|t| (1.1 * t * t.abs().sqrt()).sin()).collect();
         (track, since.into_iter().map(residual).collect())
     }
 
     fn repeats(all: Vec<(BlockedRecording, Vec<f64>)>) -> Option<f64> {
         let (tracks, residuals): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-        let moving: Vec<Vec<bool>> = tracks.iter().map(|t| vec![true; t.blocks()]).collect();
+        let moving: Vec<Vec<bool>> = tracks.iter().map(|t| vec![true; t.block_count()]).collect();
         correlation_of_repeats(&tracks, &residuals, &moving, 20.0)
     }
 
@@ -147,14 +148,17 @@ mod tests {
         let asked = |late: f64, reads: fn(f64) -> f64| {
             let (mut track, left) = track(late, of_motion);
             let followed = |t: &f64| (0.9 * (t - late) * (t - late).abs().sqrt()).sin();
-            track.reference = Some(track.start.iter().map(followed).collect());
-            track.v.iter_mut().for_each(|v| *v = reads(*v));
+            let reference = track.blocks.start.iter().map(followed).collect();
+            Arc::make_mut(&mut track.blocks).reference = Some(reference);
+            track.motion.v.iter_mut().for_each(|v| *v = reads(*v));
             (track, left)
         };
         let both = || vec![asked(0.0, |v| v), asked(0.3, |_| 0.0)];
         assert!(repeats(both()).is_some());
-        let unasked =
-            both().into_iter().map(|(track, left)| (BlockedRecording { reference: None, ..track }, left));
+        let unasked = both().into_iter().map(|(mut track, left)| {
+            Arc::make_mut(&mut track.blocks).reference = None;
+            (track, left)
+        });
         assert_eq!(repeats(unasked.collect()), None);
     }
 }

@@ -25,11 +25,11 @@ const LEAST: usize = 20;
 
 fn variable(track: &BlockedRecording, name: &str, turn: Option<f64>) -> Vec<f64> {
     match name {
-        "speed" => track.v.clone(),
-        "travel" => track.x.clone(),
-        "angle" => track.x.iter().map(|x| turn.map_or(0.0, |turn| x.rem_euclid(turn))).collect(),
-        "command" => track.block_mean(&track.command),
-        _ => track.start.clone(),
+        "speed" => track.motion.v.clone(),
+        "travel" => track.motion.x.clone(),
+        "angle" => track.motion.x.iter().map(|x| turn.map_or(0.0, |turn| x.rem_euclid(turn))).collect(),
+        "command" => track.block_mean(&track.rows.command),
+        _ => track.blocks.start.clone(),
     }
 }
 
@@ -55,7 +55,7 @@ impl<'a> Seen<'a> {
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.track.blocks()).filter(|j| !self.track.rest[*j])
+        (0..self.track.block_count()).filter(|j| !self.track.motion.rest[*j])
     }
 }
 
@@ -85,7 +85,7 @@ impl Bins {
     fn place(&self, one: &Seen, j: usize) -> (usize, usize) {
         let part = (one.values[j] - self.low) / (self.high - self.low);
         let bin = (part * BINS as f64).floor().clamp(0.0, (BINS - 1) as f64) as usize;
-        (bin, usize::from(one.track.v[j] < 0.0))
+        (bin, usize::from(one.track.motion.v[j] < 0.0))
     }
 
     fn means<'a>(&self, seen: impl Iterator<Item = &'a Seen<'a>>) -> Means {
@@ -104,8 +104,8 @@ impl Bins {
     /// What means take from each segment of a recording, and the square of all that there is.
     fn gains(&self, means: &Means, one: &Seen) -> (Vec<f64>, f64) {
         let (mut gains, mut whole) = (vec![0.0; one.track.segment_count()], 0.0);
-        for (gain, w) in gains.iter_mut().zip(one.track.segments.windows(2)) {
-            for j in (w[0]..w[1]).filter(|j| !one.track.rest[*j]) {
+        for (gain, w) in gains.iter_mut().zip(one.track.blocks.segments.windows(2)) {
+            for j in (w[0]..w[1]).filter(|j| !one.track.motion.rest[*j]) {
                 let (bin, way) = self.place(one, j);
                 let guess = means[bin][way].unwrap_or(0.0);
                 *gain += one.residual[j].powi(2) - (one.residual[j] - guess).powi(2);
@@ -168,7 +168,7 @@ pub(crate) fn maps(
 
 /// Stretches of time, s, in which a weight per block is high, merged where they nearly touch; the strongest 24.
 pub(crate) fn intervals(track: &BlockedRecording, weight: &[f64]) -> Vec<[f64; 2]> {
-    let n = track.blocks();
+    let n = track.block_count();
     let length = (0.1 * track.block_rate()).ceil().max(1.0) as usize;
     let means: Vec<f64> = weight.chunks(length).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
     let average = means.iter().sum::<f64>() / means.len() as f64;
@@ -181,7 +181,10 @@ pub(crate) fn intervals(track: &BlockedRecording, weight: &[f64]) -> Vec<[f64; 2
             continue;
         }
         let (a, b) = (i * length, ((i + 1) * length).min(n) - 1);
-        let (from, to) = (track.lead_s + track.start[a], track.lead_s + track.start[b] + track.span[b]);
+        let (from, to) = (
+            track.blocks.lead_s + track.blocks.start[a],
+            track.blocks.lead_s + track.blocks.start[b] + track.blocks.span[b],
+        );
         match out.last_mut() {
             Some((last, sum)) if from - last[1] < 0.15 => {
                 last[1] = to;
@@ -227,8 +230,9 @@ mod tests {
         let command = vec![0.0; time_s.len()];
         let recording = Recording { time_s, command, position_counts, ..Recording::default() };
         let mut track = BlockedRecording::new(&recording, &rig);
-        track.v = track.start.iter().map(|t| 2.0 * (2.0 * t).cos()).collect();
-        let residual = track.x.iter().zip(&track.start).map(|(x, t)| residual(*x, *t)).collect();
+        track.motion.v = track.blocks.start.iter().map(|t| 2.0 * (2.0 * t).cos()).collect();
+        let residual =
+            track.motion.x.iter().zip(&track.blocks.start).map(|(x, t)| residual(*x, *t)).collect();
         (track, residual)
     }
 

@@ -34,7 +34,7 @@ pub(crate) fn drive_force(
     tracks: &[BlockedRecording],
 ) -> Vec<Vec<f64>> {
     let drive: Vec<Total> = tracks.iter().map(|track| track.command_total(nominal.gain())).collect();
-    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.blocks())).collect();
+    let none: Vec<Total> = tracks.iter().map(|track| Total::zero(track.block_count())).collect();
     let j0 = nominal.rig.model.inertia;
     let all = forces(estimator, tracks, &none, j0);
     let less = forces(estimator, tracks, &drive, j0);
@@ -128,7 +128,7 @@ pub(crate) fn relative_gain(
     let mut whole = 0.0;
     for ((track, a), b) in tracks.iter().zip(before).zip(after) {
         let moving = estimator.moving(track);
-        for w in track.segments.windows(2) {
+        for w in track.blocks.segments.windows(2) {
             let mut gain = 0.0;
             for j in w[0]..w[1] {
                 if moving[j] {

@@ -96,7 +96,7 @@ fn find_steps(
             let alone = std::slice::from_ref(&*track);
             let fit = Fit::new(&Model::default(), nominal, alone, &noise);
             let found = lost_counts::find(track, &fit, span.count, asked, spread);
-            (track.lost, track.loss_price) = (found.lost, found.price);
+            (track.jumps.lost, track.jumps.price) = (found.lost, found.price);
             sizes.extend(found.sizes);
         }
         if sizes.is_empty() {

@@ -164,7 +164,7 @@ pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option
     // Each recorder has a clock of its own.
     let hertz = nearby(hertz, apart(&before), &before);
     let swings = explained(&before, hertz);
-    let speeds: Vec<Vec<f64>> = holdout.tracks.iter().map(|track| track.v.clone()).collect();
+    let speeds: Vec<Vec<f64>> = holdout.tracks.iter().map(|track| track.motion.v.clone()).collect();
     let whole = square(&before);
     let part = swings / whole;
     if explained(&of_held(holdout.force), hertz) > DRIVEN * swings

@@ -86,20 +86,20 @@ pub(crate) struct Point {
 
 /// The places of a recording's blocks.
 pub(crate) fn points(track: &BlockedRecording) -> Vec<Point> {
-    let command = track.block_mean(&track.command);
+    let command = track.block_mean(&track.rows.command);
     let (mut way, mut turned) = (0.0, 0.0);
-    (0..track.blocks())
+    (0..track.block_count())
         .map(|j| {
-            let (v, time) = (track.v[j], track.start[j] + 0.5 * track.span[j]);
+            let (v, time) = (track.motion.v[j], track.blocks.start[j] + 0.5 * track.blocks.span[j]);
             let now = if v < 0.0 { -1.0 } else { 1.0 };
             if now != way {
                 (way, turned) = (now, time);
             }
             Point {
-                direction: if track.rest[j] { 0.0 } else { v.signum() },
+                direction: if track.motion.rest[j] { 0.0 } else { v.signum() },
                 speed: v.abs(),
-                travel: track.x[j],
-                passed: v * track.span[j],
+                travel: track.motion.x[j],
+                passed: v * track.blocks.span[j],
                 command: command[j],
                 since_reversal: time - turned,
                 time,
@@ -296,7 +296,7 @@ impl<'a> Basis<'a> {
         let input = |mut column: Vec<f64>| {
             if self.inputs.scales_command() {
                 column.iter_mut().for_each(|x| *x *= gain);
-                track.command_input.scaled(&column)
+                track.rows.command_input.scaled(&column)
             } else {
                 Input::Held(column)
             }

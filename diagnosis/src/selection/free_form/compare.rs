@@ -118,7 +118,7 @@ impl Densities {
 
 /// Whether what a form takes is sure and enough to be told.
 pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
-    let blocks: usize = tracks.iter().map(BlockedRecording::blocks).sum();
+    let blocks: usize = tracks.iter().map(BlockedRecording::block_count).sum();
     taken.gain.is_sure() && taken.gain.sum > 0.5 * FORM_TOLD * blocks as f64
 }
 

@@ -23,7 +23,7 @@ struct Units {
 
 impl Units {
     fn of(track: &BlockedRecording) -> Self {
-        let segments: Vec<(usize, usize)> = track.segments.windows(2).map(|w| (w[0], w[1])).collect();
+        let segments: Vec<(usize, usize)> = track.blocks.segments.windows(2).map(|w| (w[0], w[1])).collect();
         let bounds: Vec<(usize, usize)> =
             segments.chunks(TOGETHER).map(|c| (c[0].0, c[c.len() - 1].1)).collect();
         let fold = (0..bounds.len()).map(|i| i * FOLDS / bounds.len()).collect();
@@ -94,10 +94,10 @@ impl Base {
 
 /// Root mean square of the acceleration that one unit of an input makes; nought in the sensor.
 fn size(input: &Input, track: &BlockedRecording) -> f64 {
-    let mean = |square: f64| (square / track.blocks() as f64).sqrt();
+    let mean = |square: f64| (square / track.block_count() as f64).sqrt();
     match input {
         Input::Held(a) => mean(a.iter().map(|a| a * a).sum()),
-        Input::Rows { dv, .. } => mean(dv.iter().zip(&track.span).map(|(v, h)| (v / h).powi(2)).sum()),
+        Input::Rows { dv, .. } => mean(dv.iter().zip(&track.blocks.span).map(|(v, h)| (v / h).powi(2)).sum()),
         Input::Sensor(_) => 0.0,
     }
 }
@@ -128,7 +128,7 @@ impl<'a> Evaluator<'a> {
     ) -> Self {
         let points: Vec<Vec<Point>> = tracks.iter().map(basis::points).collect();
         let warps = Warps::of(&points, nominal.rig.turn());
-        let gains: Vec<Gains> = tracks.par_iter().map(|track| Gains::new(track, noise)).collect();
+        let gains: Vec<Gains> = tracks.par_iter().map(|track| Gains::new(&track.observed(), noise)).collect();
         let units: Vec<Units> = tracks.iter().map(Units::of).collect();
         let forms = Inputs::ALL
             .par_iter()
@@ -140,7 +140,8 @@ impl<'a> Evaluator<'a> {
                     .zip(&gains)
                     .map(|((track, points), gains)| {
                         let columns = basis.columns(track, points, nominal.known_gain());
-                        columns.par_iter().map(|input| gains.response(track, input)).collect()
+                        let observed = track.observed();
+                        columns.par_iter().map(|input| gains.response(&observed, input)).collect()
                     })
                     .collect();
                 let own = responses
