@@ -29,6 +29,7 @@ pub use report::{Report, Verdict};
 pub use validation::residual_maps::Map;
 
 use recording::Recording;
+use report::verdict::Reason;
 use rig::Rig;
 use std::path::PathBuf;
 
@@ -75,10 +76,10 @@ pub fn diagnose_recordings(
 ) -> Result<Outcome, InputError> {
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
     if let Some(reason) = estimation::plausibility::mistakes(&all, rig) {
-        return Ok(Outcome::cannot_tell(rig, reason));
+        return Ok(Outcome::cannot_tell(rig, &Reason::Recordings(reason)));
     }
     if let Some(reason) = io::sufficiency::too_little(fit, holdout, rig) {
-        return Ok(Outcome::cannot_tell(rig, reason));
+        return Ok(Outcome::cannot_tell(rig, &Reason::Recordings(reason)));
     }
     let search = validation::stepwise::search(rig, fit, holdout, progress)?;
     progress("writing down", 0.95);

@@ -113,7 +113,7 @@ fn the_held_out_gain_of_a_hypothesis_is_the_likelihood_that_its_reason_tells() {
                     "{hypothesis:?}"
                 );
             }
-            if reason.contains("slow disturbance would") {
+            if reason.contains("a slow disturbance explains as much") {
                 assert_eq!(hypothesis.holdout_gain, None, "{hypothesis:?}");
             }
         }

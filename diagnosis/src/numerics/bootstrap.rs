@@ -16,7 +16,7 @@ impl Random {
 }
 
 /// Gain over segments: mean, its standard error, and a bootstrap interval of the sum.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gain {
     pub(crate) sum: f64,
     pub(crate) low: f64,

@@ -12,7 +12,8 @@ use crate::report::next_experiment;
 use crate::report::outcome::{self, Evidence, Outcome, Series};
 use crate::report::patched_rig::{patch, place};
 use crate::report::run_forward::{pooled, simulated};
-use crate::report::verdict::{misfit, verdict};
+use crate::report::text;
+use crate::report::verdict::{Reason, misfit, verdict};
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::validation::assess::{Assessed, Assessment, weigh};
@@ -21,6 +22,7 @@ use crate::validation::known_travel;
 use crate::validation::opponent;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
 use crate::validation::stepwise::Search;
@@ -41,7 +43,7 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     s.fit_tracks = fit_tracks.clone();
     let driven = is_driven(&nominal, &fit_tracks);
     if let Some(reason) = misfit(&assessment, &nominal).filter(|_| driven) {
-        return Outcome::cannot_tell(&nominal.rig, reason);
+        return Outcome::cannot_tell(&nominal.rig, &reason);
     }
     let beside = opponent::oppose(&mut assessment, &context, &s);
     let maps_of = |shown: &Shown| {
@@ -56,20 +58,17 @@ pub(crate) fn conclude(mut s: Search, given: &Rig, held_out: &[Recording]) -> Ou
     let foreign = nothing_named
         .then(|| out_of_library::alone(&context, &refit, &holdout))
         .flatten()
-        .or_else(|| form.as_ref().map(|form| format!("{form} would explain it")));
+        .map(Reason::Foreign)
+        .or_else(|| form.is_some().then_some(Reason::FreeForm));
     let (verdict, reason) = verdict(&assessment, &maps_with_all, smoothed, &excitation, foreign);
     let unnamed = unnamed.filter(|_| verdict == Verdict::Unexplained);
-    let reason = match (reason, form.as_ref().filter(|_| unnamed.is_some())) {
-        (Some(reason), Some(form)) if !reason.contains(form.as_str()) => {
-            Some(format!("{reason}; what is there is {form}"))
-        }
-        (reason, _) => reason,
-    };
+    let form = form.filter(|_| unnamed.is_some());
+    let reason = reason.map(|reason| text::reason(&reason, form.as_deref()));
     // The verdict rests on all that was weighed, what people see on what is named.
     let with_named = only_named(&assessment, &context, &refit, smoothed, &s);
     let named_alone = with_named.as_ref().unwrap_or(&assessment.shown);
     let where_left = &named_alone.on_holdout.patched;
-    let free_form = free_form::told(unnamed.as_ref(), form.filter(|_| unnamed.is_some()), beside);
+    let free_form = free_form::told(unnamed.as_ref(), form, beside);
     let drawn = unnamed.as_ref().map(|unnamed| unnamed.shape.clone());
     let with_force = unnamed.and_then(|unnamed| {
         Some(Shown::new(&context, smoothed, &assessment.estimator, &refit, unnamed.fitted?))
@@ -180,13 +179,13 @@ fn hypotheses(assessment: &Assessment, s: &Search) -> Vec<Hypothesis> {
         holdout_gain: Some(assessed.found.holdout.sum),
         evidence: assessment.rests_on_evidence(assessed).then(|| assessed.evidence.clone()),
         class: assessed.class.clone(),
-        rejected_because: assessment.doubt(assessed),
+        rejected_because: assessment.doubt(assessed).as_ref().map(text::rejection),
     };
     let mut out: Vec<Hypothesis> =
         assessment.effects.iter().chain(&assessment.dropped).map(weighed).collect();
-    let mut lost = |name, holdout_gain, reason: String| {
+    let mut lost = |name, holdout_gain, why: Rejection| {
         if out.iter().all(|known| known.name != name) {
-            let rejected_because = Some(reason);
+            let rejected_because = Some(text::rejection(&why));
             out.push(Hypothesis { name, holdout_gain, evidence: None, class: Vec::new(), rejected_because });
         }
     };
@@ -195,17 +194,17 @@ fn hypotheses(assessment: &Assessment, s: &Search) -> Vec<Hypothesis> {
             let winner = one.effect.name;
             let behind = || {
                 if class.contains(&rival.name) {
-                    format!("the recordings do not tell it from {winner}")
+                    Rejection::Indistinguishable { from: winner }
                 } else {
-                    format!("{winner} explains more by {:.1} standard errors", rival.z)
+                    Rejection::Behind { winner, z: rival.z }
                 }
             };
-            let reason = rival.absence.clone().unwrap_or_else(behind);
-            lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), reason);
+            let why = rival.absence.clone().unwrap_or_else(behind);
+            lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), why);
         }
     }
-    for (name, gain, reason) in &s.rejected {
-        lost(*name, *gain, reason.clone());
+    for (name, gain, why) in &s.rejected {
+        lost(*name, *gain, why.clone());
     }
     out
 }

@@ -14,6 +14,7 @@ pub(crate) mod outcome;
 pub(crate) mod patched_rig;
 pub(crate) mod run_forward;
 pub mod simulation_page;
+pub(crate) mod text;
 pub(crate) mod verdict;
 mod write;
 

@@ -6,6 +6,8 @@ use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
 use crate::numerics::digits::short;
+use crate::report::text;
+use crate::report::verdict::Reason;
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
@@ -167,7 +169,7 @@ pub(crate) fn unit(variable: &str, kind: Kind) -> String {
 
 impl Outcome {
     /// The outcome where recordings cannot tell, with the reason.
-    pub(crate) fn cannot_tell(rig: &Rig, reason: String) -> Self {
+    pub(crate) fn cannot_tell(rig: &Rig, reason: &Reason) -> Self {
         let mut report = Report {
             format: 1,
             verdict: Verdict::InsufficientExcitation,
@@ -191,7 +193,7 @@ impl Outcome {
             place: None,
             simulation: None,
             separating_experiment: Some(crate::report::next_experiment::GENERAL.to_owned()),
-            reason: Some(reason),
+            reason: Some(text::reason(reason, None)),
         };
         report.sentence = sentence(&report, rig.kind);
         let evidence = Evidence {

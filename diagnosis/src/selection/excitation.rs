@@ -85,14 +85,6 @@ impl Excitation {
         self.speeds < ONE_SPEED
     }
 
-    /// Why recordings at one speed cannot tell.
-    pub(crate) fn one_speed(&self) -> String {
-        format!(
-            "all motion is at about one speed (nine tenths of it within a factor of {:.1}), where what depends on speed and what does not look alike",
-            self.speeds
-        )
-    }
-
     /// What decides between twins.
     pub(crate) fn shown(&self) -> Shown {
         Shown {

@@ -14,11 +14,12 @@ use crate::selection::excitation::Excitation;
 use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
-use crate::validation::confidence::{self, Evidence, Leftover};
+use crate::validation::confidence::{self, Evidence, Leftover, Weakness};
 use crate::validation::evidence::EffectEvidence;
 use crate::validation::held_out::HeldOut;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
+use crate::validation::rejection::{Rather, Rejection};
 use crate::validation::repeats::correlation_of_repeats;
 use crate::validation::residuals::{Residuals, above};
 use crate::validation::stepwise::{Search, eliminate};
@@ -40,8 +41,8 @@ pub(crate) struct Assessed {
     pub(crate) undecided: bool,
     /// Part of the travel over which it bends, where that is more than bristles do.
     pub(crate) creeps: Option<f64>,
-    /// What it would rather be, where physics without a name explains surely more.
-    pub(crate) rather: Option<String>,
+    /// What it would rather be, where something without a name explains surely more.
+    pub(crate) rather: Option<Rather>,
 }
 
 impl Assessed {
@@ -100,11 +101,10 @@ impl Assessment {
         self.swing.is_some_and(|swing| swing.is_mistaken())
     }
 
-    /// What is there instead of the effect that explains the most, where physics without a name explains more.
-    pub(crate) fn foreign(&self) -> Option<String> {
+    /// The effect that explains most, with what it would rather be, where something without a name explains more.
+    pub(crate) fn resembled(&self) -> Option<(EffectName, Rather)> {
         let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
-        let says = most.rather.as_ref()?;
-        Some(format!("it resembles {}, but {says}", most.found.effect.name))
+        Some((most.found.effect.name, most.rather.clone()?))
     }
 
     /// Places of the effects that are named.
@@ -113,14 +113,14 @@ impl Assessment {
         self.effects.iter().enumerate().filter_map(is_named).collect()
     }
 
-    /// Why an effect is not named, if it is not.
-    pub(crate) fn doubt(&self, assessed: &Assessed) -> Option<String> {
+    /// Why an effect is not named; none if it is.
+    pub(crate) fn doubt(&self, assessed: &Assessed) -> Option<Rejection> {
         self.contradiction(assessed).or_else(|| {
             if assessed.undecided {
-                Some("more effects than a class may hold explain it as well".into())
+                Some(Rejection::Undecided)
             } else if assessed.confidence < NAMED {
-                let weakness = confidence::weakness(&assessed.evidence);
-                Some(format!("it is right with a probability of only {:.2}: {weakness}", assessed.confidence))
+                let weakness = Weakness::of(&assessed.evidence);
+                Some(Rejection::Improbable { probability: assessed.confidence, weakness })
             } else {
                 None
             }
@@ -128,24 +128,21 @@ impl Assessment {
     }
 
     /// What rules an effect out however much it explains.
-    fn contradiction(&self, assessed: &Assessed) -> Option<String> {
+    fn contradiction(&self, assessed: &Assessed) -> Option<Rejection> {
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
-            Some(format!("what it explains swings at {:.1} Hz, whatever the axis does", swing.hertz))
+            Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
-            Some(parameters::NO_SIZE.into())
+            Some(Rejection::NoSize)
         } else if let Some(part) = assessed.creeps {
-            Some(format!(
-                "it would bend over {:.0} % of the travel, as a spring that creeps does",
-                100.0 * part
-            ))
-        } else if let Some(foreign) = &assessed.rather {
-            Some(foreign.clone())
+            Some(Rejection::Creeps { part })
+        } else if let Some(rather) = &assessed.rather {
+            Some(Rejection::Rather(rather.clone()))
         } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(assessed)) {
-            Some("what stands beside it and explains more is no effect of the library".into())
-        } else if let Some(joint) = self.same_joint(assessed) {
-            Some(format!("beside {joint} it is the form of the same joint"))
+            Some(Rejection::BesideUnknown)
+        } else if let Some(other) = self.same_joint(assessed) {
+            Some(Rejection::SameJoint { other })
         } else if self.drifts_alike(assessed) {
-            Some("gain and friction would change alike, as both do where the inertia changes".into())
+            Some(Rejection::InertiaChanges)
         } else {
             None
         }

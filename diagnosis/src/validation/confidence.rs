@@ -56,19 +56,25 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
-/// What takes most from the probability, in words with its figure.
-pub(crate) fn weakness(evidence: &Evidence) -> String {
-    let most = takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key);
-    let unexplained = 100.0 * evidence["unexplained"];
-    match most {
-        "least_z" => format!(
-            "its gain is {:.1} standard errors on left-out blocks of the fitted or on held-out recordings",
-            evidence["least_z"].exp()
-        ),
-        "share" | "share_of_bristles" => {
-            format!("it takes {:.1} % of what the noise leaves", 100.0 * evidence["share"].exp())
+/// What takes most from the probability of a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Weakness {
+    /// Its gain is few standard errors.
+    UnsureGain { z: f64 },
+    /// It explains a small part of what the noise leaves.
+    SmallShare { share: f64 },
+    /// This part of what the refit leaves beyond chance is still there with it.
+    LeftOver { part: f64 },
+}
+
+impl Weakness {
+    /// The weakest piece of some evidence.
+    pub(crate) fn of(evidence: &Evidence) -> Self {
+        match takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key) {
+            "least_z" => Self::UnsureGain { z: evidence["least_z"].exp() },
+            "share" | "share_of_bristles" => Self::SmallShare { share: evidence["share"].exp() },
+            _ => Self::LeftOver { part: evidence["unexplained"] },
         }
-        _ => format!("{unexplained:.0} % of what the refit leaves beyond chance is still there with it"),
     }
 }
 
@@ -87,10 +93,14 @@ mod tests {
     #[test]
     fn the_weakness_is_what_takes_most_from_the_probability() {
         let sure = ("least_z", SUREST_Z.ln());
-        let says = |change: &[(&str, f64)]| weakness(&evidence(&[&[sure], change].concat()));
-        assert!(says(&[("least_z", 2.5_f64.ln())]).contains("2.5 standard errors"));
-        assert!(says(&[("share", 0.04_f64.ln())]).contains("4.0 % of what the noise leaves"));
-        assert!(says(&[("unexplained", 0.6), ("unexplained_of_force", 1.8)]).starts_with("60 %"));
+        let weakest = |change: &[(&str, f64)]| Weakness::of(&evidence(&[&[sure], change].concat()));
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        let unsure = weakest(&[("least_z", 2.5_f64.ln())]);
+        assert!(matches!(unsure, Weakness::UnsureGain { z } if near(z, 2.5)), "{unsure:?}");
+        let small = weakest(&[("share", 0.04_f64.ln())]);
+        assert!(matches!(small, Weakness::SmallShare { share } if near(share, 0.04)), "{small:?}");
+        let left = weakest(&[("unexplained", 0.6), ("unexplained_of_force", 1.8)]);
+        assert_eq!(left, Weakness::LeftOver { part: 0.6 });
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
+use crate::validation::rejection::Rejection;
 use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.
@@ -127,72 +128,49 @@ impl EffectEvidence {
         self.fit.z >= PROMISING_Z && self.holdout.z > WORSE_Z && self.share >= SHARE
     }
 
-    /// What of a gain on every recording it lacks: the first requirement that it does not meet, with its figure.
-    fn unsure(&self) -> String {
+    /// The requirement of a sure gain on every recording that it does not meet, the first of them.
+    fn unsure(&self) -> Rejection {
         let (fit, holdout) = (self.fit.z.max(self.fit.clipped_z), self.holdout.z.max(self.holdout.clipped_z));
         if self.holdout.sum <= 0.0 {
-            format!("held-out recordings are less likely with it, by {:.0} nats", -self.holdout.sum)
+            Rejection::LessLikely { nats: -self.holdout.sum }
         } else if holdout < UNLIKELY_Z {
-            format!("its gain on held-out recordings is {holdout:.1} standard errors, less than {UNLIKELY_Z}")
+            Rejection::UnlikelyGain { z: holdout }
         } else if self.holdout.low <= 0.0 {
-            let Gain { sum, low, high, .. } = self.holdout;
-            format!(
-                "its gain on held-out recordings, {sum:.0} nats, may be none (95 %: {low:.0} to {high:.0})"
-            )
+            Rejection::MayGainNothing { gain: self.holdout }
         } else {
-            format!(
-                "its gain is {fit:.1} standard errors on left-out blocks of the fitted recordings and {holdout:.1} on held-out ones, not {SURE_Z} on both, and it takes {:.0} % of what the noise leaves, less than {:.0} %",
-                100.0 * self.share.max(0.0),
-                100.0 * UNSURE_SHARE
-            )
+            Rejection::NotSure { fit_z: fit, holdout_z: holdout, share: self.share }
         }
     }
 
-    /// What of its share is too little, if it is.
-    fn too_little(&self) -> Option<String> {
-        let says = |least: f64, z: f64| {
-            format!(
-                "it takes {:.1} % of what the noise leaves, less than {:.0} %, and its gain is {z:.1} standard errors, less than the {CERTAIN_Z} that so little needs",
-                100.0 * self.share,
-                100.0 * least
-            )
-        };
-        if self.share < LEAST_SHARE {
-            return Some(format!(
-                "it takes {:.1} % of what the noise leaves, less than {:.0} %",
-                100.0 * self.share,
-                100.0 * LEAST_SHARE
-            ));
+    /// The requirement on its share that it does not meet, if there is one.
+    fn too_small(&self) -> Option<Rejection> {
+        let share = self.share;
+        if share < LEAST_SHARE {
+            return Some(Rejection::TooSmall { share });
         }
-        if self.share < SHARE && !self.is_certain() && !self.takes_most_of_the_rest() {
-            return Some(says(SHARE, self.steadiest_z()));
+        if share < SHARE && !self.is_certain() && !self.takes_most_of_the_rest() {
+            return Some(Rejection::SmallAndUnsure { share, least: SHARE, z: self.steadiest_z() });
         }
-        (self.share < FAIR_SHARE && !self.stands_out()).then(|| says(FAIR_SHARE, self.least_z()))
+        (share < FAIR_SHARE && !self.stands_out()).then(|| Rejection::SmallAndUnsure {
+            share,
+            least: FAIR_SHARE,
+            z: self.least_z(),
+        })
     }
 
-    /// Why an effect may not be named, if it may not: the requirement that it does not meet.
-    pub(crate) fn rejection_reason(&self) -> Option<String> {
+    /// Why an effect may not be named: the first requirement that it does not meet; none if it meets all.
+    pub(crate) fn rejection(&self) -> Option<Rejection> {
         if !self.generalises() {
             return Some(self.unsure());
         }
         let on_fit = self.fit.z.max(self.fit.clipped_z);
         let rare = on_fit < UNLIKELY_Z && self.holdout.z < SURE_Z;
         if rare && !self.recurs() && !self.agrees_everywhere() && !self.predicts() {
-            return Some(format!(
-                "its gain rests on few moments of the fitted recordings: {on_fit:.1} standard errors there, less than {UNLIKELY_Z}, and {:.1} on held-out ones, less than {SURE_Z}",
-                self.holdout.z
-            ));
+            return Some(Rejection::FewMoments { fit_z: on_fit, holdout_z: self.holdout.z });
         }
-        if let Some(reason) = self.too_little() {
-            return Some(reason);
-        }
-        if !self.is_comb {
-            return Some(
-                "its orders follow each other without a gap, as at places along the travel, not at teeth or poles"
-                    .into(),
-            );
-        }
-        self.at_bound.then(|| "a fitted parameter reached its limit".into())
+        self.too_small()
+            .or_else(|| (!self.is_comb).then_some(Rejection::NotPeriodic))
+            .or_else(|| self.at_bound.then_some(Rejection::AtLimit))
     }
 }
 
@@ -206,7 +184,7 @@ pub(crate) struct Rival {
     pub(crate) lead: f64,
     pub(crate) held_out_lead: f64,
     /// Why it is none although it explains as much.
-    pub(crate) absence: Option<String>,
+    pub(crate) absence: Option<Rejection>,
 }
 
 #[cfg(test)]
@@ -236,7 +214,7 @@ mod tests {
     fn may_be_named(change: impl FnOnce(&mut EffectEvidence)) -> bool {
         let mut found = found();
         change(&mut found);
-        found.rejection_reason().is_none()
+        found.rejection().is_none()
     }
 
     #[test]
@@ -264,35 +242,27 @@ mod tests {
         assert!(fitted(2.6) && !fitted(2.0));
     }
 
-    /// The figure that a reason gives is the one that rejects.
     #[test]
-    fn a_reason_is_the_requirement_that_is_not_met_with_its_figure() {
-        let reason = |change: fn(&mut EffectEvidence)| {
+    fn a_rejection_is_the_requirement_that_is_not_met() {
+        let rejection = |change: fn(&mut EffectEvidence)| {
             let mut found = EffectEvidence { sizes: vec![1.0, 2.0], ..found() };
             change(&mut found);
-            found.rejection_reason().expect("it is rejected")
+            found.rejection().expect("it is rejected")
         };
-        assert!(
-            reason(|found| found.holdout = gain(-12.0, -50.0, -1.0))
-                .contains("less likely with it, by 12 nats")
-        );
-        let unlikely = reason(|found| found.holdout = gain(661.0, 10.0, 1.4));
-        assert!(unlikely.contains("1.4 standard errors, less than 2"), "{unlikely}");
-        let none = reason(|found| found.holdout = gain(661.0, -10.0, 2.4));
-        assert!(none.contains("661 nats, may be none (95 %: -10 to 1322)"), "{none}");
-        let hardly = reason(|found| {
+        let less_likely = rejection(|found| found.holdout = gain(-12.0, -50.0, -1.0));
+        assert_eq!(less_likely, Rejection::LessLikely { nats: 12.0 });
+        let unlikely = rejection(|found| found.holdout = gain(661.0, 10.0, 1.4));
+        assert_eq!(unlikely, Rejection::UnlikelyGain { z: 1.4 });
+        let none = rejection(|found| found.holdout = gain(661.0, -10.0, 2.4));
+        assert_eq!(none, Rejection::MayGainNothing { gain: gain(661.0, -10.0, 2.4) });
+        let hardly = rejection(|found| {
             found.fit = gain(90.0, 10.0, 2.5);
             found.share = 0.4;
         });
-        assert!(hardly.contains("2.5 standard errors on left-out") && hardly.contains("40 %"), "{hardly}");
-        let little = reason(|found| (found.share, found.fit) = (0.03, gain(90.0, 10.0, 4.0)));
-        assert!(
-            little.contains("3.0 %") && little.contains("4.0 standard errors, less than the 6"),
-            "{little}"
-        );
-        assert!(
-            reason(|found| found.share = 0.002).contains("0.2 % of what the noise leaves, less than 1 %")
-        );
+        assert_eq!(hardly, Rejection::NotSure { fit_z: 2.5, holdout_z: 8.0, share: 0.4 });
+        let little = rejection(|found| (found.share, found.fit) = (0.03, gain(90.0, 10.0, 4.0)));
+        assert_eq!(little, Rejection::SmallAndUnsure { share: 0.03, least: SHARE, z: 4.0 });
+        assert_eq!(rejection(|found| found.share = 0.002), Rejection::TooSmall { share: 0.002 });
     }
 
     #[test]
@@ -413,7 +383,7 @@ mod tests {
         half.holdout = gain(300.0, -20.0, 1.5);
         half.force.low = -0.1;
         half.share = 0.3;
-        assert!(half.rejection_reason().is_some() && half.is_provisional());
+        assert!(half.rejection().is_some() && half.is_provisional());
         half.holdout = gain(-10.0, -50.0, -0.5);
         assert!(half.is_provisional());
         half.holdout = gain(-50.0, -90.0, -1.5);

@@ -97,7 +97,7 @@ pub(crate) fn judge_all(
                 is_comb,
                 sizes,
             };
-            if found.rejection_reason().is_some() {
+            if found.rejection().is_some() {
                 found.score_z = score_z_of(context, &last.model, &without.model, slow, judging);
             }
             found

@@ -12,6 +12,7 @@ pub(crate) mod known_travel;
 pub(crate) mod opponent;
 pub(crate) mod out_of_library;
 pub(crate) mod parameters;
+pub(crate) mod rejection;
 pub(crate) mod repeats;
 pub(crate) mod residual_maps;
 pub(crate) mod residuals;

@@ -9,6 +9,7 @@ use crate::validation::assess::Assessment;
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
 use crate::validation::parameters;
+use crate::validation::rejection::Rather;
 use crate::validation::stepwise::Search;
 
 /// What a force of any form would take beside a model.
@@ -39,15 +40,8 @@ pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Sear
         let variable = model.effects[i].name.variable();
         let standing = whole.standing(&evaluator.densities(&less), variable);
         if let Some(against) = standing.against {
-            let takes = match standing.own.sum {
-                own if own > 0.0 => format!("{own:.0}"),
-                _ => "nothing".to_owned(),
-            };
-            assessment.effects[i].rather = Some(format!(
-                "a force over {} of a form that it cannot have takes {:.0} nats of left-out blocks where it takes {takes}",
-                against.inputs.in_words(),
-                against.most,
-            ));
+            let (over, form) = (against.inputs, against.most);
+            assessment.effects[i].rather = Some(Rather::FreeForm { over, form, effect: standing.own.sum });
         }
     }
     let taken = whole.taken().into_iter().next()?;

@@ -11,6 +11,7 @@ use crate::selection::context::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
+use crate::validation::rejection::Rather;
 use rayon::prelude::*;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.
@@ -19,8 +20,17 @@ fn like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
     EffectName::ALL.iter().flat_map(of).collect()
 }
 
-/// What foreign physics would explain of a refit where nothing is named, if it is most of it and as sure as of a name.
-pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut) -> Option<String> {
+/// Physics without a name that explains most of what a refit leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Foreign {
+    /// What it is, a noun phrase.
+    pub(crate) what: String,
+    /// The part that it explains, at most 1.
+    pub(crate) share: f64,
+}
+
+/// Physics without a name that explains most of what a refit leaves where nothing is named, as surely as a name must.
+pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut) -> Option<Foreign> {
     let all = like(None, context);
     let model = |foreign: &Unnamed| Model { effects: vec![foreign.effect.clone()], ..Model::default() };
     let merit = |foreign: &Unnamed| {
@@ -31,13 +41,13 @@ pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut
     let (_, best) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = context.fit(model(&best), &refit.noise, Colour::White);
     let found = judge_all(context, &fitted, &refit.noise, holdout).pop()?;
-    let is_sure = found.rejection_reason().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
-    is_sure.then(|| format!("{} would explain {:.0} % of it", best.what, 100.0 * found.share.min(1.0)))
+    let is_sure = found.rejection().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
+    is_sure.then_some(Foreign { what: best.what, share: found.share.min(1.0) })
 }
 
-/// What foreign physics a fitted effect would rather be, where some in its place explains surely more; `gain` is the
+/// Physics without a name that a fitted effect would rather be, where some in its place explains surely more; `gain` is the
 /// effect's own.
-pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, gain: f64) -> Option<String> {
+pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, gain: f64) -> Option<Rather> {
     let more = |foreign: &Unnamed| {
         let mut model = fitted.model.clone();
         model.effects[effect] = foreign.effect.clone();
@@ -51,5 +61,5 @@ pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, 
         .into_iter()
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(more, _)| *more > 0.0)
-        .map(|(_, foreign)| format!("{} would explain more", foreign.what))
+        .map(|(_, foreign)| Rather::Unnamed { what: foreign.what })
 }

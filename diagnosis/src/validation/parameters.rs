@@ -7,6 +7,7 @@ use crate::estimation::model::{Key, Nominal};
 use crate::io::schema::Parameter;
 use crate::numerics::linear::Square;
 use crate::selection::context::{FitContext, FittedModel};
+use crate::validation::rejection::Rejection;
 use std::collections::BTreeMap;
 
 /// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and the relative standard
@@ -98,14 +99,11 @@ pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> boo
         || parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
 }
 
-/// Why an effect without a size is none.
-pub(crate) const NO_SIZE: &str = "its size cannot be told from zero";
-
-/// Why an effect of a fitted model may not be named although it explains something: it does by what it shares with others.
-pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize) -> Option<String> {
+/// Why an effect of a fitted model may not be named although it explains something: it explains it together with others.
+pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize) -> Option<Rejection> {
     let name = fitted.model.effects[effect].name;
     let is_there = is_there(name, &parameters(context, fitted, effect));
-    (!is_there).then(|| NO_SIZE.to_owned())
+    (!is_there).then_some(Rejection::NoSize)
 }
 
 /// The parameters of an effect of a fitted model.

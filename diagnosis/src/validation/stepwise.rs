@@ -21,6 +21,7 @@ use crate::validation::evidence::EffectEvidence;
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
 use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
 use crate::validation::residuals::{drive_force, forces};
 use rayon::prelude::*;
 
@@ -40,8 +41,8 @@ pub(crate) struct Search {
     /// The final model under coloured noise.
     pub(crate) last: FittedModel,
     pub(crate) found: Vec<EffectEvidence>,
-    /// Hypotheses that were fitted in full and lost: name, gain, reason.
-    pub(crate) rejected: Vec<(EffectName, Option<f64>, String)>,
+    /// Hypotheses that were fitted in full and rejected: name, gain, and why.
+    pub(crate) rejected: Vec<(EffectName, Option<f64>, Rejection)>,
 }
 
 /// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
@@ -123,7 +124,7 @@ struct SearchState {
 /// What was looked at and not taken.
 #[derive(Default)]
 struct Rejected {
-    names: Vec<(EffectName, Option<f64>, String)>,
+    names: Vec<(EffectName, Option<f64>, Rejection)>,
     tried: usize,
     /// Whether plain forces were looked for together.
     plain_tried: bool,
@@ -194,7 +195,7 @@ fn with_plain_forces(now: &SearchState, on: &FitContext, best: f64) -> Option<Ne
         holdout.follow(&white, on.nominal, on.span, on.scale);
         let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
         let judged = judge_all(&own, &white, &slow.noise, &holdout);
-        if judged.iter().all(|judged| judged.rejection_reason().is_none()) {
+        if judged.iter().all(|judged| judged.rejection().is_none()) {
             return Some(Next { state: SearchState { white, slow, tracks, holdout }, generalises: true });
         }
     }
@@ -225,11 +226,7 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
         let gain = with.merit - now.slow.merit;
         if gain < MIN_LOG_LIKELIHOOD_GAIN {
-            rejected.names.push((
-                name,
-                None,
-                "what it explains is no more than a slow disturbance would".into(),
-            ));
+            rejected.names.push((name, None, Rejection::SlowDisturbance));
             continue;
         }
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, on);
@@ -237,20 +234,19 @@ fn with_one_more(now: &SearchState, on: &FitContext, rejected: &mut Rejected, mo
         let mut holdout = now.holdout.clone();
         holdout.follow(&white, on.nominal, on.span, on.scale);
         let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
-        let rejection_reason = judged
-            .rejection_reason()
-            .or_else(|| parameters::absence(&own, &white, white.model.effects.len() - 1));
-        if rejection_reason.is_none() || (promising.is_none() && judged.is_provisional()) {
+        let rejection =
+            judged.rejection().or_else(|| parameters::absence(&own, &white, white.model.effects.len() - 1));
+        if rejection.is_none() || (promising.is_none() && judged.is_provisional()) {
             let slow = own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]);
-            let generalises = rejection_reason.is_none();
+            let generalises = rejection.is_none();
             let next = Next { state: SearchState { white, slow, tracks, holdout }, generalises };
             if generalises {
                 return Some(next);
             }
             promising = Some(next);
         }
-        if let Some(reason) = rejection_reason {
-            rejected.names.push((name, Some(judged.holdout.sum), reason));
+        if let Some(why) = rejection {
+            rejected.names.push((name, Some(judged.holdout.sum), why));
         }
     }
     promising
@@ -388,7 +384,7 @@ pub(crate) fn eliminate(s: &mut Search, context: &FitContext, holdout: &HeldOut,
             .iter()
             .enumerate()
             .filter_map(|(i, f)| {
-                let reason = f.rejection_reason().or_else(|| parameters::absence(context, &plain, i))?;
+                let reason = f.rejection().or_else(|| parameters::absence(context, &plain, i))?;
                 Some((i, f.holdout.z, reason))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));

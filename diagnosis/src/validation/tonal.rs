@@ -42,15 +42,9 @@ impl TonalDisturbance {
         self.taken > MISTAKEN
     }
 
-    /// What was left out in words, where it is a swing.
-    pub(crate) fn in_words(&self) -> Option<String> {
-        (self.part > DOMINANT || self.is_mistaken()).then(|| {
-            format!(
-                "{:.0} % of what a refit leaves is a force that swings at {:.1} Hz, whatever the axis does",
-                100.0 * self.part,
-                self.hertz
-            )
-        })
+    /// True if the swing is what was left out.
+    pub(crate) fn is_left_out(&self) -> bool {
+        self.part > DOMINANT || self.is_mistaken()
     }
 }
 

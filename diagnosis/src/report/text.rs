@@ -1,0 +1,145 @@
+//! The sentences of a report: nothing else makes any of what was found, and nothing reads one to decide.
+
+use crate::numerics::bootstrap::Gain;
+use crate::report::verdict::Reason;
+use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
+use crate::validation::confidence::Weakness;
+use crate::validation::rejection::{Rather, Rejection};
+
+/// Why an effect is not named, as a clause.
+pub(crate) fn rejection(why: &Rejection) -> String {
+    match why {
+        Rejection::SlowDisturbance => "a slow disturbance explains as much".into(),
+        Rejection::LessLikely { nats } => {
+            format!("held-out recordings are less likely with it, by {nats:.0} nats")
+        }
+        Rejection::UnlikelyGain { z } => {
+            format!("its gain on held-out recordings is {z:.1} standard errors, less than {UNLIKELY_Z}")
+        }
+        Rejection::MayGainNothing { gain: Gain { sum, low, high, .. } } => format!(
+            "its gain on held-out recordings, {sum:.0} nats, may be zero (95 %: {low:.0} to {high:.0})"
+        ),
+        Rejection::NotSure { fit_z, holdout_z, share } => format!(
+            "its gain is {fit_z:.1} standard errors on left-out blocks of the fitted recordings and {holdout_z:.1} on held-out ones, not {SURE_Z} on both, and it explains {:.0} % of what the noise leaves, less than {:.0} %",
+            100.0 * share.max(0.0),
+            100.0 * UNSURE_SHARE
+        ),
+        Rejection::FewMoments { fit_z, holdout_z } => format!(
+            "its gain rests on few moments of the fitted recordings: {fit_z:.1} standard errors there, less than {UNLIKELY_Z}, and {holdout_z:.1} on held-out ones, less than {SURE_Z}"
+        ),
+        Rejection::TooSmall { share } => format!(
+            "it explains {:.1} % of what the noise leaves, less than {:.0} %",
+            100.0 * share,
+            100.0 * LEAST_SHARE
+        ),
+        Rejection::SmallAndUnsure { share, least, z } => format!(
+            "it explains {:.1} % of what the noise leaves, and effects below {:.0} % need a gain of {CERTAIN_Z} standard errors; this one has {z:.1}",
+            100.0 * share,
+            100.0 * least
+        ),
+        Rejection::NotPeriodic => {
+            "its orders follow one another without a gap, as at places along the travel, not at teeth or poles"
+                .into()
+        }
+        Rejection::AtLimit => "a fitted parameter reached its limit".into(),
+        Rejection::NoSize => "its size cannot be distinguished from zero".into(),
+        Rejection::Swing { hertz } => {
+            format!("what it explains swings at {hertz:.1} Hz, whatever the axis does")
+        }
+        Rejection::Creeps { part } => {
+            format!("it would bend over {:.0} % of the travel, as a spring that creeps does", 100.0 * part)
+        }
+        Rejection::Rather(what) => rather(what),
+        Rejection::BesideUnknown => "a larger effect in the same model is not in the library".into(),
+        Rejection::SameJoint { other } => format!("{other} is of the same joint and explains more"),
+        Rejection::InertiaChanges => {
+            "gain and friction would change by the same part, as where the inertia changes".into()
+        }
+        Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
+        Rejection::Improbable { probability, weakness: weakest } => {
+            format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
+        }
+        Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
+        Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
+    }
+}
+
+fn rather(what: &Rather) -> String {
+    match what {
+        Rather::Unnamed { what } => format!("{what} would explain more"),
+        Rather::FreeForm { over, form, effect } => {
+            let own = if *effect > 0.0 { format!("{effect:.0}") } else { "nothing".to_owned() };
+            format!(
+                "a force over {} of a form that it cannot have explains {form:.0} nats of left-out blocks where it explains {own}",
+                over.in_words()
+            )
+        }
+    }
+}
+
+fn weakness(weakest: &Weakness) -> String {
+    match weakest {
+        Weakness::UnsureGain { z } => format!(
+            "its gain is {z:.1} standard errors on left-out blocks of the fitted or on held-out recordings"
+        ),
+        Weakness::SmallShare { share } => {
+            format!("it explains {:.1} % of what the noise leaves", 100.0 * share)
+        }
+        Weakness::LeftOver { part } => {
+            format!("{:.0} % of what the refit leaves beyond chance remains with it", 100.0 * part)
+        }
+    }
+}
+
+/// Why recordings cannot tell, or what is left where no effect is named; `form` is the force of any form, in words, where there
+/// is one.
+pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
+    let sentence = match why {
+        Reason::Recordings(sentence) => sentence.clone(),
+        Reason::Misfit { left } => format!(
+            "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is wrong (seconds, counts, command) or where something that was not recorded moves the axis",
+            100.0 * left
+        ),
+        Reason::OneSpeed { factor } => format!(
+            "all motion is at about one speed (nine tenths of it within a factor of {factor:.1}), so effects that depend on speed look like those that do not"
+        ),
+        Reason::Swing { part, hertz } => format!(
+            "{:.0} % of what a refit leaves is a force that swings at {hertz:.1} Hz, whatever the axis does",
+            100.0 * part
+        ),
+        Reason::Resembles { effect, rather: what } => format!("it resembles {effect}, but {}", rather(what)),
+        Reason::Foreign(foreign) => {
+            format!("{} would explain {:.0} % of it", foreign.what, 100.0 * foreign.share)
+        }
+        Reason::FreeForm => return format!("{} would explain it", form.unwrap_or("a force of some form")),
+        Reason::Repeats { correlation } => {
+            format!("the residual repeats where the motion does, with a correlation of {correlation:.2}")
+        }
+    };
+    match form {
+        Some(form) => format!("{sentence}; the residual is {form}"),
+        None => sentence,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rejection_gives_the_figure_that_rejects() {
+        let little = rejection(&Rejection::SmallAndUnsure { share: 0.03, least: 0.05, z: 4.2 });
+        assert!(little.contains("3.0 %") && little.contains("5 %") && little.contains("4.2"), "{little}");
+        let gain = Gain { sum: 661.0, low: -10.0, high: 1322.0, z: 2.4, clipped_z: 2.4 };
+        let none = rejection(&Rejection::MayGainNothing { gain });
+        assert!(none.contains("661 nats") && none.contains("-10 to 1322"), "{none}");
+    }
+
+    #[test]
+    fn a_form_that_is_the_reason_is_said_once() {
+        let form = "a force that grows with speed";
+        assert_eq!(reason(&Reason::FreeForm, Some(form)), format!("{form} would explain it"));
+        let other = reason(&Reason::Repeats { correlation: 0.8 }, Some(form));
+        assert!(other.ends_with(&format!("; the residual is {form}")), "{other}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Why an effect is not named: the requirement that it does not meet, with its figures. `report::text` makes sentences of it.
+
+use crate::effects::EffectName;
+use crate::numerics::bootstrap::Gain;
+use crate::selection::free_form::Inputs;
+use crate::validation::confidence::Weakness;
+
+/// Why an effect is not named.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Rejection {
+    /// A slow disturbance explains as much.
+    SlowDisturbance,
+    /// Held-out recordings are less likely with the effect.
+    LessLikely { nats: f64 },
+    /// The gain on held-out recordings is too few standard errors.
+    UnlikelyGain { z: f64 },
+    /// The interval of the gain on held-out recordings holds zero.
+    MayGainNothing { gain: Gain },
+    /// The gain is not sure on fitted and on held-out recordings, and the effect does not explain most.
+    NotSure { fit_z: f64, holdout_z: f64, share: f64 },
+    /// The gain rests on few moments of the fitted recordings.
+    FewMoments { fit_z: f64, holdout_z: f64 },
+    /// The effect explains too little of what the noise leaves, however sure it is.
+    TooSmall { share: f64 },
+    /// The effect explains less than `least` of what the noise leaves, and is not sure enough for that.
+    SmallAndUnsure { share: f64, least: f64, z: f64 },
+    /// The waves are not those of teeth or poles.
+    NotPeriodic,
+    /// A fitted value reached its limit.
+    AtLimit,
+    /// The interval of its size holds zero.
+    NoSize,
+    /// A force that swings at a frequency of its own explains what the effect explains.
+    Swing { hertz: f64 },
+    /// The effect would bend over this part of the travel, as only a spring that creeps does.
+    Creeps { part: f64 },
+    /// Something that has no name in the library explains it better.
+    Rather(Rather),
+    /// A larger effect beside it is not in the library.
+    BesideUnknown,
+    /// Another effect beside it is of the same joint and explains more.
+    SameJoint { other: EffectName },
+    /// Gain and friction change by the same part, as where the inertia changes.
+    InertiaChanges,
+    /// More effects explain it as well than a class may hold.
+    Undecided,
+    /// The probability that it is right is too small.
+    Improbable { probability: f64, weakness: Weakness },
+    /// The recordings cannot tell it from a named effect.
+    Indistinguishable { from: EffectName },
+    /// Another effect in its place explains more.
+    Behind { winner: EffectName, z: f64 },
+}
+
+/// What an effect would rather be.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Rather {
+    /// Physics without a name in the library; a noun phrase.
+    Unnamed { what: String },
+    /// A force of a form that the effect cannot have: gains on left-out blocks, nats, of the form and of the effect.
+    FreeForm { over: Inputs, form: f64, effect: f64 },
+}
