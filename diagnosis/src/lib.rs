@@ -16,6 +16,7 @@ pub mod effects;
 mod estimation;
 mod io;
 mod numerics;
+mod pipeline;
 pub mod report;
 mod selection;
 pub mod simulation;
@@ -24,12 +25,12 @@ mod validation;
 
 pub use io::error::InputError;
 pub use io::{recording, rig};
-pub use report::outcome::{Evidence, Outcome, Series};
+pub use pipeline::diagnosis::Series;
+pub use report::outcome::{Evidence, Outcome};
 pub use report::{Report, Verdict};
 pub use validation::residual_maps::Map;
 
 use recording::Recording;
-use report::verdict::Reason;
 use rig::Rig;
 use std::path::PathBuf;
 
@@ -74,17 +75,7 @@ pub fn diagnose_recordings(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
-    let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
-    if let Some(reason) = estimation::plausibility::mistakes(&all, rig) {
-        return Ok(Outcome::cannot_tell(rig, &Reason::Recordings(reason)));
-    }
-    if let Some(reason) = io::sufficiency::too_little(fit, holdout, rig) {
-        return Ok(Outcome::cannot_tell(rig, &Reason::Recordings(reason)));
-    }
-    let search = validation::stepwise::search(rig, fit, holdout, progress)?;
-    progress("writing down", 0.95);
-    let mut outcome = report::conclude::conclude(search, rig, holdout);
-    outcome.evidence.rate_hz = all.iter().map(|r| r.rate_hz()).min_by(f64::total_cmp);
+    let outcome = Outcome::of(pipeline::run(rig, fit, holdout, progress));
     progress("done", 1.0);
     Ok(outcome)
 }

@@ -5,8 +5,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders from the bottom to the top.
-const FLOORS: [&str; 8] =
-    ["numerics", "effects", "io", "simulation", "estimation", "selection", "validation", "report"];
+const FLOORS: [&str; 9] = [
+    "numerics",
+    "effects",
+    "io",
+    "simulation",
+    "estimation",
+    "selection",
+    "validation",
+    "pipeline",
+    "report",
+];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).expect("the folder is there") {

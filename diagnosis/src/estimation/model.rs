@@ -102,6 +102,11 @@ const IGNORED_UNANCHORED: f64 = 0.35;
 const IGNORED_UNBALANCED: f64 = 0.2;
 
 impl Nominal {
+    /// The nominal model of a rig, before anything was found of it in recordings.
+    pub(crate) fn of(rig: &Rig) -> Self {
+        Self { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false, virtual_inertia: 0.0 }
+    }
+
     /// Gain over inertia as the rig states it.
     pub(crate) fn gain(&self) -> f64 {
         self.rig.actuator.gain / self.rig.model.inertia

@@ -4,10 +4,10 @@ use crate::effects::Variable;
 use crate::io::rig::Kind;
 use crate::io::schema::FreeForm;
 use crate::numerics::digits::short;
+use crate::pipeline::diagnosis::FreeForce;
 use crate::report::axes::{frame, safe};
 use crate::report::form_in_words;
 use crate::selection::free_form::Shape;
-use crate::validation::opponent::{Beside, Unnamed};
 use std::fmt::Write as _;
 
 /// The form in a sentence without a stop.
@@ -15,25 +15,16 @@ pub(crate) fn sentence(shape: &Shape, length: &str) -> String {
     form_in_words::sentence(&shape.table, &shape.visits, length)
 }
 
-/// The entry of the report: of the force where nothing is named, or of what a form takes beside the names.
-pub(crate) fn told(
-    unnamed: Option<&Unnamed>,
-    in_words: Option<String>,
-    beside: Option<Beside>,
-) -> Option<FreeForm> {
-    let (taken, share_of_ceiling) = match (unnamed, &beside) {
-        (Some(unnamed), _) => (&unnamed.taken, 0.0),
-        (None, Some(beside)) => (&beside.taken, beside.share),
-        (None, None) => return None,
-    };
-    Some(FreeForm {
-        inputs: taken.inputs.variables().to_vec(),
+/// The entry of the report.
+pub(crate) fn entry(force: &FreeForce, in_words: Option<String>) -> FreeForm {
+    FreeForm {
+        inputs: force.inputs.variables().to_vec(),
         in_words,
-        holdout_gain: unnamed.and_then(|unnamed| unnamed.holdout_gain),
-        left_out_gain: taken.gain.sum,
-        left_out_error: taken.gain.error,
-        share_of_ceiling,
-    })
+        holdout_gain: force.holdout_gain,
+        left_out_gain: force.left_out_gain,
+        left_out_error: force.left_out_error,
+        share_of_ceiling: force.share_of_ceiling,
+    }
 }
 
 /// Lines of a picture over two variables.

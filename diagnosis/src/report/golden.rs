@@ -3,8 +3,8 @@
 use crate::effects::EffectName as N;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, Named, Place, Region, Report, Verdict};
+use crate::pipeline::diagnosis::Reason;
 use crate::report::outcome::{Outcome, sentence};
-use crate::report::verdict::Reason;
 use std::collections::BTreeMap;
 
 fn named(name: N, confidence: f64, class: &[N], states: Vec<Region>) -> Named {
@@ -21,9 +21,12 @@ fn named(name: N, confidence: f64, class: &[N], states: Vec<Region>) -> Named {
 
 /// A report of a verdict over a force of 1 N·m: 0.4 stands, 0.2 refitted, 0.05 patched.
 fn report(verdict: Verdict, reason: Option<&str>, effects: Vec<Named>) -> Report {
-    let mut report =
-        Outcome::cannot_tell(&Rig::of_values(1e-3, 1e-3, 1e-2), &Reason::Recordings("nothing yet".into()))
-            .report;
+    let mut report = Outcome::cannot_tell(
+        &Rig::of_values(1e-3, 1e-3, 1e-2),
+        &Reason::Recordings("nothing yet".into()),
+        None,
+    )
+    .report;
     (report.verdict, report.effects) = (verdict, effects);
     report.reason = reason.map(str::to_owned);
     let both = |x: f64| Both { fit: x, holdout: x };

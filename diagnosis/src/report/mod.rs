@@ -1,7 +1,6 @@
 //! What people and files are told: the verdict, what to record next, the patched rig, and the pages. Nothing here fits.
 
 pub(crate) mod axes;
-pub(crate) mod conclude;
 pub mod exports;
 mod form_in_words;
 pub(crate) mod free_form;
@@ -11,11 +10,8 @@ mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
 pub(crate) mod outcome;
-pub(crate) mod patched_rig;
-pub(crate) mod run_forward;
 pub mod simulation_page;
 pub(crate) mod text;
-pub(crate) mod verdict;
 mod write;
 
 pub use crate::io::schema::{

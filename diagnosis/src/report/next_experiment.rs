@@ -1,6 +1,8 @@
 //! What to record next: the experiment that would separate two effects, or show one at all.
 
 use crate::effects::{EffectName as N, experiments};
+use crate::numerics::digits::short_within;
+use crate::validation::known_travel::BeyondFitted;
 
 /// The recording that would decide within a class.
 pub(crate) fn separating(class: &[N]) -> Option<String> {
@@ -13,6 +15,19 @@ pub(crate) fn separating(class: &[N]) -> Option<String> {
         others.clone().find_map(|other| name.definition().experiment(*other))
     });
     Some(text.unwrap_or(experiments::RICH).to_owned())
+}
+
+/// Strokes that reach as far as the held-out recordings do; `length` is the unit of the coordinate.
+pub(crate) fn strokes(beyond: BeyondFitted, length: &str) -> String {
+    let BeyondFitted { from, to, low, high } = beyond;
+    let tidy = |x: f64| short_within(x, high - low);
+    format!(
+        "to fit on, strokes over the travel from {} to {} {length}: held-out recordings go there and fitted ones only from {} to {}, so that the profile beyond is not known",
+        tidy(from),
+        tidy(to),
+        tidy(low),
+        tidy(high)
+    )
 }
 
 /// What a recording needs so that a diagnosis is possible at all.

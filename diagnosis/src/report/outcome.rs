@@ -1,70 +1,17 @@
 //! What a diagnosis hands back: the report, the evidence behind it, the patched rig, and the files they become.
 
 use crate::effects::EffectName;
-use crate::estimation::blocked_recording::BlockedRecording;
 use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, ByModel, FitTable, Report, Verdict};
+use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Verdict};
 use crate::numerics::digits::short;
-use crate::report::text;
-use crate::report::verdict::Reason;
+use crate::pipeline::diagnosis::{Complete, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
+use crate::report::{free_form, next_experiment, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-
-/// Residuals of one recording over time, per block of at most 1 kHz.
-#[derive(Debug, Clone)]
-pub struct Series {
-    /// The recording's file name.
-    pub file: String,
-    /// Whether it was held out.
-    pub held_out: bool,
-    /// s since the first row.
-    pub time_s: Vec<f64>,
-    /// rad/s or m/s.
-    pub velocity: Vec<f64>,
-    /// Residual force, N·m or N; none at rest.
-    pub nominal: Vec<Option<f64>>,
-    /// After the refit.
-    pub refit: Vec<Option<f64>>,
-    /// With the effects found.
-    pub patched: Vec<Option<f64>>,
-    /// The drive's force under the same estimator.
-    pub force: Vec<f64>,
-}
-
-impl Series {
-    pub(crate) fn new(
-        track: &BlockedRecording,
-        held_out: bool,
-        moves: &[bool],
-        nominal: &[f64],
-        refit: &[f64],
-        patched: &[f64],
-        force: &[f64],
-    ) -> Self {
-        let moving =
-            |column: &[f64]| column.iter().zip(moves).map(|(x, moves)| moves.then_some(*x)).collect();
-        Self {
-            file: track.blocks.file.clone(),
-            held_out,
-            time_s: track
-                .blocks
-                .start
-                .iter()
-                .zip(&track.blocks.span)
-                .map(|(t, h)| track.blocks.lead_s + t + 0.5 * h)
-                .collect(),
-            velocity: track.motion.v.clone(),
-            nominal: moving(nominal),
-            refit: moving(refit),
-            patched: moving(patched),
-            force: force.to_vec(),
-        }
-    }
-}
 
 /// What `report.html` plots.
 #[derive(Debug, Clone)]
@@ -168,8 +115,16 @@ pub(crate) fn unit(variable: &str, kind: Kind) -> String {
 }
 
 impl Outcome {
+    /// What is handed back of a diagnosis.
+    pub(crate) fn of(diagnosis: Diagnosis) -> Self {
+        match diagnosis {
+            Diagnosis::CannotTell { rig, reason, rate_hz } => Self::cannot_tell(&rig, &reason, rate_hz),
+            Diagnosis::Complete(complete) => Self::complete(*complete),
+        }
+    }
+
     /// The outcome where recordings cannot tell, with the reason.
-    pub(crate) fn cannot_tell(rig: &Rig, reason: &Reason) -> Self {
+    pub(crate) fn cannot_tell(rig: &Rig, reason: &Reason, rate_hz: Option<f64>) -> Self {
         let mut report = Report {
             format: 1,
             verdict: Verdict::InsufficientExcitation,
@@ -192,7 +147,7 @@ impl Outcome {
             free_form: None,
             place: None,
             simulation: None,
-            separating_experiment: Some(crate::report::next_experiment::GENERAL.to_owned()),
+            separating_experiment: Some(next_experiment::GENERAL.to_owned()),
             reason: Some(text::reason(reason, None)),
         };
         report.sentence = sentence(&report, rig.kind);
@@ -203,9 +158,48 @@ impl Outcome {
             simulated: Vec::new(),
             kind: rig.kind,
             rig: rig.name.clone(),
-            rate_hz: None,
+            rate_hz,
         };
         Self { report, evidence, nominal_rig: rig.clone(), refit_rig: rig.clone(), patched_rig: rig.clone() }
+    }
+
+    fn complete(diagnosis: Complete) -> Self {
+        let Rigs { nominal, refit, patched } = diagnosis.rigs;
+        let kind = nominal.kind;
+        let form = diagnosis.free_form.as_ref().and_then(|force| force.shape.as_ref());
+        let form = form.map(|shape| free_form::sentence(shape, kind.length()));
+        let separating_experiment = match diagnosis.verdict {
+            Verdict::InsufficientExcitation => Some(next_experiment::SPEEDS.to_owned()),
+            _ => diagnosis.beyond_fitted.map(|beyond| next_experiment::strokes(beyond, kind.length())),
+        };
+        let mut report = Report {
+            format: 1,
+            verdict: diagnosis.verdict,
+            sentence: String::new(),
+            effects: diagnosis.effects.into_iter().map(named).collect(),
+            fit: diagnosis.errors,
+            refitted: refitted(&patched),
+            residual_bandwidth_hz: diagnosis.bandwidth_hz,
+            noise_floor: diagnosis.noise_floor,
+            unexplained_fraction: diagnosis.unexplained_fraction,
+            hypotheses: diagnosis.hypotheses.into_iter().map(hypothesis).collect(),
+            reason: diagnosis.reason.map(|reason| text::reason(&reason, form.as_deref())),
+            free_form: diagnosis.free_form.as_ref().map(|force| free_form::entry(force, form)),
+            place: diagnosis.place,
+            separating_experiment,
+            simulation: diagnosis.simulation,
+        };
+        report.sentence = sentence(&report, kind);
+        let evidence = Evidence {
+            series: diagnosis.series,
+            maps: diagnosis.maps,
+            form: diagnosis.free_form.and_then(|force| force.shape),
+            simulated: diagnosis.simulated,
+            kind,
+            rig: nominal.name.clone(),
+            rate_hz: diagnosis.rate_hz,
+        };
+        Self { report, evidence, nominal_rig: nominal, refit_rig: refit, patched_rig: patched }
     }
 
     /// Ten lines for the terminal.
@@ -303,4 +297,35 @@ impl Outcome {
             }
         }
     }
+}
+
+/// A named effect as the report has it.
+fn named(effect: NamedEffect) -> Named {
+    let NamedEffect { name, class, confidence, parameters, place } = effect;
+    let separating_experiment = next_experiment::separating(&class);
+    Named { name, class, subsystem: name.subsystem(), confidence, parameters, place, separating_experiment }
+}
+
+/// A hypothesis as the report has it.
+fn hypothesis(judged: JudgedHypothesis) -> Hypothesis {
+    let JudgedHypothesis { name, holdout_gain, evidence, class, rejection } = judged;
+    let rejected_because = rejection.as_ref().map(text::rejection);
+    Hypothesis { name, holdout_gain, evidence, class, rejected_because }
+}
+
+/// The values of the rig that a refit may move.
+fn refitted(patched: &Rig) -> BTreeMap<String, f64> {
+    let model = &patched.model;
+    [
+        ("inertia", Some(model.inertia)),
+        ("gain", Some(patched.actuator.gain)),
+        ("viscous", model.viscous),
+        ("coulomb", model.coulomb),
+        ("offset", model.offset),
+        ("weight", model.weight),
+        ("gravity", model.gravity),
+    ]
+    .into_iter()
+    .filter_map(|(key, value)| Some((key.to_owned(), value?)))
+    .collect()
 }

@@ -1,7 +1,7 @@
 //! The sentences of a report: nothing else makes any of what was found, and nothing reads one to decide.
 
 use crate::numerics::bootstrap::Gain;
-use crate::report::verdict::Reason;
+use crate::pipeline::diagnosis::Reason;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::confidence::Weakness;
 use crate::validation::rejection::{Rather, Rejection};

@@ -15,6 +15,7 @@ use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDE
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover, Weakness};
+use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
 use crate::validation::evidence::EffectEvidence;
 use crate::validation::held_out::HeldOut;
 use crate::validation::out_of_library;
@@ -22,7 +23,7 @@ use crate::validation::parameters;
 use crate::validation::rejection::{Rather, Rejection};
 use crate::validation::repeats::correlation_of_repeats;
 use crate::validation::residuals::{Residuals, above};
-use crate::validation::stepwise::{Search, eliminate};
+
 use crate::validation::tonal::{self, TonalDisturbance};
 use std::collections::BTreeMap;
 
@@ -30,7 +31,7 @@ use std::collections::BTreeMap;
 const LEAST_ABOVE: f64 = 0.02;
 
 /// One effect with what speaks for and against it.
-pub(crate) struct Assessed {
+pub(crate) struct WeighedEffect {
     pub(crate) found: EffectEvidence,
     pub(crate) class: Vec<EffectName>,
     pub(crate) evidence: Evidence,
@@ -45,17 +46,21 @@ pub(crate) struct Assessed {
     pub(crate) rather: Option<Rather>,
 }
 
-impl Assessed {
+impl WeighedEffect {
     fn explains_more(&self, than: &Self) -> bool {
         self.found.holdout.sum > than.found.holdout.sum
     }
 }
 
 /// The model that stands, its effects weighed, and its residuals.
-pub(crate) struct Assessment {
-    pub(crate) effects: Vec<Assessed>,
+pub(crate) struct WeighedModel {
+    pub(crate) effects: Vec<WeighedEffect>,
     /// What went because it was unsure.
-    pub(crate) dropped: Vec<Assessed>,
+    pub(crate) dropped: Vec<WeighedEffect>,
+    /// The model under coloured noise.
+    pub(crate) slow: FittedModel,
+    /// What was rejected on the way.
+    pub(crate) rejected: Vec<RejectedHypothesis>,
     pub(crate) shown: Shown,
     pub(crate) estimator: Estimator,
     /// What reading whole counts alone puts into the residual, N·m or N.
@@ -69,27 +74,27 @@ pub(crate) struct Assessment {
     pub(crate) repeats: Option<f64>,
 }
 
-impl Assessment {
+impl WeighedModel {
     /// Confidence of the surest effect.
     fn surest(&self) -> f64 {
         self.effects.iter().map(|e| e.confidence).fold(0.0, f64::max)
     }
 
     /// Whether it is for its evidence, weighed, that an effect is named or not.
-    pub(crate) fn rests_on_evidence(&self, assessed: &Assessed) -> bool {
+    pub(crate) fn rests_on_evidence(&self, assessed: &WeighedEffect) -> bool {
         self.contradiction(assessed).is_none()
     }
 
-    fn same_joint(&self, assessed: &Assessed) -> Option<EffectName> {
-        let gained = |assessed: &Assessed| (assessed.found.effect.name, assessed.found.holdout.sum);
+    fn same_joint(&self, assessed: &WeighedEffect) -> Option<EffectName> {
+        let gained = |assessed: &WeighedEffect| (assessed.found.effect.name, assessed.found.holdout.sum);
         same_joint(gained(assessed), self.effects.iter().map(gained))
     }
 
     /// Whether it is one of two drifts that are one of the inertia.
-    fn drifts_alike(&self, assessed: &Assessed) -> bool {
-        let definition = |assessed: &Assessed| assessed.found.effect.name.definition();
+    fn drifts_alike(&self, assessed: &WeighedEffect) -> bool {
+        let definition = |assessed: &WeighedEffect| assessed.found.effect.name.definition();
         let change = |is_of: fn(&dyn Definition) -> bool| {
-            let is_drift = |e: &&Assessed| definition(e).drifts() && is_of(definition(e));
+            let is_drift = |e: &&WeighedEffect| definition(e).drifts() && is_of(definition(e));
             Some(self.effects.iter().find(is_drift)?.parameters.get("change")?.value)
         };
         let (gain, friction) = (change(|of| of.scales_drive()), change(|of| of.needs_dry()));
@@ -109,12 +114,12 @@ impl Assessment {
 
     /// Places of the effects that are named.
     pub(crate) fn named(&self) -> Vec<usize> {
-        let is_named = |(i, effect): (usize, &Assessed)| self.doubt(effect).is_none().then_some(i);
+        let is_named = |(i, effect): (usize, &WeighedEffect)| self.doubt(effect).is_none().then_some(i);
         self.effects.iter().enumerate().filter_map(is_named).collect()
     }
 
     /// Why an effect is not named; none if it is.
-    pub(crate) fn doubt(&self, assessed: &Assessed) -> Option<Rejection> {
+    pub(crate) fn doubt(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         self.contradiction(assessed).or_else(|| {
             if assessed.undecided {
                 Some(Rejection::Undecided)
@@ -128,7 +133,7 @@ impl Assessment {
     }
 
     /// What rules an effect out however much it explains.
-    fn contradiction(&self, assessed: &Assessed) -> Option<Rejection> {
+    fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
@@ -172,102 +177,111 @@ fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> 
 }
 
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
-pub(crate) fn weigh(
-    s: &mut Search,
-    context: &FitContext,
-    refit: &FittedModel,
-    holdout: &HeldOut,
-    excitation: &Excitation,
-) -> Assessment {
-    let scales = Scales { context, refit, holdout, excitation };
-    let found = scales.once(s, None);
-    let best = scales.without_unsure(s, found);
+pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
+    let best = scales.without_unsure(scales.once(found, None));
     if !best.stands_for_swing() {
         return best;
     }
     // No model of the axis holds what goes its own way.
-    s.last = context.fit_slow(Model::default(), &[&s.null.noise]);
-    let refitted = scales.once(s, best.hertz);
+    let model = scales.context.fit_slow(Model::default(), &[&scales.null.noise]);
+    let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected };
+    let refitted = scales.once(nothing, best.hertz);
     let dropped = best.dropped.into_iter().chain(best.effects).collect();
-    Assessment { dropped, swing: best.swing, ..refitted }
+    WeighedModel { dropped, swing: best.swing, ..refitted }
 }
 
 /// What every model is weighed with.
-struct Scales<'a> {
-    context: &'a FitContext<'a>,
-    refit: &'a FittedModel,
-    holdout: &'a HeldOut,
-    excitation: &'a Excitation,
+pub(crate) struct Scales<'a> {
+    pub(crate) context: &'a FitContext<'a>,
+    /// The null under white noise.
+    pub(crate) refit: &'a FittedModel,
+    /// The null under coloured noise.
+    pub(crate) null: &'a FittedModel,
+    pub(crate) holdout: &'a HeldOut,
+    pub(crate) excitation: &'a Excitation,
 }
 
 impl Scales<'_> {
-    /// Another model in place of the best so far, if it is surer; otherwise the search stays as it was, and what stands in
-    /// the other model is told.
-    fn instead(
-        &self,
-        s: &mut Search,
-        model: Model,
-        best: &Assessment,
-    ) -> Result<Assessment, Vec<EffectName>> {
-        let other = self.context.fit_slow(model, &[&s.null.noise, &s.last.noise]);
-        let (before, known) = (std::mem::replace(&mut s.last, other), s.rejected.len());
-        eliminate(s, self.context, self.holdout, &best.shown.patched.noise);
-        let next = self.once(s, best.hertz);
-        if next.surest() > best.surest() {
-            return Ok(next);
-        }
-        s.last = before;
-        s.rejected.truncate(known);
-        Err(next.effects.iter().map(|e| e.found.effect.name).collect())
+    /// The best model, weighed without effect `i`.
+    fn without(&self, best: &WeighedModel, i: usize) -> WeighedModel {
+        let mut less = best.slow.model.clone();
+        less.effects.remove(i);
+        let model = self.context.fit_slow(less, &[&self.null.noise, &best.slow.noise]);
+        let noise = &best.shown.patched.noise;
+        let mut standing = eliminate(model, self.context, self.holdout, &self.null.noise, noise);
+        standing.rejected.splice(..0, best.rejected.iter().cloned());
+        self.once(standing, best.hertz)
     }
 
-    fn without_unsure(&self, s: &mut Search, mut best: Assessment) -> Assessment {
+    fn without_unsure(&self, mut best: WeighedModel) -> WeighedModel {
         loop {
             let least =
                 best.effects.iter().enumerate().min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
             let Some((i, _)) = least.filter(|(_, e)| e.confidence < NAMED && best.effects.len() > 1) else {
                 return best;
             };
-            let mut model = s.last.model.clone();
-            model.effects.remove(i);
-            match self.instead(s, model, &best) {
-                Ok(mut next) => {
-                    next.dropped = best.dropped;
-                    next.dropped.push(best.effects.remove(i));
-                    best = next;
-                }
-                Err(standing) => {
-                    let unsure = best.effects[i].confidence;
-                    for one in &mut best.effects {
-                        one.confidence = resting(one.confidence, unsure, one.found.effect.name, &standing);
-                    }
-                    return best;
-                }
+            let mut next = self.without(&best, i);
+            if next.surest() > best.surest() {
+                next.dropped = best.dropped;
+                next.dropped.push(best.effects.remove(i));
+                best = next;
+                continue;
             }
+            let standing: Vec<EffectName> = next.effects.iter().map(|e| e.found.effect.name).collect();
+            let unsure = best.effects[i].confidence;
+            for one in &mut best.effects {
+                one.confidence = resting(one.confidence, unsure, one.found.effect.name, &standing);
+            }
+            return best;
         }
     }
 
-    /// Weighs the model as it stands; `hertz` where the frequency of a swing is known from before.
-    fn once(&self, s: &mut Search, hertz: Option<f64>) -> Assessment {
-        let Self { context, refit, holdout, excitation } = *self;
-        let nominal = context.nominal;
-        let mut found = std::mem::take(&mut s.found);
-        let patched = context.fit(s.last.model.clone(), &s.last.noise, Colour::White);
-        let known: &[BlockedRecording] = &holdout.shown(&patched.model, context.span);
-        alternatives::fit_rivals(context, &patched, &s.last, holdout, &mut found);
+    /// Weighs a model; `hertz` where the frequency of a swing is known from before.
+    fn once(&self, standing: StandingModel, hertz: Option<f64>) -> WeighedModel {
+        let Self { context, refit, holdout, .. } = *self;
+        let StandingModel { model: slow, effects: mut found, rejected } = standing;
+        let patched = context.fit(slow.model.clone(), &slow.noise, Colour::White);
+        alternatives::fit_rivals(context, &patched, &slow, holdout, &mut found);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
         let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
-        let Shown { patched, on_fit, on_holdout, table, .. } = &shown;
-        let (inertia, _, _) = parameters::scale(nominal, patched);
-        let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+        let left = self.left_over(&slow, &shown, &estimator);
+        let Shown { on_fit, on_holdout, .. } = &shown;
+        let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
+        let swing =
+            hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
+        let repeats = self.repeats(&shown, &estimator);
+        let effects = found.into_iter().enumerate();
+        let effects = effects.map(|(i, found)| self.weigh_effect(found, i, &shown.patched, &left)).collect();
+        WeighedModel {
+            effects,
+            dropped: Vec::new(),
+            floor: left.floor,
+            understood: left.understood,
+            slow,
+            rejected,
+            shown,
+            estimator,
+            hertz,
+            swing,
+            repeats,
+        }
+    }
+
+    /// What a model leaves of the force.
+    fn left_over(&self, slow: &FittedModel, shown: &Shown, estimator: &Estimator) -> LeftOver {
+        let Self { context, holdout, .. } = *self;
+        let Shown { patched, on_holdout, table, .. } = shown;
+        let known: &[BlockedRecording] = &holdout.shown(&patched.model, context.span);
+        let (inertia, _, _) = parameters::scale(context.nominal, patched);
+        let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(context.tracks, &patched.noise, count) * inertia;
         let (refit_holdout, left_holdout) =
             (estimator.rms(&on_holdout.refit, known), estimator.rms(&on_holdout.patched, known));
-        let left = s.last.noise.slow * inertia * inertia;
+        let left = slow.noise.slow * inertia * inertia;
         // What neither counting nor a white disturbance makes.
-        let random = floor.hypot(estimator.white(&s.last.noise) * inertia);
+        let random = floor.hypot(estimator.white(&slow.noise) * inertia);
         let of_chance = |residual: f64| above(residual, random, LEAST_ABOVE).max(1e-300);
-        let leftover = Leftover {
+        let evidence = Leftover {
             of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
             unexplained: [(left_holdout, refit_holdout), (table.patched.fit, table.refit.fit)]
                 .map(|(left, refit)| of_chance(left) / of_chance(refit))
@@ -278,54 +292,52 @@ impl Scales<'_> {
         let helps_much = left_holdout < MUCH_OF_REFIT * refit_holdout;
         let understood = part_of_force < UNDERSTOOD.0 || (helps_much && part_of_force < UNDERSTOOD.1);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
-        let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
-        let swing =
-            hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
-        let all: Vec<BlockedRecording> = context.tracks.iter().chain(&holdout.smoothed).cloned().collect();
-        let left: Vec<Vec<f64>> = on_fit.patched.iter().chain(&on_holdout.patched).cloned().collect();
-        let moving: Vec<Vec<bool>> = all.iter().map(|track| estimator.moving(track)).collect();
-        let repeats = correlation_of_repeats(&all, &left, &moving, estimator.bandwidth_hz);
-        let effects = found
-            .into_iter()
-            .enumerate()
-            .map(|(i, found)| {
-                let class = alternatives::class(&found, excitation, leaves_much, context);
-                let nearest = alternatives::nearest(&found, &class);
-                let evidence = confidence::evidence(&found, leftover);
-                let parameters = parameters::parameters(context, patched, i);
-                let is_there = parameters::is_there(found.effect.name, &parameters);
-                let undecided = nearest < BEHIND_Z;
-                let most = if undecided { UNDECIDED } else { 1.0 };
-                let confidence = confidence::confidence(&evidence).min(most);
-                let creeps = candidates::creeps(&found.effect, context.span)
-                    // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
-                    .filter(|_| !found.fits_everywhere());
-                let rather = out_of_library::rather(context, patched, i, found.fit.sum);
-                Assessed {
-                    found,
-                    class,
-                    evidence,
-                    confidence,
-                    parameters,
-                    is_there,
-                    undecided,
-                    creeps,
-                    rather,
-                }
-            })
-            .collect();
-        Assessment {
-            effects,
-            dropped: Vec::new(),
-            shown,
-            estimator,
-            floor,
-            understood,
-            hertz,
-            swing,
-            repeats,
-        }
+        LeftOver { floor, evidence, understood, leaves_much }
     }
+
+    /// Correlation of the residual between repeats of a motion in all recordings.
+    fn repeats(&self, shown: &Shown, estimator: &Estimator) -> Option<f64> {
+        let all: Vec<BlockedRecording> =
+            self.context.tracks.iter().chain(&self.holdout.smoothed).cloned().collect();
+        let left: Vec<Vec<f64>> =
+            shown.on_fit.patched.iter().chain(&shown.on_holdout.patched).cloned().collect();
+        let moving: Vec<Vec<bool>> = all.iter().map(|track| estimator.moving(track)).collect();
+        correlation_of_repeats(&all, &left, &moving, estimator.bandwidth_hz)
+    }
+
+    /// Weighs effect `i` of a model.
+    fn weigh_effect(
+        &self,
+        found: EffectEvidence,
+        i: usize,
+        patched: &FittedModel,
+        left: &LeftOver,
+    ) -> WeighedEffect {
+        let context = self.context;
+        let class = alternatives::class(&found, self.excitation, left.leaves_much, context);
+        let undecided = alternatives::nearest(&found, &class) < BEHIND_Z;
+        let evidence = confidence::evidence(&found, left.evidence);
+        let parameters = parameters::parameters(context, patched, i);
+        let is_there = parameters::is_there(found.effect.name, &parameters);
+        let most = if undecided { UNDECIDED } else { 1.0 };
+        let confidence = confidence::confidence(&evidence).min(most);
+        let creeps = candidates::creeps(&found.effect, context.span)
+            // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
+            .filter(|_| !found.fits_everywhere());
+        let rather = out_of_library::rather(context, patched, i, found.fit.sum);
+        WeighedEffect { found, class, evidence, confidence, parameters, is_there, undecided, creeps, rather }
+    }
+}
+
+/// What a model leaves of the force.
+struct LeftOver {
+    /// What reading whole counts alone puts into the residual, N·m or N.
+    floor: f64,
+    evidence: Leftover,
+    /// True if the model leaves little enough of the force to have understood it.
+    understood: bool,
+    /// True if the model leaves much of what the refit left.
+    leaves_much: bool,
 }
 
 fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {

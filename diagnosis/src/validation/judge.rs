@@ -1,7 +1,7 @@
 //! What speaks for each effect of a fitted model, on left-out blocks of the fitted recordings and on held-out ones. Nothing here
 //! says what is enough to be named.
 
-use crate::effects::EffectName;
+use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
@@ -16,7 +16,7 @@ use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::thresholds::DRIFT;
 use crate::validation::evidence::EffectEvidence;
 use crate::validation::held_out::HeldOut;
-use crate::validation::holdout::{self, evaluate_all};
+use crate::validation::holdout::{self, HoldoutFit, evaluate_all};
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
@@ -31,78 +31,140 @@ pub(crate) fn judge_all(
     slow: &Noise,
     holdout: &HeldOut,
 ) -> Vec<EffectEvidence> {
-    let judging: &[BlockedRecording] = &holdout.judging(&last.model, context.span);
-    let holdout: &[BlockedRecording] = &holdout.shown(&last.model, context.span);
-    let with = evaluate_all(last, context.nominal, judging, &last.noise);
-    let with_fit = left_out_costs(&last.fit);
-    let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
-    let left = |c: &FittedModel, tracks: &[BlockedRecording], totals: &[Total]| {
-        forces(&estimator, tracks, totals, parameters::scale(context.nominal, c).0)
-    };
-    let left_on_fit = |c: &FittedModel| left(c, context.tracks, &c.fit.totals(context.tracks));
-    let left_on_holdout = |c: &FittedModel| {
-        let evaluated = evaluate_all(c, context.nominal, holdout, &last.noise);
-        left(c, holdout, &evaluated.into_iter().map(|one| one.total).collect::<Vec<_>>())
-    };
-    let square = |left: &[Vec<f64>], tracks: &[BlockedRecording]| estimator.rms(left, tracks).powi(2);
-    let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
-    let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
-    let inertia = parameters::scale(context.nominal, last).0;
-    let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
-    let explainable = |left: &[Vec<f64>], tracks: &[BlockedRecording]| {
-        let floor = estimator.counting(tracks, &last.noise, count) * inertia;
-        above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
-    };
-    let held_out = explainable(&left_on_holdout(&null), holdout);
-    let fitted = explainable(&left_on_fit(&null), context.tracks);
-    let (left_held_out, left_fitted) = (left_on_holdout(last), left_on_fit(last));
-    (0..last.model.effects.len())
-        .map(|i| {
-            let mut less = last.model.clone();
-            let effect = less.effects.remove(i);
-            let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
-            let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
-            let without_fit = left_out_costs(&without.fit);
-            let gains: Vec<f64> = without_fit.iter().zip(&with_fit).map(|(a, b)| a - b).collect();
-            let evaluated = evaluate_all(&without, context.nominal, judging, &last.noise);
-            let holdout_gain = holdout::compare(&with, &evaluated);
-            // What one recording hardly plays another may be made for.
-            let (less_held_out, less_fitted) = (left_on_holdout(&without), left_on_fit(&without));
-            let share = ((square(&less_held_out, holdout) - square(&left_held_out, holdout)) / held_out)
-                .max((square(&less_fitted, context.tracks) - square(&left_fitted, context.tracks)) / fitted);
-            let force = relative_gain(&estimator, holdout, &less_held_out, &left_held_out);
-            let sizes = played(
-                sizes_on(&estimator, context.tracks, &left_fitted, &less_fitted),
-                sizes_on(&estimator, holdout, &left_held_out, &less_held_out),
-            );
-            let definition = effect.name.definition();
-            let mut ends = last.fit.keys.iter().zip(&last.fit.solution.bound).filter(|(_, bound)| **bound);
-            let is_bound = ends.any(|((key, _), _)| match key {
-                Key::Term { effect, term } => *effect == i && definition.is_in_doubt_at_limit(*term),
-                _ => false,
-            });
-            let at_bound = is_bound
-                || candidates::is_at_end(&effect, context.span)
-                || drifts_too_far(&last.fit, i, effect.name);
-            let is_comb = periodic::is_comb(&effect, &last.fit.amplitudes(i));
-            let mut found = EffectEvidence {
-                effect,
-                score_z: 0.0,
-                rivals: Vec::new(),
-                holdout: holdout_gain,
-                fit: bootstrap(&gains),
-                force,
-                share,
-                at_bound,
-                is_comb,
-                sizes,
-            };
-            if found.rejection().is_some() {
-                found.score_z = score_z_of(context, &last.model, &without.model, slow, judging);
-            }
-            found
-        })
-        .collect()
+    let judging = holdout.judging(&last.model, context.span);
+    let shown = holdout.shown(&last.model, context.span);
+    let judged = JudgedModel::new(context, last, &judging, &shown);
+    (0..last.model.effects.len()).map(|i| judged.evidence(i, slow)).collect()
+}
+
+/// A model with what it leaves, to be compared with the model without one of its effects.
+struct JudgedModel<'a> {
+    context: &'a FitContext<'a>,
+    last: &'a FittedModel,
+    /// Held-out recordings in the motion that judges, and in the motion from which force errors come.
+    judging: &'a [BlockedRecording],
+    shown: &'a [BlockedRecording],
+    estimator: Estimator,
+    /// The model on the held-out recordings, and its cost on left-out blocks of the fitted ones.
+    on_holdout: Vec<HoldoutFit>,
+    on_fit: Vec<f64>,
+    left: LeftForce,
+    /// Mean square of the force that the null leaves beyond the noise, on fitted and on held-out recordings.
+    explainable: [f64; 2],
+}
+
+/// Force that a model leaves, per recording and block.
+struct LeftForce {
+    fitted: Vec<Vec<f64>>,
+    held_out: Vec<Vec<f64>>,
+}
+
+impl<'a> JudgedModel<'a> {
+    fn new(
+        context: &'a FitContext,
+        last: &'a FittedModel,
+        judging: &'a [BlockedRecording],
+        shown: &'a [BlockedRecording],
+    ) -> Self {
+        let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
+        let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+        let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
+        let left = |model: &FittedModel| left_force(context, &estimator, shown, model, &last.noise);
+        let inertia = parameters::scale(context.nominal, last).0;
+        let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
+        let explainable = |left: &[Vec<f64>], tracks: &[BlockedRecording]| {
+            let floor = estimator.counting(tracks, &last.noise, count) * inertia;
+            above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
+        };
+        let by_null = left(&null);
+        Self {
+            context,
+            last,
+            judging,
+            shown,
+            on_holdout: evaluate_all(last, context.nominal, judging, &last.noise),
+            on_fit: left_out_costs(&last.fit),
+            left: left(last),
+            explainable: [
+                explainable(&by_null.fitted, context.tracks),
+                explainable(&by_null.held_out, shown),
+            ],
+            estimator,
+        }
+    }
+
+    /// What speaks for effect `i`; its score is that under `slow`.
+    fn evidence(&self, i: usize, slow: &Noise) -> EffectEvidence {
+        let Self { context, last, judging, shown, estimator, left, .. } = self;
+        let mut less = last.model.clone();
+        let effect = less.effects.remove(i);
+        let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
+        let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
+        let without_fit = left_out_costs(&without.fit);
+        let gains: Vec<f64> = without_fit.iter().zip(&self.on_fit).map(|(a, b)| a - b).collect();
+        let evaluated = evaluate_all(&without, context.nominal, judging, &last.noise);
+        let less = left_force(context, estimator, shown, &without, &last.noise);
+        let sizes = played(
+            sizes_on(estimator, context.tracks, &left.fitted, &less.fitted),
+            sizes_on(estimator, shown, &left.held_out, &less.held_out),
+        );
+        let mut found = EffectEvidence {
+            score_z: 0.0,
+            rivals: Vec::new(),
+            holdout: holdout::compare(&self.on_holdout, &evaluated),
+            fit: bootstrap(&gains),
+            force: relative_gain(estimator, shown, &less.held_out, &left.held_out),
+            share: self.share(&less),
+            at_bound: self.is_at_bound(&effect, i),
+            is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
+            sizes,
+            effect,
+        };
+        if found.rejection().is_some() {
+            found.score_z = score_z_of(context, &last.model, &without.model, slow, judging);
+        }
+        found
+    }
+
+    /// Part of what the noise leaves that the model explains and one that leaves `less` does not. What one recording hardly
+    /// shows another may be made for.
+    fn share(&self, less: &LeftForce) -> f64 {
+        let square =
+            |left: &[Vec<f64>], tracks: &[BlockedRecording]| self.estimator.rms(left, tracks).powi(2);
+        let [fitted, held_out] = self.explainable;
+        let (tracks, shown) = (self.context.tracks, self.shown);
+        ((square(&less.held_out, shown) - square(&self.left.held_out, shown)) / held_out)
+            .max((square(&less.fitted, tracks) - square(&self.left.fitted, tracks)) / fitted)
+    }
+
+    /// True if a value of effect `i` is at the end of what is possible.
+    fn is_at_bound(&self, effect: &Effect, i: usize) -> bool {
+        let fit = &self.last.fit;
+        let definition = effect.name.definition();
+        let mut ends = fit.keys.iter().zip(&fit.solution.bound).filter(|(_, bound)| **bound);
+        let is_bound = ends.any(|((key, _), _)| match key {
+            Key::Term { effect, term } => *effect == i && definition.is_in_doubt_at_limit(*term),
+            _ => false,
+        });
+        is_bound || candidates::is_at_end(effect, self.context.span) || drifts_too_far(fit, i, effect.name)
+    }
+}
+
+/// Force that a model leaves on the fitted and on held-out recordings.
+fn left_force(
+    context: &FitContext,
+    estimator: &Estimator,
+    holdout: &[BlockedRecording],
+    model: &FittedModel,
+    noise: &Noise,
+) -> LeftForce {
+    let inertia = parameters::scale(context.nominal, model).0;
+    let left = |tracks: &[BlockedRecording], totals: &[Total]| forces(estimator, tracks, totals, inertia);
+    let evaluated = evaluate_all(model, context.nominal, holdout, noise);
+    LeftForce {
+        fitted: left(context.tracks, &model.fit.totals(context.tracks)),
+        held_out: left(holdout, &evaluated.into_iter().map(|one| one.total).collect::<Vec<_>>()),
+    }
 }
 
 /// Standard errors of what one model gains over another under one noise with heavy tails, on left-out blocks of the fitted or on

@@ -4,7 +4,6 @@ use crate::effects::Effect;
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
-use crate::numerics::digits::short_within;
 use std::borrow::Cow;
 
 /// Part of the fitted travel by which a recording may go beyond it.
@@ -33,14 +32,19 @@ pub(crate) fn known<'a>(
 /// Part of a recording beyond the fitted travel from which on it is told.
 const TOLD: f64 = 0.05;
 
-/// What to record next where held-out recordings go and no fitted one does, if the model asks for travel; `length` is the
-/// unit of the coordinate.
-pub(crate) fn beyond(
-    tracks: &[BlockedRecording],
-    model: &Model,
-    span: &Span,
-    length: &str,
-) -> Option<String> {
+/// Travel over which held-out recordings go and fitted ones do not, rad or m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BeyondFitted {
+    /// Where the held-out recordings go.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// Where the fitted ones go.
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+/// The travel that held-out recordings cover and no fitted one does, if the model depends on it.
+pub(crate) fn beyond(tracks: &[BlockedRecording], model: &Model, span: &Span) -> Option<BeyondFitted> {
     let known = known(tracks, model, span);
     let is_told = |track: &BlockedRecording| {
         let unknown = track.unknown.iter().filter(|unknown| **unknown).count();
@@ -51,14 +55,7 @@ pub(crate) fn beyond(
     }
     let all = || known.iter().flat_map(|track| track.motion.x.iter().copied());
     let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
-    let tidy = |x: f64| short_within(x, span.travel());
-    Some(format!(
-        "to fit on, strokes over the travel from {} to {} {length}: held-out recordings go there and fitted ones only from {} to {}, so that the profile beyond is not known",
-        tidy(from),
-        tidy(to),
-        tidy(span.low),
-        tidy(span.high)
-    ))
+    Some(BeyondFitted { from, to, low: span.low, high: span.high })
 }
 
 #[cfg(test)]
@@ -96,8 +93,9 @@ mod tests {
         assert!((unknown(20.0, N::PositionDependentFriction) - 0.485).abs() < 0.02);
         assert_eq!(unknown(20.0, N::QuadraticDrag), 0.0);
         let profile = model(N::PositionDependentFriction);
-        let told = |to: f64| beyond(&[slide(to)], &profile, &span, "rad");
-        assert_eq!(told(10.2), None);
-        assert!(told(20.0).is_some_and(|text| text.contains("from 0 to 19.95 rad")), "{:?}", told(20.0));
+        let found = |to: f64| beyond(&[slide(to)], &profile, &span);
+        assert_eq!(found(10.2), None);
+        let far = found(20.0).expect("half of it is beyond");
+        assert!(far.from == 0.0 && (far.to - 19.95).abs() < 1e-9, "{far:?}");
     }
 }

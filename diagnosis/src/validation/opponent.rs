@@ -1,16 +1,16 @@
 //! Something that is not in the library, as the opponent of every name: a force of any form. Nothing here changes a model.
 
 use crate::effects::{Effect, Variable};
+use crate::estimation::filter::Noise;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
-use crate::validation::assess::Assessment;
+use crate::validation::assess::WeighedModel;
 use crate::validation::held_out::HeldOut;
 use crate::validation::judge::judge_all;
 use crate::validation::parameters;
 use crate::validation::rejection::Rather;
-use crate::validation::stepwise::Search;
 
 /// What a force of any form would take beside a model.
 pub(crate) struct Beside {
@@ -24,15 +24,16 @@ fn share(of_model: f64, taken: &Taken) -> f64 {
     if of_model <= 0.0 { 0.0 } else { of_model / (of_model + beyond) }
 }
 
-/// Puts every name that would stand against forces of any form; a name that one of them makes needless is none. Says what
-/// a form takes beside all names, if they stand.
-pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Search) -> Option<Beside> {
-    let named = assessment.named();
+/// Compares every effect that would be named with forces of any form; an effect is not named if one of them explains the data
+/// without it. Gives the weighed model with what its effects would rather be, and what a form takes beside all names, if there are
+/// any.
+pub(crate) fn oppose(mut weighed: WeighedModel, context: &FitContext) -> (WeighedModel, Option<Beside>) {
+    let named = weighed.named();
     if named.is_empty() {
-        return None;
+        return (weighed, None);
     }
-    let evaluator = Evaluator::new(context.nominal, context.tracks, &s.last.noise, context.scale);
-    let model = assessment.shown.patched.model.clone();
+    let evaluator = Evaluator::new(context.nominal, context.tracks, &weighed.slow.noise, context.scale);
+    let model = weighed.shown.patched.model.clone();
     let whole = evaluator.densities(&model);
     for i in named {
         let mut less = model.clone();
@@ -41,32 +42,34 @@ pub(crate) fn oppose(assessment: &mut Assessment, context: &FitContext, s: &Sear
         let standing = whole.standing(&evaluator.densities(&less), variable);
         if let Some(against) = standing.against {
             let (over, form) = (against.inputs, against.most);
-            assessment.effects[i].rather = Some(Rather::FreeForm { over, form, effect: standing.own.sum });
+            weighed.effects[i].rather = Some(Rather::FreeForm { over, form, effect: standing.own.sum });
         }
     }
-    let taken = whole.taken().into_iter().next()?;
-    let of_model = whole.alone.over(&evaluator.alone(&Model::default())).sum;
-    (!assessment.named().is_empty()).then(|| Beside { share: share(of_model, &taken), taken })
+    let taken = whole.taken().into_iter().next().filter(|_| !weighed.named().is_empty());
+    let beside = taken.map(|taken| {
+        let of_model = whole.alone.over(&evaluator.alone(&Model::default())).sum;
+        Beside { share: share(of_model, &taken), taken }
+    });
+    (weighed, beside)
 }
 
 /// A force without a name where nothing is named.
 pub(crate) struct Unnamed {
     pub(crate) taken: Taken,
     pub(crate) shape: Shape,
-    /// The refit with the force beside it; none where each recording has its own place of it.
-    pub(crate) fitted: Option<FittedModel>,
     /// Held-out gain of log-likelihood over the refit.
     pub(crate) holdout_gain: Option<f64>,
 }
 
-/// The force of any form that explains most of what a refit leaves, where that is sure and enough to be told.
+/// The force of any form that explains most of what a refit leaves, where that is sure and enough to be reported; with the refit
+/// that has the force beside it, except where each recording has its own place of it.
 pub(crate) fn alone(
     context: &FitContext,
     refit: &FittedModel,
     holdout: &HeldOut,
-    s: &Search,
-) -> Option<Unnamed> {
-    let evaluator = Evaluator::new(context.nominal, context.tracks, &s.null.noise, context.scale);
+    noise: &Noise,
+) -> Option<(Unnamed, Option<FittedModel>)> {
+    let evaluator = Evaluator::new(context.nominal, context.tracks, noise, context.scale);
     let all = evaluator.densities(&Model::default()).taken();
     let taken = all.into_iter().find(|taken| is_told(taken, context.tracks))?;
     let (inertia, _, _) = parameters::scale(context.nominal, refit);
@@ -76,6 +79,6 @@ pub(crate) fn alone(
         let effects = vec![Effect::tabled(shape.table.clone(), context.nominal.rig.turn())];
         context.fit(Model { effects, ..Model::default() }, &refit.noise, Colour::White)
     });
-    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, &s.null.noise, holdout).pop());
-    Some(Unnamed { taken, shape, fitted, holdout_gain: judged.map(|found| found.holdout.sum) })
+    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, noise, holdout).pop());
+    Some((Unnamed { taken, shape, holdout_gain: judged.map(|found| found.holdout.sum) }, fitted))
 }

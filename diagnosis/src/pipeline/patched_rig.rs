@@ -1,24 +1,23 @@
 //! What an effect becomes: the entry of the patched rig, and the place where it acts.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::{Key, total};
+use crate::estimation::model::{Key, Nominal, total};
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch};
 use crate::selection::context::FittedModel;
 use crate::validation::parameters;
 use crate::validation::residual_maps;
-use crate::validation::stepwise::Search;
 
 /// Part of its nominal value that an inertia which hardly matters keeps at the least.
 const LEAST_INERTIA: f64 = 0.1;
 
 /// The rig with refitted values and the effects found.
-pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
-    let mut rig = s.nominal.rig.clone();
-    let (inertia, gain, _) = parameters::scale(&s.nominal, last);
+pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], last: &FittedModel) -> Rig {
+    let mut rig = nominal.rig.clone();
+    let (inertia, gain, _) = parameters::scale(nominal, last);
     // What was added to rig and command alike is no inertia of the machine.
-    let added = s.nominal.virtual_inertia * gain / s.nominal.rig.actuator.gain;
-    rig.model.inertia = (inertia - added).max(LEAST_INERTIA * s.original.model.inertia);
+    let added = nominal.virtual_inertia * gain / nominal.rig.actuator.gain;
+    rig.model.inertia = (inertia - added).max(LEAST_INERTIA * given.model.inertia);
     rig.actuator.gain = gain;
     let value = |key: Key| last.fit.value(key).map(|x| x * inertia);
     if let Some(x) = value(Key::Viscous) {
@@ -45,7 +44,7 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
             // The steps of the recording with the most, as they happened.
             let steps =
                 |track: &&BlockedRecording| track.jumps.lost.windows(2).filter(|w| w[0] != w[1]).count();
-            let track = s.fit_tracks.iter().max_by_key(steps).expect("something was fitted");
+            let track = fit.iter().max_by_key(steps).expect("something was fitted");
             let jumped = track.jumps.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
             let jumps: Vec<_> = jumped.map(|(i, w)| (track.blocks.start[i + 1], w[1] - w[0])).collect();
             definition.put_jumps(&mut effect, &jumps);
@@ -73,18 +72,18 @@ pub(crate) fn patch(s: &Search, last: &FittedModel) -> Rig {
 }
 
 /// Where an effect of the model acts: stretches of time, and the states in which it acts most.
-pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
+pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedModel, index: usize) -> Place {
     let mut place = Place::default();
     let mut pooled: Vec<(f64, f64)> = Vec::new();
     let variable = last.model.effects[index].name.definition().variable();
     let mut less = last.model.clone();
     less.effects.remove(index);
-    for (r, track) in s.fit_tracks.iter().enumerate() {
+    for (r, track) in fit.iter().enumerate() {
         // What the effect adds, as acceleration per block.
-        let columns = last.model.columns(&s.nominal, track, &last.noise);
+        let columns = last.model.columns(nominal, track, &last.noise);
         let theta = last.fit.theta(r);
         let with = total(track, &columns, &theta);
-        let columns = less.columns(&s.nominal, track, &last.noise);
+        let columns = less.columns(nominal, track, &last.noise);
         let without: Vec<f64> = columns
             .iter()
             .map(|c| {
@@ -120,7 +119,7 @@ pub(crate) fn place(s: &Search, last: &FittedModel, index: usize) -> Place {
                 .motion
                 .x
                 .iter()
-                .map(|x| s.nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn)))
+                .map(|x| nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn)))
                 .collect(),
             "time" => track.blocks.start.clone(),
             "tilt" => track.blocks.tilt.clone().unwrap_or_default(),

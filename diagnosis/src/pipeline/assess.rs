@@ -1,0 +1,63 @@
+//! The third stage: how sure each effect is, and whether something without a name explains the recordings instead.
+
+use super::diagnosis::Reason;
+use super::prepare::Prepared;
+use super::search::Found;
+use super::verdict::misfit;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::estimation::refit::is_driven;
+use crate::selection::context::FittedModel;
+use crate::selection::excitation::Excitation;
+use crate::validation::assess::{Scales, WeighedModel, weigh};
+use crate::validation::comparison::Shown;
+use crate::validation::held_out::HeldOut;
+use crate::validation::opponent::{self, Beside, Unnamed};
+use crate::validation::out_of_library::{self, Foreign};
+
+/// Everything that the decision rests on.
+pub(crate) struct Assessment {
+    /// The fitted recordings in the motion of the model that was found.
+    pub(crate) fit: Vec<BlockedRecording>,
+    /// The recordings that judge, in that motion.
+    pub(crate) holdout: HeldOut,
+    pub(crate) excitation: Excitation,
+    /// The null under coloured noise.
+    pub(crate) null: FittedModel,
+    /// The null under white noise.
+    pub(crate) refit: FittedModel,
+    /// The model found, its effects weighed.
+    pub(crate) weighed: WeighedModel,
+    /// What a force of any form takes beside the named effects.
+    pub(crate) beside: Option<Beside>,
+    /// The force of any form that explains most, where nothing is named, and the refit with it beside.
+    pub(crate) unnamed: Option<Unnamed>,
+    pub(crate) with_unnamed: Option<Shown>,
+    /// Physics without a name that explains most, where nothing is named.
+    pub(crate) foreign: Option<Foreign>,
+}
+
+/// Weighs the effects that were found; the reason where the rig's model does not describe the recordings at all.
+pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
+    let Prepared { nominal, .. } = prepared;
+    let Found { fit, holdout, null, standing } = found;
+    let context = prepared.context(&fit);
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    let excitation = Excitation::of(&fit, count, nominal.rig.turn());
+    let refit = context.fit(Model::default(), &null.noise, Colour::White);
+    let scales =
+        Scales { context: &context, refit: &refit, null: &null, holdout: &holdout, excitation: &excitation };
+    let weighed = weigh(&scales, standing);
+    if let Some(reason) = misfit(&weighed, nominal).filter(|_| is_driven(nominal, &fit)) {
+        return Err(reason);
+    }
+    let (weighed, beside) = opponent::oppose(weighed, &context);
+    let nothing_named = weighed.named().is_empty();
+    let unnamed = nothing_named.then(|| opponent::alone(&context, &refit, &holdout, &null.noise)).flatten();
+    let (unnamed, fitted) = unnamed.map_or((None, None), |(unnamed, fitted)| (Some(unnamed), fitted));
+    let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
+    let with_unnamed = fitted.map(show);
+    let foreign = nothing_named.then(|| out_of_library::alone(&context, &refit, &holdout)).flatten();
+    Ok(Assessment { fit, holdout, excitation, null, refit, weighed, beside, unnamed, with_unnamed, foreign })
+}

@@ -1,0 +1,243 @@
+//! The fourth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
+
+use super::assess::Assessment;
+use super::diagnosis::{Complete, Diagnosis, FreeForce, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
+use super::patched_rig::{patch, place};
+use super::prepare::Prepared;
+use super::run_forward::{pooled, simulated};
+use super::verdict::verdict;
+use crate::effects::EffectName;
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::io::recording::Recording;
+use crate::io::rig::Rig;
+use crate::io::schema::{Place, Region, Stretch, Verdict};
+use crate::selection::context::FittedModel;
+use crate::validation::assess::{WeighedEffect, WeighedModel};
+use crate::validation::comparison::Shown;
+use crate::validation::known_travel;
+use crate::validation::opponent::{Beside, Unnamed};
+use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
+use crate::validation::residual_maps::{self, Map};
+use crate::validation::residuals::{Residuals, above};
+
+/// Decides what is named; `holdout` are the held-out recordings as they were read, `rate_hz` the rows a second of the slowest one.
+pub(crate) fn decide(
+    prepared: &Prepared,
+    assessment: &Assessment,
+    holdout: &[Recording],
+    rate_hz: Option<f64>,
+) -> Diagnosis {
+    let decision = Decision { prepared, assessment };
+    let maps_with_all = decision.maps(&assessment.weighed.shown);
+    let (verdict, reason) = decision.verdict(&maps_with_all);
+    // The verdict rests on all that was weighed, what people see on what is named.
+    let with_named = decision.only_named();
+    let named_alone = with_named.as_ref().unwrap_or(&assessment.weighed.shown);
+    let unnamed = assessment.unnamed.as_ref().filter(|_| verdict == Verdict::Unexplained);
+    let with_force = assessment.with_unnamed.as_ref().filter(|_| unnamed.is_some());
+    let shown = with_force.unwrap_or(named_alone);
+    let maps = with_named.as_ref().map_or(maps_with_all, |shown| decision.maps(shown));
+    let rigs = decision.rigs(shown);
+    let simulated = simulated(&rigs.nominal, &rigs.refit, &rigs.patched, holdout);
+    let smoothed = &assessment.holdout.smoothed;
+    let estimator = &assessment.weighed.estimator;
+    let mut series = all_series(estimator, &assessment.fit, &shown.on_fit, false);
+    series.extend(all_series(estimator, smoothed, &shown.on_holdout, true));
+    let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
+    Diagnosis::Complete(Box::new(Complete {
+        verdict,
+        reason,
+        effects: decision.named_effects(with_named.as_ref()),
+        hypotheses: hypotheses(&assessment.weighed),
+        errors: shown.table.clone(),
+        bandwidth_hz: estimator.bandwidth_hz,
+        noise_floor: assessment.weighed.floor,
+        unexplained_fraction: unexplained_fraction(shown, assessment.weighed.floor),
+        place: nothing_found.then(|| top_place(smoothed, &named_alone.on_holdout.patched, &maps)),
+        free_form: free_form(unnamed, assessment.beside.as_ref()),
+        beyond_fitted: known_travel::beyond(smoothed, &shown.patched.model, &prepared.span),
+        simulation: pooled(&simulated),
+        simulated,
+        series,
+        maps,
+        rigs,
+        rate_hz,
+    }))
+}
+
+/// What a decision looks at.
+struct Decision<'a> {
+    prepared: &'a Prepared,
+    assessment: &'a Assessment,
+}
+
+impl Decision<'_> {
+    /// Residuals of a model over states.
+    fn maps(&self, shown: &Shown) -> Vec<Map> {
+        let Assessment { fit, holdout, .. } = self.assessment;
+        let (on_fit, on_holdout) = (&shown.on_fit.patched, &shown.on_holdout.patched);
+        let turn = self.prepared.nominal.rig.turn();
+        residual_maps::maps((fit, on_fit), (&holdout.smoothed, on_holdout), turn)
+    }
+
+    /// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves.
+    fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
+        let Assessment { weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
+        let form = unnamed.is_some().then_some(Reason::FreeForm);
+        let foreign = foreign.clone().map(Reason::Foreign).or(form);
+        verdict(weighed, maps, &holdout.smoothed, excitation, foreign)
+    }
+
+    /// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in
+    /// no patched rig.
+    fn only_named(&self) -> Option<Shown> {
+        let Assessment { fit, holdout, null, refit, weighed, .. } = self.assessment;
+        let named = weighed.named();
+        if named.len() == weighed.effects.len() {
+            return None;
+        }
+        let last = &weighed.slow;
+        let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
+        let model = Model { effects, ..last.model.clone() };
+        let context = self.prepared.context(fit);
+        let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
+        let patched = context.fit(slow.model, &slow.noise, Colour::White);
+        Some(Shown::new(&context, &holdout.smoothed, &weighed.estimator, refit, patched))
+    }
+
+    fn rigs(&self, shown: &Shown) -> Rigs {
+        let Prepared { given, nominal, .. } = self.prepared;
+        let Assessment { fit, refit, .. } = self.assessment;
+        let rig_of = |model: &FittedModel| -> Rig {
+            if shown.keeps_nominal && model.model.effects.is_empty() {
+                given.clone()
+            } else {
+                patch(given, nominal, fit, model)
+            }
+        };
+        Rigs { nominal: given.clone(), refit: rig_of(refit), patched: rig_of(&shown.patched) }
+    }
+
+    /// The named effects, the one that explains most first.
+    fn named_effects(&self, with_named: Option<&Shown>) -> Vec<NamedEffect> {
+        let Assessment { fit, weighed, .. } = self.assessment;
+        let nominal = &self.prepared.nominal;
+        let patched = &with_named.unwrap_or(&weighed.shown).patched;
+        let one = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
+            name: effect.found.effect.name,
+            class: effect.class.clone(),
+            confidence: effect.confidence,
+            parameters: match with_named {
+                Some(_) => parameters::parameters(&self.prepared.context(fit), patched, i),
+                None => effect.parameters.clone(),
+            },
+            place: place(nominal, fit, patched, i),
+        };
+        let named = weighed.named().into_iter().map(|i| &weighed.effects[i]).enumerate();
+        let mut effects: Vec<(f64, NamedEffect)> =
+            named.map(|(i, effect)| (effect.found.holdout.sum, one((i, effect)))).collect();
+        effects.sort_by(|a, b| b.0.total_cmp(&a.0));
+        effects.into_iter().map(|(_, named)| named).collect()
+    }
+}
+
+/// What a force of any form takes: alone, where nothing is named, or beside the named effects.
+fn free_form(unnamed: Option<&Unnamed>, beside: Option<&Beside>) -> Option<FreeForce> {
+    let (taken, share_of_ceiling) = match (unnamed, beside) {
+        (Some(unnamed), _) => (&unnamed.taken, 0.0),
+        (None, Some(beside)) => (&beside.taken, beside.share),
+        (None, None) => return None,
+    };
+    Some(FreeForce {
+        inputs: taken.inputs,
+        shape: unnamed.map(|unnamed| unnamed.shape.clone()),
+        holdout_gain: unnamed.and_then(|unnamed| unnamed.holdout_gain),
+        left_out_gain: taken.gain.sum,
+        left_out_error: taken.gain.error,
+        share_of_ceiling,
+    })
+}
+
+/// Part of the held-out mean square above the noise that the patched model leaves.
+fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
+    let table = &shown.table;
+    let before = above(table.nominal.holdout, floor, 0.0).max(above(table.refit.holdout, floor, 0.0));
+    let left = above(table.patched.holdout, floor, 0.0);
+    if before > 0.0 { (left / before).min(1.0) } else { 0.0 }
+}
+
+/// What was weighed, what was fitted in its place, and what was looked at on the way, each effect once.
+fn hypotheses(weighed: &WeighedModel) -> Vec<JudgedHypothesis> {
+    let of_effect = |effect: &WeighedEffect| JudgedHypothesis {
+        name: effect.found.effect.name,
+        holdout_gain: Some(effect.found.holdout.sum),
+        evidence: weighed.rests_on_evidence(effect).then(|| effect.evidence.clone()),
+        class: effect.class.clone(),
+        rejection: weighed.doubt(effect),
+    };
+    let mut out: Vec<JudgedHypothesis> =
+        weighed.effects.iter().chain(&weighed.dropped).map(of_effect).collect();
+    let mut lost = |name: EffectName, holdout_gain, why: Rejection| {
+        if out.iter().all(|known| known.name != name) {
+            let (evidence, class, rejection) = (None, Vec::new(), Some(why));
+            out.push(JudgedHypothesis { name, holdout_gain, evidence, class, rejection });
+        }
+    };
+    for WeighedEffect { found: one, class, .. } in &weighed.effects {
+        for rival in &one.rivals {
+            let winner = one.effect.name;
+            let behind = || match class.contains(&rival.name) {
+                true => Rejection::Indistinguishable { from: winner },
+                false => Rejection::Behind { winner, z: rival.z },
+            };
+            let why = rival.absence.clone().unwrap_or_else(behind);
+            lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), why);
+        }
+    }
+    for rejected in &weighed.rejected {
+        lost(rejected.name, rejected.holdout_gain, rejected.why.clone());
+    }
+    out
+}
+
+/// Where most of what no effect explains is.
+fn top_place(holdout: &[BlockedRecording], left: &[Vec<f64>], maps: &[Map]) -> Place {
+    let stretch = |(track, left): (&BlockedRecording, &Vec<f64>)| {
+        let weight: Vec<f64> =
+            left.iter().zip(&track.motion.rest).map(|(x, rest)| if *rest { 0.0 } else { x * x }).collect();
+        Stretch { file: track.blocks.file.clone(), intervals_s: residual_maps::intervals(track, &weight) }
+    };
+    Place { recordings: holdout.iter().zip(left).map(stretch).collect(), states: strongest(maps) }
+}
+
+fn strongest(maps: &[Map]) -> Vec<Region> {
+    let Some(map) = maps.iter().filter(|m| m.significant).max_by(|a, b| a.carries.total_cmp(&b.carries))
+    else {
+        return Vec::new();
+    };
+    let weight = |i: usize| map.forward[i].unwrap_or(0.0).abs().max(map.backward[i].unwrap_or(0.0).abs());
+    let centres: Vec<f64> = map.edges.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let weights: Vec<f64> = (0..centres.len()).map(weight).collect();
+    residual_maps::range(&centres, &weights)
+        .map(|(low, high)| Region { variable: map.variable.into(), low, high })
+        .into_iter()
+        .collect()
+}
+
+/// Residuals over time of some recordings.
+fn all_series(
+    estimator: &Estimator,
+    tracks: &[BlockedRecording],
+    of: &Residuals,
+    holdout: bool,
+) -> Vec<Series> {
+    let one = |(r, track): (usize, &BlockedRecording)| {
+        let moving = estimator.moving(track);
+        Series::new(track, holdout, &moving, &of.nominal[r], &of.refit[r], &of.patched[r], &of.force[r])
+    };
+    tracks.iter().enumerate().map(one).collect()
+}

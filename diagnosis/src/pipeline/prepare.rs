@@ -1,0 +1,125 @@
+//! The first stage: recordings cut into blocks, the nominal model refitted, and what both need before any effect is looked for.
+
+use super::Progress;
+use crate::effects::definition::Span;
+use crate::effects::{Effect, EffectName};
+use crate::estimation::blocked_recording::{BlockedRecording, Jumps};
+use crate::estimation::filter::Noise;
+use crate::estimation::fit::Fit;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::lost_counts::{self, Asked};
+use crate::estimation::model::{Model, Nominal};
+use crate::estimation::noise::{self, Colour};
+use crate::estimation::{quasi_static, refit};
+use crate::io::recording::Recording;
+use crate::io::rig::Rig;
+use crate::selection::candidates::span_of;
+use crate::selection::context::{FitContext, FittedModel};
+use crate::validation::held_out::HeldOut;
+use crate::validation::residuals::{drive_force, forces};
+
+/// Rig and recordings before any effect is looked for.
+pub(crate) struct Prepared {
+    /// The rig as it was given.
+    pub(crate) given: Rig,
+    pub(crate) nominal: Nominal,
+    /// The recordings that are fitted, in the motion of the refitted nominal model.
+    pub(crate) fit: Vec<BlockedRecording>,
+    /// The recordings that judge.
+    pub(crate) holdout: HeldOut,
+    pub(crate) span: Span,
+    /// Acceleration that the command makes: the scale of the noise search.
+    pub(crate) scale: f64,
+    /// Noise under the refitted nominal model.
+    pub(crate) noise: Noise,
+}
+
+impl Prepared {
+    /// What the searches work on, with the recordings in some motion.
+    pub(crate) fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
+        FitContext { nominal: &self.nominal, tracks, span: &self.span, scale: self.scale }
+    }
+}
+
+/// Cuts recordings into blocks, refits the nominal model, and looks for lost counts.
+pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress: Progress) -> Prepared {
+    let cut = |all: &[Recording]| all.iter().map(|r| BlockedRecording::moving(r, rig)).collect::<Vec<_>>();
+    let (mut tracks, mut holdout) = (cut(fit), cut(holdout));
+    let mut nominal = Nominal::of(rig);
+    quasi_static::add_inertia(&mut nominal, &mut tracks, &mut holdout);
+    progress("refitting the nominal model", 0.1);
+    let (noise, refit) = refit::settle(&mut nominal, &mut tracks);
+    let scale = refit::acceleration_scale(&nominal, &tracks);
+    nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
+    let span = span_of(&tracks, &nominal);
+    let search = JumpSearch { nominal: &nominal, count: span.count, noise: &noise, scale };
+    let spread = search.find(&mut tracks, Asked::UNKNOWN, None);
+    let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
+    let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
+    let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
+    let mut holdout = HeldOut::new(holdout);
+    holdout.follow(&first, &nominal, &span, scale);
+    search.find(&mut holdout.filtered, asked, spread);
+    holdout.share_jumps();
+    for (r, track) in tracks.iter_mut().enumerate() {
+        (track.place, track.bias) = (Some(r), first.fit.bias(r));
+    }
+    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise }
+}
+
+/// Part of the force that a refit may leave for the forces to be in balance.
+const BALANCED: f64 = 0.5;
+
+/// True if a refit explains most of the force.
+fn is_balanced(
+    refit: &Fit,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+    scale: f64,
+) -> bool {
+    let estimator = Estimator::new(tracks, noise, scale);
+    let left = forces(&estimator, tracks, &refit.totals(tracks), nominal.rig.model.inertia);
+    let force = drive_force(nominal, &estimator, tracks);
+    estimator.rms(&left, tracks) < BALANCED * estimator.rms(&force, tracks)
+}
+
+/// What a search for lost counts looks with.
+struct JumpSearch<'a> {
+    nominal: &'a Nominal,
+    /// One count, rad or m.
+    count: f64,
+    noise: &'a Noise,
+    scale: f64,
+}
+
+impl JumpSearch<'_> {
+    /// Looks for lost counts in every recording under the null, and again with the noise that is left without them and with
+    /// the knowledge that counts get lost; gives how many are lost at a time, as travel. Held-out recordings take that, `spread`,
+    /// from the fitted ones.
+    fn find(&self, tracks: &mut [BlockedRecording], mut asked: Asked, spread: Option<f64>) -> Option<f64> {
+        let nominal = self.nominal;
+        let mut noise = *self.noise;
+        let mut sizes = Vec::new();
+        for _ in 0..2 {
+            sizes.clear();
+            for track in tracks.iter_mut() {
+                let alone = std::slice::from_ref(&*track);
+                let fit = Fit::new(&Model::default(), nominal, alone, &noise);
+                let found = lost_counts::find(track, &fit, self.count, asked, spread);
+                track.jumps = Jumps { lost: found.lost, price: found.price };
+                sizes.extend(found.sizes);
+            }
+            if sizes.is_empty() {
+                return None;
+            }
+            asked = Asked::KNOWN;
+            let of_jumps = EffectName::ALL.iter().filter(|name| name.definition().is_of_jumps());
+            let effects = of_jumps.map(|name| Effect::shaped(*name, &[])).collect();
+            let model = Model { effects, ..Model::default() };
+            let totals = Fit::new(&model, nominal, tracks, &noise).totals(tracks);
+            noise = noise::estimate(tracks, &totals, &noise, self.scale, Colour::White);
+        }
+        Some(lost_counts::spread_of(&sizes, self.count))
+    }
+}

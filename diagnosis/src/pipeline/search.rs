@@ -1,0 +1,333 @@
+//! The second stage: effects are added one after another as long as one generalises, and what does not stand when all are judged
+//! together is taken out again.
+
+use super::Progress;
+use super::prepare::Prepared;
+use crate::effects::{Effect, EffectName};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::filter::Knows;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::estimation::refit;
+use crate::selection::context::{FitContext, FittedModel, MOST};
+use crate::selection::{candidates, joint};
+use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
+use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
+use crate::validation::held_out::HeldOut;
+use crate::validation::judge::judge_all;
+use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
+use crate::validation::residuals::forces;
+use rayon::prelude::*;
+
+/// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
+const TRIED: usize = 3;
+
+/// What the search ends with.
+pub(crate) struct Found {
+    /// The fitted recordings in the motion of the model that was found.
+    pub(crate) fit: Vec<BlockedRecording>,
+    /// The recordings that judge, in that motion.
+    pub(crate) holdout: HeldOut,
+    /// The null under coloured noise.
+    pub(crate) null: FittedModel,
+    pub(crate) standing: StandingModel,
+}
+
+/// Searches for the effects that explain what the nominal model leaves.
+pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
+    let search = Search { prepared, progress };
+    let mut tried = Tried::default();
+    let grown = search.forward_selection(search.start(), &mut tried);
+    progress("judging on held-out recordings", 0.8);
+    let mut found = search.backward_elimination(grown);
+    tried.excluded = found.standing.rejected.iter().map(|rejected| rejected.name).collect();
+    if !found.standing.effects.is_empty() && !tried.excluded.is_empty() {
+        // What went may have stood in the place of something else.
+        tried.count = 0;
+        let mut again =
+            search.backward_elimination(search.forward_selection(search.state(&found), &mut tried));
+        if again.standing.effects.len() > found.standing.effects.len() {
+            again.standing.rejected.splice(..0, found.standing.rejected);
+            found = again;
+        }
+    }
+    found.standing.rejected.splice(..0, tried.rejected);
+    found
+}
+
+/// The model as far as it has come, under white and under coloured noise, and the motion that goes with it.
+struct SearchState {
+    white: FittedModel,
+    slow: FittedModel,
+    tracks: Vec<BlockedRecording>,
+    holdout: HeldOut,
+}
+
+/// What was looked at so far.
+#[derive(Default)]
+struct Tried {
+    rejected: Vec<RejectedHypothesis>,
+    /// How many candidates were judged.
+    count: usize,
+    /// True once plain forces were looked for together.
+    plain: bool,
+    /// Effects that were found and taken out again: not looked at a second time.
+    excluded: Vec<EffectName>,
+}
+
+/// The model with one more effect.
+struct Next {
+    state: SearchState,
+    /// True if the effect generalises to the held-out recordings; otherwise it is likely to beside another.
+    generalises: bool,
+}
+
+struct Search<'a> {
+    prepared: &'a Prepared,
+    progress: Progress<'a>,
+}
+
+impl Search<'_> {
+    fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
+        self.prepared.context(tracks)
+    }
+
+    /// The model without any effect.
+    fn start(&self) -> SearchState {
+        let Prepared { fit, holdout, noise, .. } = self.prepared;
+        let context = self.context(fit);
+        let white = context.fit(Model::default(), noise, Colour::White);
+        let slow = context.fit_slow(Model::default(), &[noise, &white.noise]);
+        SearchState { white, slow, tracks: fit.clone(), holdout: holdout.clone() }
+    }
+
+    /// Adds effects one after another as long as one generalises.
+    fn forward_selection(&self, mut now: SearchState, tried: &mut Tried) -> SearchState {
+        let mut before = None;
+        while now.white.model.effects.len() < MOST {
+            let step = now.white.model.effects.len();
+            (self.progress)("searching for what was left out", 0.15 + 0.2 * step as f64);
+            let Some(next) = self.with_one_more(&now, tried, TRIED * (step + 1)) else { break };
+            if !next.generalises && before.is_some() {
+                break;
+            }
+            // Of two effects as large as each other neither generalises alone: what promises stands until one more step decides.
+            let last = std::mem::replace(&mut now, next.state);
+            before = (!next.generalises).then_some(last);
+        }
+        before.unwrap_or(now)
+    }
+
+    /// What of a model stands when all its effects are judged together.
+    fn backward_elimination(&self, now: SearchState) -> Found {
+        let SearchState { white, slow, tracks, holdout } = now;
+        let context = self.context(&tracks);
+        let null = context.fit_slow(Model::default(), &[&self.prepared.noise, &white.noise]);
+        let standing = eliminate(slow, &context, &holdout, &null.noise, &white.noise);
+        Found { fit: tracks, holdout, null, standing }
+    }
+
+    /// What stands, in its own motion.
+    fn state(&self, found: &Found) -> SearchState {
+        let context = self.context(&found.fit);
+        let last = &found.standing.model;
+        let fitted = context.fit(last.model.clone(), &self.prepared.noise, Colour::White);
+        let (tracks, white) = in_its_own_motion(&found.fit, fitted, &context);
+        let holdout = self.followed(&found.holdout, &white);
+        let slow = self.context(&tracks).fit_slow(white.model.clone(), &[&last.noise, &white.noise]);
+        SearchState { white, slow, tracks, holdout }
+    }
+
+    /// The held-out recordings in the motion of a model.
+    fn followed(&self, holdout: &HeldOut, model: &FittedModel) -> HeldOut {
+        let Prepared { nominal, span, scale, .. } = self.prepared;
+        let mut holdout = holdout.clone();
+        holdout.follow(model, nominal, span, *scale);
+        holdout
+    }
+
+    /// The model with one more effect, if there is one that generalises or, failing that, promises to; at most `most` may have
+    /// been judged by then.
+    fn with_one_more(&self, now: &SearchState, tried: &mut Tried, most: usize) -> Option<Next> {
+        let on = self.context(&now.tracks);
+        let candidates = on.screen(&now.white, &|name| !tried.excluded.contains(&name));
+        let mut finalists = on.finalists(&now.white, &candidates);
+        on.polish(&mut finalists);
+        order_near_ties(&on, now.white.merit, &mut finalists);
+        if now.white.model.effects.is_empty() && !tried.plain {
+            tried.plain = true;
+            let best = finalists.first().map_or(0.0, |best| best.merit - now.white.merit);
+            if let Some(next) = self.with_plain_forces(now, best) {
+                return Some(next);
+            }
+        }
+        let mut promising = None;
+        for finalist in finalists {
+            if finalist.merit - now.white.merit < MIN_LOG_LIKELIHOOD_GAIN || tried.count >= most {
+                break;
+            }
+            tried.count += 1;
+            let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
+            match self.judge(now, finalist, promising.is_none()) {
+                Judged::Generalises(state) => return Some(Next { state, generalises: true }),
+                Judged::Rejected { holdout_gain, why, provisional } => {
+                    tried.rejected.push(RejectedHypothesis { name, holdout_gain, why });
+                    let next = |state| Next { state, generalises: false };
+                    promising = promising.or_else(|| provisional.map(next));
+                }
+            }
+        }
+        promising
+    }
+
+    /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if it may carry beside another.
+    fn judge(&self, now: &SearchState, finalist: FittedModel, may_promise: bool) -> Judged {
+        let on = self.context(&now.tracks);
+        let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
+        if with.merit - now.slow.merit < MIN_LOG_LIKELIHOOD_GAIN {
+            return Judged::Rejected {
+                holdout_gain: None,
+                why: Rejection::SlowDisturbance,
+                provisional: None,
+            };
+        }
+        let (tracks, white) = in_its_own_motion(&now.tracks, finalist, &on);
+        let own = self.context(&tracks);
+        let holdout = self.followed(&now.holdout, &white);
+        let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
+        let last = white.model.effects.len() - 1;
+        let rejection = judged.rejection().or_else(|| parameters::absence(&own, &white, last));
+        let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
+        let slow = is_kept.then(|| own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]));
+        let state = slow.map(|slow| SearchState { white, slow, tracks, holdout });
+        match (rejection, state) {
+            (None, Some(state)) => Judged::Generalises(state),
+            (why, provisional) => Judged::Rejected {
+                holdout_gain: Some(judged.holdout.sum),
+                why: why.expect("what is not rejected is kept"),
+                provisional,
+            },
+        }
+    }
+
+    /// The model with the best set of plain forces, where they gain enough beside `best`, the most that any effect gains, and
+    /// all of them generalise.
+    fn with_plain_forces(&self, now: &SearchState, best: f64) -> Option<Next> {
+        let on = self.context(&now.tracks);
+        for white in best_plain_models(&on, now) {
+            let has_twin =
+                |effect: &Effect| effect.name.definition().plain(effect).is_some_and(|it| it.has_twin);
+            let enough =
+                if white.model.effects.iter().any(has_twin) { PLAIN_NEARLY_ALL } else { PLAIN_ENOUGH };
+            let gain = white.merit - now.white.merit;
+            if gain < MIN_LOG_LIKELIHOOD_GAIN || gain < enough * best {
+                continue;
+            }
+            let (tracks, white) = in_its_own_motion(&now.tracks, white, &on);
+            let own = self.context(&tracks);
+            let holdout = self.followed(&now.holdout, &white);
+            let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
+            let judged = judge_all(&own, &white, &slow.noise, &holdout);
+            if judged.iter().all(|judged| judged.rejection().is_none()) {
+                let state = SearchState { white, slow, tracks, holdout };
+                return Some(Next { state, generalises: true });
+            }
+        }
+        None
+    }
+}
+
+/// What became of a model with one more effect.
+enum Judged {
+    Generalises(SearchState),
+    Rejected {
+        /// Gain on held-out recordings, nats; none where it was not judged there.
+        holdout_gain: Option<f64>,
+        why: Rejection,
+        /// The model, where the effect may carry beside another.
+        provisional: Option<SearchState>,
+    },
+}
+
+/// Most plain forces taken together.
+const PLAIN_TOGETHER: usize = 3;
+/// Part of what the best of all effects gains that plain friction and weight must gain to be taken before it, and that
+/// forces with a twin in the library must.
+const PLAIN_ENOUGH: f64 = 0.6;
+const PLAIN_NEARLY_ALL: f64 = 0.9;
+
+/// Sets of forces that any machine may have and the rig does not hold, as models. They are looked for together before anything
+/// else: neither of two may show without the other.
+fn plain_sets(on: &FitContext) -> Vec<Model> {
+    let all = EffectName::ALL.iter().flat_map(|name| candidates::shapes(*name, on.span, on.nominal));
+    let ranked = |effect: Effect| Some((effect.name.definition().plain(&effect)?.rank, effect));
+    let mut plain: Vec<(u8, Effect)> = all.filter_map(ranked).collect();
+    plain.sort_by_key(|(rank, _)| *rank);
+    let mut sets: Vec<Vec<Effect>> = vec![Vec::new()];
+    for (_, effect) in plain {
+        let with = |set: &Vec<Effect>| {
+            let fits = set.len() < PLAIN_TOGETHER && set.iter().all(|other| other.name != effect.name);
+            fits.then(|| set.iter().chain([&effect]).cloned().collect::<Vec<_>>())
+        };
+        sets.extend(sets.iter().filter_map(with).collect::<Vec<_>>());
+    }
+    sets.into_iter().skip(1).map(|effects| Model { effects, ..Model::default() }).collect()
+}
+
+/// The best model of each number of plain forces under its own noise, best first.
+fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
+    let mut ranked: Vec<FittedModel> = plain_sets(on)
+        .into_par_iter()
+        .map(|model| on.fit_at(model, &now.white.noise))
+        .filter(|fitted| fitted.merit - now.white.merit > MIN_LOG_LIKELIHOOD_GAIN)
+        .collect();
+    ranked.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    let mut sizes: Vec<usize> = Vec::new();
+    let mut fitted: Vec<FittedModel> = Vec::new();
+    for one in ranked {
+        if !sizes.contains(&one.model.effects.len()) {
+            sizes.push(one.model.effects.len());
+            fitted.push(on.fit(one.model, &now.white.noise, Colour::White));
+        }
+    }
+    fitted.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    fitted
+}
+
+/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
+/// its smoother, and next to rest and reversals such a smoother knows neither the speed nor its sign.
+fn in_its_own_motion(
+    tracks: &[BlockedRecording],
+    candidate: FittedModel,
+    on: &FitContext,
+) -> (Vec<BlockedRecording>, FittedModel) {
+    let mut own = tracks.to_vec();
+    let count = 1.0 / on.nominal.rig.encoder.counts_per_unit;
+    refit::estimate_motion(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count, Knows::All);
+    let context = FitContext { tracks: &own, ..*on };
+    let again = context.fit(candidate.model, &candidate.noise, Colour::White);
+    let again = joint::settled(&context, again);
+    (own, again)
+}
+
+/// Candidates whose gain is this part of the best one's are near ties.
+const NEAR_TIE: f64 = 0.9;
+
+/// Puts near ties in the order of the force that they leave on the fitted recordings: what they gain on the noise of a
+/// null that explains little says less.
+fn order_near_ties(context: &FitContext, before: f64, finalists: &mut [FittedModel]) {
+    let Some(best) = finalists.first().map(|c| c.merit - before) else { return };
+    let near = finalists.iter().take_while(|c| c.merit - before >= NEAR_TIE * best).count();
+    if near < 2 {
+        return;
+    }
+    let estimator = Estimator::new(context.tracks, &finalists[0].noise, context.scale);
+    let left = |c: &FittedModel| {
+        let inertia = parameters::scale(context.nominal, c).0;
+        let totals = c.fit.totals(context.tracks);
+        estimator.rms(&forces(&estimator, context.tracks, &totals, inertia), context.tracks)
+    };
+    finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
+}

@@ -1,0 +1,60 @@
+//! What of a model stands when all its effects are judged together.
+
+use crate::effects::EffectName;
+use crate::estimation::filter::Noise;
+use crate::estimation::noise::Colour;
+use crate::selection::context::{FitContext, FittedModel};
+use crate::validation::evidence::EffectEvidence;
+use crate::validation::held_out::HeldOut;
+use crate::validation::judge::judge_all;
+use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
+
+/// A hypothesis that was fitted in full and rejected.
+#[derive(Clone)]
+pub(crate) struct RejectedHypothesis {
+    pub(crate) name: EffectName,
+    /// Gain on held-out recordings, nats; none where it was not judged there.
+    pub(crate) holdout_gain: Option<f64>,
+    pub(crate) why: Rejection,
+}
+
+/// A model all of whose effects carry to the held-out recordings.
+pub(crate) struct StandingModel {
+    /// Under coloured noise.
+    pub(crate) model: FittedModel,
+    /// What speaks for each effect.
+    pub(crate) effects: Vec<EffectEvidence>,
+    /// What was taken out.
+    pub(crate) rejected: Vec<RejectedHypothesis>,
+}
+
+/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and
+/// judges that; `noise` is white, `null_noise` is the null's coloured one.
+pub(crate) fn eliminate(
+    mut model: FittedModel,
+    context: &FitContext,
+    holdout: &HeldOut,
+    null_noise: &Noise,
+    noise: &Noise,
+) -> StandingModel {
+    let mut rejected = Vec::new();
+    loop {
+        let plain = context.fit(model.model.clone(), noise, Colour::White);
+        let effects = judge_all(context, &plain, &model.noise, holdout);
+        let weakest = effects
+            .iter()
+            .enumerate()
+            .filter_map(|(i, f)| {
+                let why = f.rejection().or_else(|| parameters::absence(context, &plain, i))?;
+                Some((i, f.holdout.z, why))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _, why)) = weakest else { return StandingModel { model, effects, rejected } };
+        let (name, gain) = (effects[i].effect.name, effects[i].holdout.sum);
+        rejected.push(RejectedHypothesis { name, holdout_gain: Some(gain), why });
+        let mut less = model.model.clone();
+        less.effects.remove(i);
+        model = context.fit_slow(less, &[null_noise, noise]);
+    }
+}
