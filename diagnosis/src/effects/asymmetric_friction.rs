@@ -1,10 +1,12 @@
 //! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn q̇|)`. Where the nominal model has an
 //! offset the dry part is that offset, and only the viscous part can be told.
 
-use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Plain, Reported, Span};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Plain, Reported, Span,
+};
 use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
 struct Law {
@@ -28,19 +30,32 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that differs with direction"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law { viscous_only: effect.is_set("viscous_only") }))
     }
     fn is_dry(&self) -> bool {
         true
     }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
+        joint.bias -= effect.coefficient("coulomb_difference");
+        let difference = effect.coefficient("viscous_difference");
+        if difference != 0.0 {
+            joint.notes.push(format!(
+                "asymmetric_friction: viscous friction is {:.6e} forward and {:.6e} backward; damping holds their mean",
+                joint.viscous + difference,
+                joint.viscous - difference
+            ));
+        }
+        true
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Speed)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let known = [("viscous_only", 1.0)];
         vec![Effect::shaped(name, if span.rig.has_offset { &known } else { &[] })]
@@ -51,6 +66,18 @@ impl Definition for Defined {
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 4, has_twin: true })
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that differs with direction"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let mut out = Vec::new();
@@ -67,21 +94,5 @@ impl Definition for Defined {
     }
     fn form_sd(&self, _value: &str) -> f64 {
         0.025
-    }
-    fn plain(&self, _effect: &Effect) -> Option<Plain> {
-        Some(Plain { rank: 4, has_twin: true })
-    }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
-        joint.bias -= effect.coefficient("coulomb_difference");
-        let difference = effect.coefficient("viscous_difference");
-        if difference != 0.0 {
-            joint.notes.push(format!(
-                "asymmetric_friction: viscous friction is {:.6e} forward and {:.6e} backward; damping holds their mean",
-                joint.viscous + difference,
-                joint.viscous - difference
-            ));
-        }
-        true
     }
 }

@@ -1,7 +1,8 @@
 //! A gap between motor and load that opens at reversals; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, Definition, Factors, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
+    Shown, Span,
 };
 use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
 use super::{Effect, EffectName, State, Subsystem};
@@ -32,30 +33,27 @@ fn widest(span: &Span) -> f64 {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "a gap at reversals"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law(Load::new(effect))))
     }
+    fn coupling(&self) -> Option<Coupling> {
+        Some(Coupling::Stiff)
+    }
+    fn needed(&self) -> &'static [&'static str] {
+        &["gap", "coast", "contact_hz", "ratio"]
+    }
+}
+
+impl EffectSearch for Defined {
     fn needs_dry(&self) -> bool {
         true
     }
     fn is_of_command(&self) -> bool {
         true
     }
-    fn coupling(&self) -> Option<Coupling> {
-        Some(Coupling::Stiff)
-    }
     fn has_optima_apart(&self) -> bool {
         true
-    }
-    fn needed(&self) -> &'static [&'static str] {
-        &["gap", "coast", "contact_hz", "ratio"]
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let mut out = Vec::new();
@@ -83,12 +81,6 @@ impl Definition for Defined {
         let gain = allowed.gain;
         ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
     }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
-    }
-    fn form_sd(&self, _value: &str) -> f64 {
-        0.4
-    }
     fn twins(&self, effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         // A gap that the encoder does not see, and the spring that its flanks are.
         let unseen = effect.shape_or("gap", f64::INFINITY) < SEEN * shown.count;
@@ -97,5 +89,20 @@ impl Definition for Defined {
     }
     fn start_factors(&self) -> &'static [Factors] {
         &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])]
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "a gap at reversals"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.4
     }
 }

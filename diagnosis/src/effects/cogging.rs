@@ -1,24 +1,24 @@
 //! Torque periodic in the angle, independent of the command: teeth and poles, or a screw. Its orders are sought in the residual.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem};
+use super::{Effect, EffectName, Subsystem, Variable};
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "torque periodic in the angle"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
     fn has_own_phase(&self) -> bool {
         true
     }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Angle)
+    }
+}
+
+impl EffectSearch for Defined {
     fn is_periodic(&self) -> bool {
         true
     }
@@ -27,6 +27,19 @@ impl Definition for Defined {
     }
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
+    }
+    fn is_of_orders(&self, orders: &[f64]) -> bool {
+        // Once per turn and nothing else is an off-centre mass.
+        orders.iter().any(|order| *order != 1.0)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "torque periodic in the angle"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, false)
@@ -38,9 +51,5 @@ impl Definition for Defined {
         (other == EffectName::TorqueRipple).then_some(
             "slow turns with a small and with a large constant load: ripple grows with the command, cogging does not",
         )
-    }
-    fn is_of_orders(&self, orders: &[f64]) -> bool {
-        // Once per turn and nothing else is an off-centre mass.
-        orders.iter().any(|order| *order != 1.0)
     }
 }

@@ -1,22 +1,22 @@
 //! Small commands do nothing; larger ones pass whole or lose the width.
 
-use super::definition::{Definition, Fitted, Movable, Reported, Span};
-use super::{CommandLaw, Effect, EffectName, Subsystem};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
+use super::{CommandLaw, Effect, EffectName, Subsystem, Variable};
 use crate::numerics::golden::logarithmic;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "small commands do nothing"
-    }
+impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         let half_width = effect.shape_or("half_width", 0.0);
         Some(CommandLaw::Deadband { half_width, shift: effect.is_set("shift") })
     }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Command)
+    }
+}
+
+impl EffectSearch for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
@@ -36,6 +36,15 @@ impl Definition for Defined {
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "small commands do nothing"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]

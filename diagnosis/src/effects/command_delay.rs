@@ -1,30 +1,31 @@
 //! A pure transport delay between command and force.
 
-use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "the drive applies the command late"
-    }
+impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         Some(CommandLaw::of_delay(effect.shape_or("delay", 0.0)))
     }
+    fn needed(&self) -> &'static [&'static str] {
+        &["delay"]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.delay += effect.shape_or("delay", 0.0);
+        true
+    }
+}
+
+impl EffectSearch for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
     fn has_optima_apart(&self) -> bool {
         true
-    }
-    fn needed(&self) -> &'static [&'static str] {
-        &["delay"]
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let delays = logarithmic((0.2 * span.row).max(1e-5), 0.03, 16);
@@ -36,6 +37,15 @@ impl Definition for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
     }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "the drive applies the command late"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("delay", fitted.shape("delay"), "s")]
     }
@@ -44,9 +54,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::ElectricalLag).then_some(experiments::PHASE)
-    }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.delay += effect.shape_or("delay", 0.0);
-        true
     }
 }

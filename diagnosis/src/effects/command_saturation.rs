@@ -1,26 +1,31 @@
 //! A drive that clips below its declared limit.
 
-use super::definition::{Definition, Fitted, Movable, Reported, Shown, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
 use super::joint_terms::JointTerms;
-use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
+use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "the drive clips large commands"
-    }
+impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         Some(CommandLaw::Clip { limit: effect.shape_or("limit", 0.0) })
     }
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn needed(&self) -> &'static [&'static str] {
         &["limit"]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        let clip = effect.shape_or("limit", f64::INFINITY);
+        joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
+        true
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Command)
+    }
+}
+
+impl EffectSearch for Defined {
+    fn is_of_command(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let part = |i: i32| span.clip + (0.945 - span.clip) / 9.0 * f64::from(i);
@@ -31,6 +36,19 @@ impl Definition for Defined {
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
+    }
+    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
+        // A drive that clips, and a roller that slips at a constant force.
+        vec![EffectName::RollerSlip]
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "the drive clips large commands"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("limit", fitted.shape("limit"), fitted.command.clone())]
@@ -43,14 +61,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::RollerSlip).then_some(experiments::BLOCKED)
-    }
-    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
-        // A drive that clips, and a roller that slips at a constant force.
-        vec![EffectName::RollerSlip]
-    }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        let clip = effect.shape_or("limit", f64::INFINITY);
-        joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
-        true
     }
 }

@@ -1,11 +1,12 @@
 //! Dry friction, where the nominal model has none: `-coulomb·sgn(q̇)`.
 
 use super::definition::{
-    Allowed, Definition, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
+    Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::sign;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
 struct Law;
@@ -24,36 +25,45 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "dry friction"
-    }
+impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law))
     }
     fn is_dry(&self) -> bool {
         true
     }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Coulomb)
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.dry += effect.coefficient("coulomb");
+        true
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Speed)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        fitted.one_force("coulomb", fitted.force.into())
-    }
-    fn nominal_term(&self) -> Option<NominalTerm> {
-        Some(NominalTerm::Coulomb)
-    }
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         Some(Plain { rank: 0, has_twin: false })
     }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.dry += effect.coefficient("coulomb");
-        true
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("coulomb", fitted.force.into())
     }
 }

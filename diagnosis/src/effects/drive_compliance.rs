@@ -1,6 +1,9 @@
 //! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
 
-use super::definition::{Allowed, Coupling, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown,
+    Span,
+};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden::logarithmic;
 use std::f64::consts::TAU;
@@ -60,13 +63,7 @@ fn highest(span: &Span) -> f64 {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "a spring between motor and load"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let omega = TAU * effect.shape_or("resonance_hz", 1.0);
         Some(Box::new(Law { omega, damping: effect.shape_or("damping", 0.05), state: None }))
@@ -74,14 +71,20 @@ impl Definition for Defined {
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)
     }
+    fn needed(&self) -> &'static [&'static str] {
+        &["resonance_hz", "damping"]
+    }
+    fn is_relative_to_gain(&self) -> bool {
+        true
+    }
+}
+
+impl EffectSearch for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
     fn has_optima_apart(&self) -> bool {
         true
-    }
-    fn needed(&self) -> &'static [&'static str] {
-        &["resonance_hz", "damping"]
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let mut out = Vec::new();
@@ -99,6 +102,19 @@ impl Definition for Defined {
         let gain = allowed.gain;
         ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0))
     }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // A spring that explains little of what it should explain may well have a gap.
+        shown.leaves_much.then_some(EffectName::Backlash).into_iter().collect()
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "a spring between motor and load"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (f, s) = fitted.shape("resonance_hz");
         let (x, sd) = fitted.term(0);
@@ -109,12 +125,5 @@ impl Definition for Defined {
     }
     fn form_sd(&self, _value: &str) -> f64 {
         0.035
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // A spring that explains little of what it should explain may well have a gap.
-        shown.leaves_much.then_some(EffectName::Backlash).into_iter().collect()
-    }
-    fn is_relative_to_gain(&self) -> bool {
-        true
     }
 }

@@ -1,30 +1,31 @@
 //! A first-order lag (L/R) between command and force.
 
-use super::definition::{Definition, Fitted, Movable, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "a first-order lag between command and torque"
-    }
+impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         Some(CommandLaw::of_lag(effect.shape_or("time_constant", 0.0)))
     }
+    fn needed(&self) -> &'static [&'static str] {
+        &["time_constant"]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.lag += effect.shape_or("time_constant", 0.0);
+        true
+    }
+}
+
+impl EffectSearch for Defined {
     fn is_of_command(&self) -> bool {
         true
     }
     fn has_optima_apart(&self) -> bool {
         true
-    }
-    fn needed(&self) -> &'static [&'static str] {
-        &["time_constant"]
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let times = logarithmic((0.2 * span.row).max(1e-5), 0.05, 9);
@@ -36,6 +37,15 @@ impl Definition for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
     }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "a first-order lag between command and torque"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("time_constant", fitted.shape("time_constant"), "s")]
     }
@@ -44,9 +54,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::CommandDelay).then_some(experiments::PHASE)
-    }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.lag += effect.shape_or("time_constant", 0.0);
-        true
     }
 }

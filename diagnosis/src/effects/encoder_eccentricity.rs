@@ -1,19 +1,13 @@
 //! An encoder that errs once per turn: travel added to what it reads.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::mass_imbalance::{LEAST_TURNS, once_a_turn};
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem};
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Sensor
-    }
-    fn words(&self) -> &'static str {
-        "the encoder errs once per turn"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
@@ -23,12 +17,24 @@ impl Definition for Defined {
     fn in_sensor(&self) -> bool {
         true
     }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let turn = span.rig.turn.filter(|turn| span.travel() / turn > LEAST_TURNS);
         turn.into_iter().map(|turn| once_a_turn(name, turn)).collect()
     }
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Sensor
+    }
+    fn words(&self) -> &'static str {
+        "the encoder errs once per turn"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", waves::amplitude(fitted), fitted.length)]

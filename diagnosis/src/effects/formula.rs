@@ -5,7 +5,9 @@
 //! of terms; the others are shape values, which are searched between their bounds. What a formula is called is known to the
 //! whole program once it is read, because names of effects are compared everywhere.
 
-use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Span};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Span,
+};
 use super::{Effect, EffectName, State, Subsystem};
 use exmex::{Express, FlatEx};
 use serde::{Deserialize, Serialize};
@@ -354,13 +356,7 @@ impl ForceLaw for Law {
 /// Points along a value of a formula's shape, for so many of them together.
 const POINTS: [usize; 3] = [9, 5, 3];
 
-impl Definition for Formula {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        self.words
-    }
+impl EffectLaw for Formula {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let formula = effect.name.formula()?;
         // Without a value: the middle of what it may be.
@@ -370,6 +366,9 @@ impl Definition for Formula {
     fn is_dry(&self) -> bool {
         self.is_dry
     }
+}
+
+impl EffectSearch for Formula {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if self.uses("tilt") && !span.tilt {
             return Vec::new();
@@ -410,6 +409,15 @@ impl Definition for Formula {
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         self.terms().len()
+    }
+}
+
+impl EffectReport for Formula {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        self.words
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let terms = self.terms().into_iter().enumerate();

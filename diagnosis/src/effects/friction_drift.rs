@@ -1,6 +1,8 @@
 //! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) + viscous·q̇)·(1 - exp(-t/time_constant))`.
 
-use super::definition::{Allowed, Definition, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+};
 use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
@@ -30,13 +32,7 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that changes as the recording goes on"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let time_constant = effect.shape_or("time_constant", 1.0);
         Some(Box::new(Law { time_constant, dry_only: effect.is_set("dry_only") }))
@@ -44,17 +40,20 @@ impl Definition for Defined {
     fn is_dry(&self) -> bool {
         true
     }
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn drifts(&self) -> bool {
-        true
-    }
-    fn has_optima_apart(&self) -> bool {
         true
     }
     fn needed(&self) -> &'static [&'static str] {
         &["time_constant"]
+    }
+}
+
+impl EffectSearch for Defined {
+    fn needs_dry(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let at = |time_constant: f64| {
@@ -81,6 +80,18 @@ impl Definition for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2
     }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::GainDrift).into_iter().collect()
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that changes as the recording goes on"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         let base = fitted.own_dry.abs();
@@ -96,8 +107,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::GainDrift).then_some(experiments::LATE)
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::GainDrift).into_iter().collect()
     }
 }

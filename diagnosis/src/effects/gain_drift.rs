@@ -3,7 +3,9 @@
 //! command and h nought at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
 //! `at_once_s` the load changes at once, which has no name and speaks only against others.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
+};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden::logarithmic;
 
@@ -52,13 +54,7 @@ const CHANGES: usize = 40;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "the torque constant changes as the recording goes on"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law {
             time_constant: effect.shape_or("time_constant", 1.0),
@@ -70,17 +66,20 @@ impl Definition for Defined {
     fn scales_drive(&self) -> bool {
         true
     }
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn drifts(&self) -> bool {
-        true
-    }
-    fn has_optima_apart(&self) -> bool {
         true
     }
     fn needed(&self) -> &'static [&'static str] {
         &["time_constant"]
+    }
+}
+
+impl EffectSearch for Defined {
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let by_time = |time_constant: f64| Effect::shaped(name, &[("time_constant", time_constant)]);
@@ -103,6 +102,29 @@ impl Definition for Defined {
         let least = 0.6 * allowed.gain.abs() / allowed.gain_reach;
         (-least, least)
     }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::FrictionDrift).into_iter().collect()
+    }
+    fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
+        if fitted.is_some_and(|effect| effect.name != name) {
+            return Vec::new();
+        }
+        let at = |i: usize| {
+            let time = span.duration * i as f64 / CHANGES as f64;
+            let effect = Effect::shaped(name, &[("time_constant", span.duration), ("at_once_s", time)]);
+            Unnamed { effect, freedom: 4.0, what: format!("a load that changes at once, at {time:.1} s,") }
+        };
+        (1..CHANGES).map(at).collect()
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "the torque constant changes as the recording goes on"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         vec![
@@ -118,20 +140,6 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::FrictionDrift).then_some(experiments::LATE)
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::FrictionDrift).into_iter().collect()
-    }
-    fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
-        if fitted.is_some_and(|effect| effect.name != name) {
-            return Vec::new();
-        }
-        let at = |i: usize| {
-            let time = span.duration * i as f64 / CHANGES as f64;
-            let effect = Effect::shaped(name, &[("time_constant", span.duration), ("at_once_s", time)]);
-            Unnamed { effect, freedom: 4.0, what: format!("a load that changes at once, at {time:.1} s,") }
-        };
-        (1..CHANGES).map(at).collect()
     }
 }
 
@@ -150,7 +158,8 @@ mod tests {
             }
             out[0] / 3.0
         };
-        let near = |heat: f64, expected: f64| assert!((heat - expected).abs() < 1e-3, "{heat} for {expected}");
+        let near =
+            |heat: f64, expected: f64| assert!((heat - expected).abs() < 1e-3, "{heat} for {expected}");
         let settled = 1.0 - (-1.0_f64).exp();
         near(after(-0.2, 2.0), settled);
         near(after(0.0, 2.0), settled * (-1.0_f64).exp());

@@ -1,7 +1,9 @@
 //! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with `of_drive` the load is the drive's
 //! own force, as a gear loses it, which has no name and speaks only against others.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed,
+};
 use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem};
 
@@ -25,30 +27,21 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "dry friction that grows with the load"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law { of_drive: effect.is_set("of_drive") }))
     }
     fn is_dry(&self) -> bool {
         true
     }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.force { vec![Effect::shaped(name, &[])] } else { Vec::new() }
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
-    }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        fitted.one_force("coefficient", "1".into())
-    }
-    fn form_sd(&self, _value: &str) -> f64 {
-        0.03
     }
     fn unnamed(&self, name: EffectName, _fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
         // Whatever bends with speed, force or command may be the loss of a gear.
@@ -57,5 +50,20 @@ impl Definition for Defined {
             freedom: 1.0,
             what: "friction in proportion to the force of the drive, as a gear loses it,".into(),
         }]
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction that grows with the load"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("coefficient", "1".into())
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
     }
 }

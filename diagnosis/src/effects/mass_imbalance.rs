@@ -1,8 +1,10 @@
 //! Gravity on an off-centre mass: once per turn of the axis, or of the motor.
 
-use super::definition::{Definition, Fitted, ForceLaw, NominalTerm, Plain, Reported, Shown, Span};
+use super::definition::{
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Shown, Span,
+};
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem};
+use super::{Effect, EffectName, Subsystem, Variable};
 
 /// Part of a turn of the motor over which once a turn is told from a slope, and of the axis over which gravity bends from a
 /// spring's straight line.
@@ -15,19 +17,22 @@ pub(super) fn once_a_turn(name: EffectName, turn: f64) -> Effect {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        "gravity on an off-centre mass"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
     fn has_own_phase(&self) -> bool {
         true
     }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Gravity)
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Angle)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.rig.has_gravity {
             // It is the gravity of that very mass.
@@ -41,6 +46,23 @@ impl Definition for Defined {
     }
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // Waves of once a turn, where nothing that turns need be heavy.
+        let wave = shown.linear.then_some(EffectName::Cogging);
+        wave.into_iter().chain(shown.less_than_a_turn.then_some(EffectName::PositionSpring)).collect()
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 3, has_twin: true })
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "gravity on an off-centre mass"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", fitted.scaled(waves::amplitude(fitted)), fitted.force)]
@@ -61,16 +83,5 @@ impl Definition for Defined {
             }
             _ => None,
         }
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // Waves of once a turn, where nothing that turns need be heavy.
-        let wave = shown.linear.then_some(EffectName::Cogging);
-        wave.into_iter().chain(shown.less_than_a_turn.then_some(EffectName::PositionSpring)).collect()
-    }
-    fn nominal_term(&self) -> Option<NominalTerm> {
-        Some(NominalTerm::Gravity)
-    }
-    fn plain(&self, _effect: &Effect) -> Option<Plain> {
-        Some(Plain { rank: 3, has_twin: true })
     }
 }

@@ -1,6 +1,6 @@
 //! Counts that the encoder loses for good: steps of what it reads. The steps are found before any effect is.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -25,13 +25,7 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Sensor
-    }
-    fn words(&self) -> &'static str {
-        "the encoder loses counts"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
         let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
@@ -39,20 +33,6 @@ impl Definition for Defined {
     }
     fn in_sensor(&self) -> bool {
         true
-    }
-    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
-        vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        (0.5, 1.5)
-    }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        // All the counts that were lost in the fitted recordings, whichever way.
-        let sum = fitted.lost * fitted.term(0).0;
-        vec![Reported::new("lost", (sum, ((0.05 * sum).powi(2) + 1.0).sqrt()), "counts")]
-    }
-    fn variable(&self) -> &'static str {
-        "time"
     }
     fn is_of_jumps(&self) -> bool {
         true
@@ -63,5 +43,31 @@ impl Definition for Defined {
             effect.shape.insert(format!("time_{n}"), *time);
             effect.coefficients.insert(format!("step_{n}"), *step);
         }
+    }
+}
+
+impl EffectSearch for Defined {
+    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
+        vec![Effect::shaped(name, &[])]
+    }
+    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
+        (0.5, 1.5)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Sensor
+    }
+    fn words(&self) -> &'static str {
+        "the encoder loses counts"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        // All the counts that were lost in the fitted recordings, whichever way.
+        let sum = fitted.lost * fitted.term(0).0;
+        vec![Reported::new("lost", (sum, ((0.05 * sum).powi(2) + 1.0).sqrt()), "counts")]
+    }
+    fn variable(&self) -> &'static str {
+        "time"
     }
 }

@@ -109,21 +109,6 @@ impl EffectName {
         }
     }
 
-    /// The variable that its force is a function of, where there is one alone.
-    pub(crate) fn variable(self) -> Option<Variable> {
-        match self {
-            Self::ViscousFriction
-            | Self::CoulombFriction
-            | Self::AsymmetricFriction
-            | Self::StribeckFriction
-            | Self::QuadraticDrag => Some(Variable::Speed),
-            Self::PositionSpring => Some(Variable::Travel),
-            Self::Cogging | Self::MassImbalance => Some(Variable::Angle),
-            Self::CommandDeadband | Self::CommandSaturation => Some(Variable::Command),
-            _ => None,
-        }
-    }
-
     /// Where it sits.
     pub fn subsystem(self) -> Subsystem {
         self.definition().subsystem()

@@ -1,7 +1,7 @@
 //! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the inertia that follows the travel, which
 //! has no name and speaks only against others.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span, Unnamed};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
 use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -48,37 +48,21 @@ const INERTIA_DEGREE: f64 = 12.0;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        "damping that changes along the travel"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law { profile: Profile::new(effect), of_inertia: effect.is_set("of_inertia") }))
     }
+    fn follows_travel(&self) -> bool {
+        true
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         travel_profile::grid(name, span)
     }
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         travel_profile::freedom(effect)
-    }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        let unit = format!("{}·s/{}", fitted.force, fitted.length);
-        vec![Reported::new("span", travel_profile::span(fitted), unit)]
-    }
-    fn form_sd(&self, _value: &str) -> f64 {
-        0.13
-    }
-    fn variable(&self) -> &'static str {
-        "travel"
-    }
-    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
-        Some(experiments::STROKES)
-    }
-    fn follows_travel(&self) -> bool {
-        true
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
         // All of them are told by an acceleration that changes with the travel.
@@ -92,5 +76,27 @@ impl Definition for Defined {
             freedom: INERTIA_DEGREE,
             what: "an inertia that changes along the travel".into(),
         }]
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "damping that changes along the travel"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let unit = format!("{}·s/{}", fitted.force, fitted.length);
+        vec![Reported::new("span", travel_profile::span(fitted), unit)]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.13
+    }
+    fn variable(&self) -> &'static str {
+        "travel"
+    }
+    fn experiment(&self, _other: EffectName) -> Option<&'static str> {
+        Some(experiments::STROKES)
     }
 }

@@ -1,6 +1,6 @@
 //! Dry friction that changes along the travel: `-Σ legendre_k·P_k(q)·sgn(q̇)`.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::law::{legendre, sign};
 use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -22,19 +22,19 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "dry friction that changes along the travel"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law(Profile::new(effect))))
     }
     fn is_dry(&self) -> bool {
         true
     }
+    fn follows_travel(&self) -> bool {
+        true
+    }
+}
+
+impl EffectSearch for Defined {
     fn needs_dry(&self) -> bool {
         true
     }
@@ -43,6 +43,15 @@ impl Definition for Defined {
     }
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         travel_profile::freedom(effect)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "dry friction that changes along the travel"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("span", travel_profile::span(fitted), fitted.force)]
@@ -55,8 +64,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         Some(experiments::STROKES)
-    }
-    fn follows_travel(&self) -> bool {
-        true
     }
 }

@@ -2,11 +2,12 @@
 //! creeps, which has no name and speaks only against others.
 
 use super::definition::{
-    Allowed, Definition, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain, Reported, Shown, Span, Unnamed,
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain,
+    Reported, Shown, Span, Unnamed,
 };
 use super::joint_terms::JointTerms;
 use super::law::first_or_both;
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, Subsystem, Variable, experiments};
 
 #[derive(Debug, Clone)]
 struct Law {
@@ -43,13 +44,7 @@ const FADES_S: [f64; 6] = [0.1, 0.25, 0.6, 1.5, 4.0, 10.0];
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        "a spring along the travel"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law {
             from: effect.shape_or("from", 0.0),
@@ -59,6 +54,21 @@ impl Definition for Defined {
             faded: 0.0,
         }))
     }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        if effect.shape_or("fades_s", f64::INFINITY).is_finite() || effect.is_set("one_sided") {
+            return false;
+        }
+        joint.stiffness += effect.coefficient("stiffness");
+        joint.slack = effect.shape_or("from", 0.0);
+        joint.bias += effect.coefficient("preload");
+        true
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Travel)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if !span.rig.has_stroke {
             return Vec::new();
@@ -82,18 +92,6 @@ impl Definition for Defined {
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         1 + usize::from(effect.is_set("preload"))
     }
-    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
-        fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))
-    }
-    fn form_sd(&self, _value: &str) -> f64 {
-        0.13
-    }
-    fn variable(&self) -> &'static str {
-        "travel"
-    }
-    fn experiment(&self, other: EffectName) -> Option<&'static str> {
-        (other != EffectName::MassImbalance).then_some(experiments::STROKES)
-    }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()
     }
@@ -114,13 +112,25 @@ impl Definition for Defined {
         };
         FADES_S.map(fading).into()
     }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        if effect.shape_or("fades_s", f64::INFINITY).is_finite() || effect.is_set("one_sided") {
-            return false;
-        }
-        joint.stiffness += effect.coefficient("stiffness");
-        joint.slack = effect.shape_or("from", 0.0);
-        joint.bias += effect.coefficient("preload");
-        true
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        "a spring along the travel"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.13
+    }
+    fn variable(&self) -> &'static str {
+        "travel"
+    }
+    fn experiment(&self, other: EffectName) -> Option<&'static str> {
+        (other != EffectName::MassImbalance).then_some(experiments::STROKES)
     }
 }

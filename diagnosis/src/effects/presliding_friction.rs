@@ -1,7 +1,10 @@
 //! Elastic bristles before sliding: the hysteresis just after a reversal (Dahl 1968; LuGre, Canudas de Wit et al. 1995).
 
 use super::bristles::{Bristles, lengths};
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
+    Span,
+};
 use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden::logarithmic;
@@ -35,21 +38,18 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "elastic bristles before sliding"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law { bristles: Bristles::new(effect), alike: effect.shape_or("spread", 1.0) <= 1.0 }))
     }
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn needed(&self) -> &'static [&'static str] {
         &["deflection"]
+    }
+}
+
+impl EffectSearch for Defined {
+    fn needs_dry(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let at = |spread: f64| {
@@ -64,6 +64,28 @@ impl Definition for Defined {
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_length.then_some(EffectName::Backlash).into_iter().collect()
+    }
+    fn bends_at_reversals(&self) -> bool {
+        true
+    }
+    fn gives_way_over(&self, effect: &Effect) -> Option<f64> {
+        Some(effect.shape_or("deflection", 0.0))
+    }
+    fn is_in_doubt_at_limit(&self, term: usize) -> bool {
+        // Bristles without damping are bristles all the same.
+        term == 0
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "elastic bristles before sliding"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (c, cs) = fitted.scaled(fitted.term(0));
@@ -85,18 +107,5 @@ impl Definition for Defined {
         matches!(other, EffectName::Backlash | EffectName::StribeckFriction).then_some(
             "a ladder of reversals with amplitudes from a few counts to a turn: bristles give a loop at every amplitude, a gap only above its width",
         )
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_length.then_some(EffectName::Backlash).into_iter().collect()
-    }
-    fn bends_at_reversals(&self) -> bool {
-        true
-    }
-    fn gives_way_over(&self, effect: &Effect) -> Option<f64> {
-        Some(effect.shape_or("deflection", 0.0))
-    }
-    fn is_in_doubt_at_limit(&self, term: usize) -> bool {
-        // Bristles without damping are bristles all the same.
-        term == 0
     }
 }

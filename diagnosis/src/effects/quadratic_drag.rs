@@ -1,7 +1,9 @@
 //! Drag with the square of speed: `-coefficient·q̇·|q̇|`.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, POSITIVE, Reported, Shown, Span};
-use super::{Effect, EffectName, State, Subsystem};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Shown, Span,
+};
+use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
 struct Law;
@@ -20,29 +22,38 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "drag with the square of speed"
-    }
+impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law))
     }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Speed)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::StribeckFriction).into_iter().collect()
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "drag with the square of speed"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", format!("{}·s²/{}²", fitted.force, fitted.length))
     }
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         Some(super::experiments::SPEEDS)
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::StribeckFriction).into_iter().collect()
     }
 }

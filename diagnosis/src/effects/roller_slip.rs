@@ -1,7 +1,8 @@
 //! A drive that lets go above a force ceiling; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, Definition, Factors, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
+    Shown, Span,
 };
 use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -27,27 +28,24 @@ const HOLDS: f64 = 0.9;
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "the drive lets go above a force ceiling"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law(Load::new(effect))))
-    }
-    fn is_of_command(&self) -> bool {
-        true
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Grip)
     }
-    fn has_optima_apart(&self) -> bool {
-        true
-    }
     fn needed(&self) -> &'static [&'static str] {
         &["limit", "creep", "coast", "ratio"]
+    }
+}
+
+impl EffectSearch for Defined {
+    fn is_of_command(&self) -> bool {
+        true
+    }
+    fn has_optima_apart(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let mut out = Vec::new();
@@ -84,6 +82,22 @@ impl Definition for Defined {
         let gain = allowed.gain;
         ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain))
     }
+    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
+        // A drive that clips, and a roller that slips at a constant force.
+        vec![EffectName::CommandSaturation]
+    }
+    fn start_factors(&self) -> &'static [Factors] {
+        &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "the drive lets go above a force ceiling"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.
         let (limit, s) = fitted.shape("limit");
@@ -107,12 +121,5 @@ impl Definition for Defined {
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::CommandSaturation).then_some(experiments::BLOCKED)
-    }
-    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
-        // A drive that clips, and a roller that slips at a constant force.
-        vec![EffectName::CommandSaturation]
-    }
-    fn start_factors(&self) -> &'static [Factors] {
-        &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]
     }
 }

@@ -1,8 +1,11 @@
 //! Friction that falls as speed rises from zero: `-peak·exp(-(|q̇|/speed)^exponent)·sgn(q̇)` (Stribeck 1902; Bo and Pavelescu 1982).
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown, Span};
+use super::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
+    Span,
+};
 use super::law::sign;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State, Subsystem, Variable};
 use crate::numerics::golden::logarithmic;
 
 #[derive(Debug, Clone)]
@@ -25,13 +28,7 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that falls as speed rises from zero"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let (speed, exponent) = (effect.shape_or("speed", 1.0), effect.shape_or("exponent", 2.0));
         Some(Box::new(Law { speed, exponent }))
@@ -39,11 +36,17 @@ impl Definition for Defined {
     fn is_dry(&self) -> bool {
         true
     }
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn needed(&self) -> &'static [&'static str] {
         &["speed"]
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Speed)
+    }
+}
+
+impl EffectSearch for Defined {
+    fn needs_dry(&self) -> bool {
+        true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
@@ -60,6 +63,18 @@ impl Definition for Defined {
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_speed.then_some(EffectName::QuadraticDrag).into_iter().collect()
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that falls as speed rises from zero"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![
             Reported::new("peak", fitted.scaled(fitted.term(0)), fitted.force),
@@ -68,8 +83,5 @@ impl Definition for Defined {
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "peak" { 0.2 } else { 0.18 }
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::QuadraticDrag).into_iter().collect()
     }
 }

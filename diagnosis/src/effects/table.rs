@@ -1,6 +1,6 @@
 //! A force as a table over one or two variables: what is there and has no name.
 
-use super::definition::{Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::{Effect, EffectName, State, Subsystem};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -157,20 +157,26 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
+impl EffectLaw for Defined {
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let table = effect.table.clone()?;
+        Some(Box::new(Law { table, turn: effect.shape_or("turn", TAU), way: 0.0, turned: 0.0 }))
+    }
+}
+
+impl EffectSearch for Defined {
+    /// It is no candidate: what has no name is sought by its form.
+    fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
+        Vec::new()
+    }
+}
+
+impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
     fn words(&self) -> &'static str {
         "a force without a name"
-    }
-    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        let table = effect.table.clone()?;
-        Some(Box::new(Law { table, turn: effect.shape_or("turn", TAU), way: 0.0, turned: 0.0 }))
-    }
-    /// It is no candidate: what has no name is sought by its form.
-    fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
-        Vec::new()
     }
     /// It is drawn, and has no values of its own.
     fn report(&self, _fitted: &Fitted) -> Vec<Reported> {

@@ -1,6 +1,8 @@
 //! A weight that acts through the tilt, where the nominal model has none: `weight·sin(tilt)`.
 
-use super::definition::{Definition, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span};
+use super::definition::{
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span,
+};
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -20,18 +22,30 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
+impl EffectLaw for Defined {
+    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(Law))
+    }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Weight)
+    }
+}
+
+impl EffectSearch for Defined {
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        if span.tilt { vec![Effect::shaped(name, &[])] } else { Vec::new() }
+    }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 2, has_twin: false })
+    }
+}
+
+impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
     fn words(&self) -> &'static str {
         "a weight that acts through the tilt"
-    }
-    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law))
-    }
-    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        if span.tilt { vec![Effect::shaped(name, &[])] } else { Vec::new() }
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("weight", fitted.force.into())
@@ -41,11 +55,5 @@ impl Definition for Defined {
     }
     fn variable(&self) -> &'static str {
         "tilt"
-    }
-    fn nominal_term(&self) -> Option<NominalTerm> {
-        Some(NominalTerm::Weight)
-    }
-    fn plain(&self, _effect: &Effect) -> Option<Plain> {
-        Some(Plain { rank: 2, has_twin: false })
     }
 }

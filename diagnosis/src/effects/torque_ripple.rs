@@ -1,28 +1,25 @@
 //! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought in the residual.
 
-use super::definition::{Allowed, Definition, Fitted, ForceLaw, Reported, Span};
+use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem};
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "torque periodic in the angle and proportional to the command"
-    }
+impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, true)))
     }
     fn has_own_phase(&self) -> bool {
         true
     }
-    fn is_periodic(&self) -> bool {
+    fn scales_drive(&self) -> bool {
         true
     }
-    fn scales_drive(&self) -> bool {
+}
+
+impl EffectSearch for Defined {
+    fn is_periodic(&self) -> bool {
         true
     }
     fn is_of_command(&self) -> bool {
@@ -39,6 +36,15 @@ impl Definition for Defined {
     }
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Actuator
+    }
+    fn words(&self) -> &'static str {
+        "torque periodic in the angle and proportional to the command"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, true)

@@ -1,10 +1,11 @@
 //! Friction that grows with speed, where the nominal model has none: `-viscous·q̇`.
 
 use super::definition::{
-    Allowed, Definition, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
+    Span,
 };
 use super::joint_terms::JointTerms;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
 struct Law;
@@ -23,36 +24,45 @@ impl ForceLaw for Law {
 
 pub(super) struct Defined;
 
-impl Definition for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that grows with speed"
-    }
+impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Law))
     }
+    fn nominal_term(&self) -> Option<NominalTerm> {
+        Some(NominalTerm::Viscous)
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.viscous += effect.coefficient("viscous");
+        true
+    }
+    fn depends_on(&self) -> Option<Variable> {
+        Some(Variable::Speed)
+    }
+}
+
+impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
+    fn plain(&self, _effect: &Effect) -> Option<Plain> {
+        Some(Plain { rank: 1, has_twin: false })
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "friction that grows with speed"
+    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("viscous", format!("{}·s/{}", fitted.force, fitted.length))
     }
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::StribeckFriction).then_some(super::experiments::SPEEDS)
-    }
-    fn nominal_term(&self) -> Option<NominalTerm> {
-        Some(NominalTerm::Viscous)
-    }
-    fn plain(&self, _effect: &Effect) -> Option<Plain> {
-        Some(Plain { rank: 1, has_twin: false })
-    }
-    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.viscous += effect.coefficient("viscous");
-        true
     }
 }

@@ -38,7 +38,7 @@ pub(crate) fn oppose(mut weighed: WeighedModel, context: &FitContext) -> (Weighe
     for i in named {
         let mut less = model.clone();
         less.effects.remove(i);
-        let variable = model.effects[i].name.variable();
+        let variable = model.effects[i].name.definition().depends_on();
         let standing = whole.standing(&evaluator.densities(&less), variable);
         if let Some(against) = standing.against {
             let (over, form) = (against.inputs, against.most);
