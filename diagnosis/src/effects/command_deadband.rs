@@ -2,7 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 pub(super) struct Defined;
 

@@ -5,7 +5,7 @@ use super::definition::{
     Span,
 };
 use super::{Effect, EffectName, State, Subsystem};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
 
 /// Resonance above which a spring holds like a solid shaft, Hz.

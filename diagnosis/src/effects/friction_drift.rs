@@ -5,7 +5,7 @@ use super::definition::{
 };
 use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem, experiments};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct Law {

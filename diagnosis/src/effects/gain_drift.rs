@@ -7,7 +7,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
 };
 use super::{Effect, EffectName, State, Subsystem, experiments};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct Law {

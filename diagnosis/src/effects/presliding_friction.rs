@@ -7,7 +7,7 @@ use super::definition::{
 };
 use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 /// Longest over shortest of the lengths over which bristles bend, where they are not all alike: asperities of many sizes.
 const SPREAD: f64 = 10.0;

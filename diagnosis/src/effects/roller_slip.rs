@@ -6,7 +6,7 @@ use super::definition::{
 };
 use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
 use super::{Effect, EffectName, State, Subsystem, experiments};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct Law(Load);

@@ -6,7 +6,7 @@ use super::definition::{
 };
 use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem, Variable};
-use crate::numerics::golden::logarithmic;
+use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct Law {

@@ -2,5 +2,5 @@
 
 pub(crate) mod bootstrap;
 pub(crate) mod digits;
-pub(crate) mod golden;
+pub(crate) mod golden_section;
 pub(crate) mod linear;

@@ -10,10 +10,10 @@ use crate::estimation::noise::Colour;
 use crate::estimation::refit::is_driven;
 use crate::selection::context::FittedModel;
 use crate::selection::excitation::Excitation;
-use crate::validation::assess::{Scales, WeighedModel, weigh};
 use crate::validation::comparison::Shown;
-use crate::validation::held_out::HeldOut;
-use crate::validation::opponent::{self, Beside, Unnamed};
+use crate::validation::confidence_pass::{Scales, WeighedModel, weigh};
+use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library::{self, Foreign};
 
 /// Everything that the decision rests on.
@@ -21,7 +21,7 @@ pub(crate) struct Assessment {
     /// The fitted recordings in the motion of the model that was found.
     pub(crate) fit: Vec<BlockedRecording>,
     /// The recordings that judge, in that motion.
-    pub(crate) holdout: HeldOut,
+    pub(crate) holdout: HoldoutSet,
     pub(crate) excitation: Excitation,
     /// The null under coloured noise.
     pub(crate) null: FittedModel,
@@ -30,7 +30,7 @@ pub(crate) struct Assessment {
     /// The model found, its effects weighed.
     pub(crate) weighed: WeighedModel,
     /// What a force of any form takes beside the named effects.
-    pub(crate) beside: Option<Beside>,
+    pub(crate) beside: Option<FreeFormShare>,
     /// The force of any form that explains most, where nothing is named, and the refit with it beside.
     pub(crate) unnamed: Option<Unnamed>,
     pub(crate) with_unnamed: Option<Shown>,
@@ -52,9 +52,10 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     if let Some(reason) = misfit(&weighed, nominal).filter(|_| is_driven(nominal, &fit)) {
         return Err(reason);
     }
-    let (weighed, beside) = opponent::oppose(weighed, &context);
+    let (weighed, beside) = free_form_check::check(weighed, &context);
     let nothing_named = weighed.named().is_empty();
-    let unnamed = nothing_named.then(|| opponent::alone(&context, &refit, &holdout, &null.noise)).flatten();
+    let unnamed =
+        nothing_named.then(|| free_form_check::alone(&context, &refit, &holdout, &null.noise)).flatten();
     let (unnamed, fitted) = unnamed.map_or((None, None), |(unnamed, fitted)| (Some(unnamed), fitted));
     let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
     let with_unnamed = fitted.map(show);

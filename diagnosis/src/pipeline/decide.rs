@@ -15,10 +15,10 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch, Verdict};
 use crate::selection::context::FittedModel;
-use crate::validation::assess::{WeighedEffect, WeighedModel};
 use crate::validation::comparison::Shown;
+use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
+use crate::validation::free_form_check::{FreeFormShare, Unnamed};
 use crate::validation::known_travel;
-use crate::validation::opponent::{Beside, Unnamed};
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
@@ -146,7 +146,7 @@ impl Decision<'_> {
 }
 
 /// What a force of any form takes: alone, where nothing is named, or beside the named effects.
-fn free_form(unnamed: Option<&Unnamed>, beside: Option<&Beside>) -> Option<FreeForce> {
+fn free_form(unnamed: Option<&Unnamed>, beside: Option<&FreeFormShare>) -> Option<FreeForce> {
     let (taken, share_of_ceiling) = match (unnamed, beside) {
         (Some(unnamed), _) => (&unnamed.taken, 0.0),
         (None, Some(beside)) => (&beside.taken, beside.share),

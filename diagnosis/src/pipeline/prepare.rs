@@ -15,7 +15,7 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
 use crate::selection::context::{FitContext, FittedModel};
-use crate::validation::held_out::HeldOut;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::residuals::{drive_force, forces};
 
 /// Rig and recordings before any effect is looked for.
@@ -26,7 +26,7 @@ pub(crate) struct Prepared {
     /// The recordings that are fitted, in the motion of the refitted nominal model.
     pub(crate) fit: Vec<BlockedRecording>,
     /// The recordings that judge.
-    pub(crate) holdout: HeldOut,
+    pub(crate) holdout: HoldoutSet,
     pub(crate) span: Span,
     /// Acceleration that the command makes: the scale of the noise search.
     pub(crate) scale: f64,
@@ -57,7 +57,7 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
     let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
-    let mut holdout = HeldOut::new(holdout);
+    let mut holdout = HoldoutSet::new(holdout);
     holdout.follow(&first, &nominal, &span, scale);
     search.find(&mut holdout.filtered, asked, spread);
     holdout.share_jumps();

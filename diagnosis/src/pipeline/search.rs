@@ -13,9 +13,9 @@ use crate::estimation::refit;
 use crate::selection::context::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
+use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
-use crate::validation::held_out::HeldOut;
-use crate::validation::judge::judge_all;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residuals::forces;
@@ -29,7 +29,7 @@ pub(crate) struct Found {
     /// The fitted recordings in the motion of the model that was found.
     pub(crate) fit: Vec<BlockedRecording>,
     /// The recordings that judge, in that motion.
-    pub(crate) holdout: HeldOut,
+    pub(crate) holdout: HoldoutSet,
     /// The null under coloured noise.
     pub(crate) null: FittedModel,
     pub(crate) standing: StandingModel,
@@ -62,7 +62,7 @@ struct SearchState {
     white: FittedModel,
     slow: FittedModel,
     tracks: Vec<BlockedRecording>,
-    holdout: HeldOut,
+    holdout: HoldoutSet,
 }
 
 /// What was looked at so far.
@@ -141,7 +141,7 @@ impl Search<'_> {
     }
 
     /// The held-out recordings in the motion of a model.
-    fn followed(&self, holdout: &HeldOut, model: &FittedModel) -> HeldOut {
+    fn followed(&self, holdout: &HoldoutSet, model: &FittedModel) -> HoldoutSet {
         let Prepared { nominal, span, scale, .. } = self.prepared;
         let mut holdout = holdout.clone();
         holdout.follow(model, nominal, span, *scale);
@@ -196,7 +196,8 @@ impl Search<'_> {
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, &on);
         let own = self.context(&tracks);
         let holdout = self.followed(&now.holdout, &white);
-        let judged = judge_all(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
+        let judged =
+            gather_evidence(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
         let last = white.model.effects.len() - 1;
         let rejection = judged.rejection().or_else(|| parameters::absence(&own, &white, last));
         let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
@@ -229,7 +230,7 @@ impl Search<'_> {
             let own = self.context(&tracks);
             let holdout = self.followed(&now.holdout, &white);
             let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
-            let judged = judge_all(&own, &white, &slow.noise, &holdout);
+            let judged = gather_evidence(&own, &white, &slow.noise, &holdout);
             if judged.iter().all(|judged| judged.rejection().is_none()) {
                 let state = SearchState { white, slow, tracks, holdout };
                 return Some(Next { state, generalises: true });

@@ -7,8 +7,8 @@ use crate::estimation::model::Nominal;
 use crate::io::schema::Verdict;
 use crate::selection::excitation::Excitation;
 use crate::thresholds::UNDERSTOOD;
-use crate::validation::assess::WeighedModel;
 use crate::validation::comparison::Shown;
+use crate::validation::confidence_pass::WeighedModel;
 use crate::validation::residual_maps::Map;
 use crate::validation::residuals::{above, refit_matters};
 

@@ -4,12 +4,12 @@ pub(crate) mod axes;
 pub mod exports;
 mod form_in_words;
 pub(crate) mod free_form;
-#[cfg(test)]
-mod golden;
 mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
 pub(crate) mod outcome;
+#[cfg(test)]
+mod sentence_snapshots;
 pub mod simulation_page;
 pub(crate) mod text;
 mod write;

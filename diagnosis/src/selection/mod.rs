@@ -8,6 +8,6 @@ pub(crate) mod free_form;
 pub(crate) mod joint;
 pub(crate) mod periodic;
 pub(crate) mod predictive;
-pub(crate) mod score_test;
+pub(crate) mod score_statistic;
 pub(crate) mod search;
 pub(crate) mod shape_search;

@@ -6,11 +6,11 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
 use crate::estimation::model::{Model, Nominal, effective_command};
-use crate::numerics::golden::golden;
+use crate::numerics::golden_section::golden;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
 use crate::selection::context::FitContext;
-use crate::selection::score_test::{Sums, Terms, project};
+use crate::selection::score_statistic::{Sums, Terms, project};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 

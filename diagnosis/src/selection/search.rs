@@ -5,12 +5,12 @@ use crate::effects::{Effect, EffectName as N};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::numerics::golden::golden;
+use crate::numerics::golden_section::golden;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel, cost};
 use crate::selection::joint;
 use crate::selection::periodic::{self, Searched};
-use crate::selection::score_test;
+use crate::selection::score_statistic;
 use crate::selection::shape_search::descend;
 use rayon::prelude::*;
 
@@ -75,7 +75,7 @@ impl FitContext<'_> {
                 }
                 _ => {
                     let grid = candidates::shapes(*name, self.span, self.nominal);
-                    score_test::best_on_grid(
+                    score_statistic::best_on_grid(
                         &now.fit,
                         &residuals,
                         &now.model,
@@ -99,7 +99,7 @@ impl FitContext<'_> {
     /// Moves the shape of an effect to its largest score gain, one value after another.
     fn refine(&self, now: &FittedModel, residuals: &[Vec<f64>], mut effect: Effect) -> (Effect, f64) {
         let gain = |effect: &Effect| {
-            score_test::score(&now.fit, residuals, &now.model, self.tracks, effect, self.nominal).gain
+            score_statistic::score(&now.fit, residuals, &now.model, self.tracks, effect, self.nominal).gain
         };
         let movable = candidates::movable(&effect, self.span);
         let mut best = gain(&effect);

@@ -7,7 +7,7 @@ use crate::estimation::model::{Model, total};
 use crate::numerics::linear::Factor;
 use crate::selection::candidates;
 use crate::selection::context::FitContext;
-use crate::selection::score_test::{Terms, project};
+use crate::selection::score_statistic::{Terms, project};
 use rayon::prelude::*;
 
 /// Most steps, and the longest, as a change of a value's logarithm.

@@ -12,9 +12,9 @@ use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
 use crate::thresholds::{BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, MOST_IN_CLASS};
-use crate::validation::evidence::{EffectEvidence, Rival};
-use crate::validation::held_out::HeldOut;
-use crate::validation::holdout::evaluate_all;
+use crate::validation::acceptance_criteria::{EffectEvidence, Rival};
+use crate::validation::holdout_likelihood::evaluate_all;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub(crate) fn fit_rivals(
     context: &FitContext,
     last: &FittedModel,
     slow: &FittedModel,
-    holdout: &HeldOut,
+    holdout: &HoldoutSet,
     found: &mut [EffectEvidence],
 ) {
     let best = context.fit(last.model.clone(), &last.noise, Colour::White);
@@ -55,7 +55,7 @@ struct Contest<'a> {
     best: &'a FittedModel,
     /// The model under coloured noise.
     slow: &'a FittedModel,
-    holdout: &'a HeldOut,
+    holdout: &'a HoldoutSet,
 }
 
 /// A model with one more effect.

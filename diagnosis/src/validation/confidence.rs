@@ -6,7 +6,7 @@
 use crate::thresholds::{
     BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS,
 };
-use crate::validation::evidence::EffectEvidence;
+use crate::validation::acceptance_criteria::EffectEvidence;
 use std::collections::BTreeMap;
 
 /// What speaks for and against a name, by key; logarithms are natural.

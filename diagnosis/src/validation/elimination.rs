@@ -4,9 +4,9 @@ use crate::effects::EffectName;
 use crate::estimation::filter::Noise;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
-use crate::validation::evidence::EffectEvidence;
-use crate::validation::held_out::HeldOut;
-use crate::validation::judge::judge_all;
+use crate::validation::acceptance_criteria::EffectEvidence;
+use crate::validation::effect_evidence::gather_evidence;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 
@@ -34,14 +34,14 @@ pub(crate) struct StandingModel {
 pub(crate) fn eliminate(
     mut model: FittedModel,
     context: &FitContext,
-    holdout: &HeldOut,
+    holdout: &HoldoutSet,
     null_noise: &Noise,
     noise: &Noise,
 ) -> StandingModel {
     let mut rejected = Vec::new();
     loop {
         let plain = context.fit(model.model.clone(), noise, Colour::White);
-        let effects = judge_all(context, &plain, &model.noise, holdout);
+        let effects = gather_evidence(context, &plain, &model.noise, holdout);
         let weakest = effects
             .iter()
             .enumerate()

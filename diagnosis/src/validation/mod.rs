@@ -1,16 +1,16 @@
 //! What held-out recordings say of fitted models: gains, alternatives, residual maps, and how sure each effect is.
 
+pub(crate) mod acceptance_criteria;
 pub(crate) mod alternatives;
-pub(crate) mod assess;
 pub(crate) mod comparison;
 pub(crate) mod confidence;
+pub(crate) mod confidence_pass;
+pub(crate) mod effect_evidence;
 pub(crate) mod elimination;
-pub(crate) mod evidence;
-pub(crate) mod held_out;
-pub(crate) mod holdout;
-pub(crate) mod judge;
+pub(crate) mod free_form_check;
+pub(crate) mod holdout_likelihood;
+pub(crate) mod holdout_set;
 pub(crate) mod known_travel;
-pub(crate) mod opponent;
 pub(crate) mod out_of_library;
 pub(crate) mod parameters;
 pub(crate) mod rejection;

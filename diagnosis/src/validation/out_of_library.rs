@@ -9,8 +9,8 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
-use crate::validation::held_out::HeldOut;
-use crate::validation::judge::judge_all;
+use crate::validation::effect_evidence::gather_evidence;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::rejection::Rather;
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ pub(crate) struct Foreign {
 }
 
 /// Physics without a name that explains most of what a refit leaves where nothing is named, as surely as a name must.
-pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut) -> Option<Foreign> {
+pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HoldoutSet) -> Option<Foreign> {
     let all = like(None, context);
     let model = |foreign: &Unnamed| Model { effects: vec![foreign.effect.clone()], ..Model::default() };
     let merit = |foreign: &Unnamed| {
@@ -40,7 +40,7 @@ pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HeldOut
     let tried: Vec<(f64, Unnamed)> = all.into_par_iter().map(|foreign| (merit(&foreign), foreign)).collect();
     let (_, best) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = context.fit(model(&best), &refit.noise, Colour::White);
-    let found = judge_all(context, &fitted, &refit.noise, holdout).pop()?;
+    let found = gather_evidence(context, &fitted, &refit.noise, holdout).pop()?;
     let is_sure = found.rejection().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
     is_sure.then_some(Foreign { what: best.what, share: found.share.min(1.0) })
 }

@@ -7,7 +7,7 @@ use crate::estimation::input::Total;
 use crate::estimation::model::{Nominal, total};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::selection::context::FittedModel;
-use crate::validation::holdout::evaluate_all;
+use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::parameters;
 
 /// Residual force of a model over recordings, per block.

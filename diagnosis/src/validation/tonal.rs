@@ -3,7 +3,7 @@
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
-use crate::numerics::golden::golden;
+use crate::numerics::golden_section::golden;
 use crate::thresholds::MISTAKEN;
 use rayon::prelude::*;
 use std::f64::consts::TAU;

@@ -9,13 +9,13 @@ use crate::estimation::model::{Model, Nominal};
 use crate::estimation::noise::guess;
 use crate::estimation::refit::estimate_motion;
 use crate::selection::context::FittedModel;
-use crate::validation::holdout::evaluate_all;
+use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::known_travel::known;
 use std::borrow::Cow;
 
 /// Held-out recordings, both times in the order given.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct HeldOut {
+pub(crate) struct HoldoutSet {
     /// Each block's motion from the rows until then. Likelihood gains come from here: a smoother knows the disturbance from
     /// which a force is to be told.
     pub(crate) filtered: Vec<BlockedRecording>,
@@ -24,7 +24,7 @@ pub(crate) struct HeldOut {
     pub(crate) smoothed: Vec<BlockedRecording>,
 }
 
-impl HeldOut {
+impl HoldoutSet {
     /// Recordings of which nothing has been estimated yet.
     pub(crate) fn new(tracks: Vec<BlockedRecording>) -> Self {
         Self { filtered: tracks.clone(), smoothed: tracks }

@@ -6,14 +6,14 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
-use crate::validation::assess::WeighedModel;
-use crate::validation::held_out::HeldOut;
-use crate::validation::judge::judge_all;
+use crate::validation::confidence_pass::WeighedModel;
+use crate::validation::effect_evidence::gather_evidence;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rather;
 
 /// What a force of any form would take beside a model.
-pub(crate) struct Beside {
+pub(crate) struct FreeFormShare {
     pub(crate) taken: Taken,
     /// Part of what model and form take of left-out blocks that the model takes, 0 to 1.
     pub(crate) share: f64,
@@ -27,7 +27,10 @@ fn share(of_model: f64, taken: &Taken) -> f64 {
 /// Compares every effect that would be named with forces of any form; an effect is not named if one of them explains the data
 /// without it. Gives the weighed model with what its effects would rather be, and what a form takes beside all names, if there are
 /// any.
-pub(crate) fn oppose(mut weighed: WeighedModel, context: &FitContext) -> (WeighedModel, Option<Beside>) {
+pub(crate) fn check(
+    mut weighed: WeighedModel,
+    context: &FitContext,
+) -> (WeighedModel, Option<FreeFormShare>) {
     let named = weighed.named();
     if named.is_empty() {
         return (weighed, None);
@@ -48,7 +51,7 @@ pub(crate) fn oppose(mut weighed: WeighedModel, context: &FitContext) -> (Weighe
     let taken = whole.taken().into_iter().next().filter(|_| !weighed.named().is_empty());
     let beside = taken.map(|taken| {
         let of_model = whole.alone.over(&evaluator.alone(&Model::default())).sum;
-        Beside { share: share(of_model, &taken), taken }
+        FreeFormShare { share: share(of_model, &taken), taken }
     });
     (weighed, beside)
 }
@@ -66,7 +69,7 @@ pub(crate) struct Unnamed {
 pub(crate) fn alone(
     context: &FitContext,
     refit: &FittedModel,
-    holdout: &HeldOut,
+    holdout: &HoldoutSet,
     noise: &Noise,
 ) -> Option<(Unnamed, Option<FittedModel>)> {
     let evaluator = Evaluator::new(context.nominal, context.tracks, noise, context.scale);
@@ -79,6 +82,6 @@ pub(crate) fn alone(
         let effects = vec![Effect::tabled(shape.table.clone(), context.nominal.rig.turn())];
         context.fit(Model { effects, ..Model::default() }, &refit.noise, Colour::White)
     });
-    let judged = fitted.as_ref().and_then(|fitted| judge_all(context, fitted, noise, holdout).pop());
+    let judged = fitted.as_ref().and_then(|fitted| gather_evidence(context, fitted, noise, holdout).pop());
     Some((Unnamed { taken, shape, holdout_gain: judged.map(|found| found.holdout.sum) }, fitted))
 }

@@ -44,17 +44,26 @@ fn every_verdict_says_its_sentence() {
     ];
     let rest = "a.csv is at rest: it moves by 0 counts in all; record a motion of some turns";
     let cases = [
-        (report(Verdict::MissingPhysics, None, found), include_str!("golden/missing_physics.txt")),
-        (report(Verdict::NoMismatch, None, Vec::new()), include_str!("golden/no_mismatch.txt")),
-        (report(Verdict::ParametersOnly, None, Vec::new()), include_str!("golden/parameters_only.txt")),
+        (
+            report(Verdict::MissingPhysics, None, found),
+            include_str!("sentence_snapshots/missing_physics.txt"),
+        ),
+        (report(Verdict::NoMismatch, None, Vec::new()), include_str!("sentence_snapshots/no_mismatch.txt")),
+        (
+            report(Verdict::ParametersOnly, None, Vec::new()),
+            include_str!("sentence_snapshots/parameters_only.txt"),
+        ),
         (
             report(Verdict::Unexplained, Some("a force that swings by itself at 50 Hz is left"), Vec::new()),
-            include_str!("golden/unexplained.txt"),
+            include_str!("sentence_snapshots/unexplained.txt"),
         ),
-        (report(Verdict::RandomDisturbance, None, Vec::new()), include_str!("golden/random_disturbance.txt")),
+        (
+            report(Verdict::RandomDisturbance, None, Vec::new()),
+            include_str!("sentence_snapshots/random_disturbance.txt"),
+        ),
         (
             report(Verdict::InsufficientExcitation, Some(rest), Vec::new()),
-            include_str!("golden/insufficient_excitation.txt"),
+            include_str!("sentence_snapshots/insufficient_excitation.txt"),
         ),
     ];
     for (report, golden) in cases {

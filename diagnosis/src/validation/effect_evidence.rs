@@ -14,9 +14,9 @@ use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::periodic;
 use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::thresholds::DRIFT;
-use crate::validation::evidence::EffectEvidence;
-use crate::validation::held_out::HeldOut;
-use crate::validation::holdout::{self, HoldoutFit, evaluate_all};
+use crate::validation::acceptance_criteria::EffectEvidence;
+use crate::validation::holdout_likelihood::{self, HoldoutFit, evaluate_all};
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
@@ -25,11 +25,11 @@ use crate::validation::sizes::{played, sizes_on};
 const LEAST_EXPLAINABLE: f64 = 0.2;
 
 /// What speaks for each effect of a model fitted under white noise; its score is that under `slow`.
-pub(crate) fn judge_all(
+pub(crate) fn gather_evidence(
     context: &FitContext,
     last: &FittedModel,
     slow: &Noise,
-    holdout: &HeldOut,
+    holdout: &HoldoutSet,
 ) -> Vec<EffectEvidence> {
     let judging = holdout.judging(&last.model, context.span);
     let shown = holdout.shown(&last.model, context.span);
@@ -111,7 +111,7 @@ impl<'a> JudgedModel<'a> {
         let mut found = EffectEvidence {
             score_z: 0.0,
             rivals: Vec::new(),
-            holdout: holdout::compare(&self.on_holdout, &evaluated),
+            holdout: holdout_likelihood::compare(&self.on_holdout, &evaluated),
             fit: bootstrap(&gains),
             force: relative_gain(estimator, shown, &less.held_out, &left.held_out),
             share: self.share(&less),

@@ -12,12 +12,12 @@ use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
+use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover, Weakness};
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
-use crate::validation::evidence::EffectEvidence;
-use crate::validation::held_out::HeldOut;
+use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library;
 use crate::validation::parameters;
 use crate::validation::rejection::{Rather, Rejection};
@@ -197,7 +197,7 @@ pub(crate) struct Scales<'a> {
     pub(crate) refit: &'a FittedModel,
     /// The null under coloured noise.
     pub(crate) null: &'a FittedModel,
-    pub(crate) holdout: &'a HeldOut,
+    pub(crate) holdout: &'a HoldoutSet,
     pub(crate) excitation: &'a Excitation,
 }
 

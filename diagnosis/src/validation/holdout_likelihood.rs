@@ -105,7 +105,7 @@ fn best_shift(period: f64, highest: f64, value: impl Fn(f64) -> f64) -> f64 {
         }
     }
     let width = period / count as f64;
-    crate::numerics::golden::golden(at(best.0) - width, at(best.0) + width, 12, value)
+    crate::numerics::golden_section::golden(at(best.0) - width, at(best.0) + width, 12, value)
 }
 
 /// Lays a fitted model on a held-out recording under a noise.
