@@ -1,13 +1,14 @@
-//! Where a simulation and a recording differ, which physics was left out, how sure that is, and the proof.
+//! Diagnosis of the difference between a simulation and recordings: which physics was left out, how sure that is, and the evidence.
 //!
-//! Given a rig (the nominal simulation) and recordings, [`diagnose`] refits the nominal values, looks for the effects of
-//! [`effects::EffectName`] in what remains, judges them on recordings that were not used for fitting, and reports.
-//! This crate knows rigs and recordings; it may not know devices, links or plots of other crates.
+//! Given a rig (the nominal simulation) and recordings, [`diagnose`] refits the nominal values, searches the residual for the effects
+//! of [`effects::EffectName`], judges them on recordings that were not used for fitting, and reports. This crate knows rigs and
+//! recordings; it may not know devices, links or plots of other crates.
 //!
 //! Folders, each using only those before it: `numerics` (linear algebra, searches, bootstrap), `effects` (the laws), `io`
 //! (rigs, recordings, the report's shape), `simulation` (a rig run forward), `estimation` (blocks, filter, noise, fit),
-//! `selection` (candidates and their shapes), `validation` (held-out recordings) and `report` (what people read).
-//! `tests/layout.rs` holds them to it. What admits or rejects a name stands in `thresholds`, which all of them may read.
+//! `selection` (candidates and their shapes), `validation` (held-out recordings), `pipeline` (the stages, one after another) and
+//! `report` (sentences, pages and files). `tests/layout.rs` checks this, and that no files use each other in a circle. The numbers
+//! that admit or reject a name are in `thresholds`, which every folder may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
@@ -34,7 +35,7 @@ use recording::Recording;
 use rig::Rig;
 use std::path::PathBuf;
 
-/// What to diagnose.
+/// The files to diagnose.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// `rig.toml`.
@@ -47,7 +48,7 @@ pub struct Request {
     pub effects: Option<PathBuf>,
 }
 
-/// Reads, diagnoses and concludes. `progress` hears the stage and the fraction done.
+/// Reads the files, diagnoses the recordings and reports. `progress` receives the stage and the fraction done.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome, InputError> {
     progress("reading", 0.0);
     if request.fit.is_empty() || request.holdout.is_empty() {
@@ -68,7 +69,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     diagnose_recordings(&rig, &fit, &holdout, progress)
 }
 
-/// The same for a rig and recordings that are already read.
+/// Diagnoses recordings that are already read.
 pub fn diagnose_recordings(
     rig: &Rig,
     fit: &[Recording],

@@ -268,7 +268,7 @@ fn a_drive_that_is_limited_in_few_rows_is_no_outlier() {
 }
 
 #[test]
-fn friction_that_has_no_name_is_no_fault_of_the_command() {
+fn unmodelled_friction_is_not_reported_as_a_command_effect() {
     // The inertia takes two per cent of the drive's force.
     let machine = Machine { inertia: 0.02, viscous: 2.0, slow_grip: 2.5, ..AXIS };
     let taken = Taken { seconds: 12.0, ..BENCH };

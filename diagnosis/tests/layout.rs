@@ -1,4 +1,4 @@
-//! The folders of the crate stand in an order, and each uses only those before it: no circle, no arrow upward.
+//! The folders of the crate have an order, and each uses only those before it.
 
 use diagnosis::effects::EffectName;
 use std::fs;
@@ -72,7 +72,7 @@ fn each_folder_uses_only_those_before_it() {
     assert!(upward.is_empty(), "folders use what stands above them:\n{}", upward.join("\n"));
 }
 
-/// What stands beside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.
+/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.
 const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
 
 #[test]

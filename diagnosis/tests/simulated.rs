@@ -165,7 +165,7 @@ fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
         let spring = |h: &&diagnosis::report::Hypothesis| h.name.as_str() == "position_spring";
         let why = outcome.report.hypotheses.iter().find(spring).and_then(|h| h.rejected_because.clone());
         assert!(why.is_some_and(|why| why.contains("fade")), "{}", outcome.summary());
-        // What is not named is in the patched rig as a table at the most.
+        // What is not named is in the patched rig as a table at most.
         let is_table = |effect: &diagnosis::effects::Effect| effect.table.is_some();
         assert!(outcome.patched_rig.effects.iter().all(is_table), "{:?}", outcome.patched_rig.effects);
     }

@@ -1,4 +1,4 @@
-//! What stands between the command as recorded and the command that makes torque.
+//! Effects between the command as recorded and the command that makes torque.
 
 use super::Effect;
 use std::collections::VecDeque;

@@ -1,6 +1,6 @@
 //! Recordings that would tell effects apart, where more than one effect asks for the same.
 
-/// What depends on speed and what does not look alike at one.
+/// At one speed, effects that depend on speed look like those that do not.
 pub(crate) const SPEEDS: &str = "a staircase of constant speeds over two decades, both ways";
 
 /// A spring, a damping and a friction along the travel.
@@ -15,6 +15,6 @@ pub(super) const PHASE: &str = "a multisine in the command up to a fifth of the 
 /// A drive that clips and a joint that slips.
 pub(super) const BLOCKED: &str = "a ramp of the command against a blocked axis with the force measured: a drive that clips holds its force, one that slips lets it fall";
 
-/// What to record where no effect knows better.
+/// The recording to make where no effect asks for another.
 pub(crate) const RICH: &str =
     "a two-decade staircase of speeds both ways, followed by a multisine in the command";

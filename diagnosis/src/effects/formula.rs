@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::RwLock;
 
-/// What a formula may use of a state: speed, position from the start of the recording, command, time from its start, tilt.
+/// The variables of a formula: speed, position from the start of the recording, command, time from its start, tilt.
 const VARIABLES: [&str; 5] = ["v", "q", "u", "t", "tilt"];
 
 /// A formula as a file has it.
@@ -28,7 +28,7 @@ pub struct FormulaText {
     /// Least and largest value of each parameter.
     #[serde(default)]
     pub parameters: BTreeMap<String, [f64; 2]>,
-    /// What it is, in a few words.
+    /// A short noun phrase that says what it is.
     #[serde(default)]
     pub words: String,
 }
@@ -276,7 +276,7 @@ impl Formula {
         self.place();
     }
 
-    /// Whether the force jumps to its opposite where the speed turns, as dry friction does.
+    /// True if the force jumps to its opposite where the speed turns, as dry friction does.
     fn turns_with_speed(&self) -> bool {
         let linear = vec![1.0; self.linear.len()];
         let mut scratch = Vec::new();
@@ -296,12 +296,12 @@ impl Formula {
         if self.linear.is_empty() { vec![SCALE.to_owned()] } else { self.linear.clone() }
     }
 
-    /// What enters non-linearly, with bounds.
+    /// Returns the parameters that enter non-linearly, with their bounds.
     pub(super) fn shape(&self) -> &[(&'static str, f64, f64)] {
         &self.shape
     }
 
-    /// Whether it uses a variable.
+    /// True if it uses a variable.
     pub fn uses(&self, variable: &str) -> bool {
         self.expression.var_names().iter().any(|name| name == variable)
     }

@@ -10,7 +10,7 @@ use crate::numerics::golden_section::logarithmic;
 #[derive(Debug, Clone)]
 struct Law {
     time_constant: f64,
-    /// What is not there does not drift.
+    /// True if only dry friction drifts, because the rig has no viscous friction.
     dry_only: bool,
 }
 

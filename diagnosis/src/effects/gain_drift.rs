@@ -1,6 +1,6 @@
 //! A torque constant that changes over the recording, as magnets and winding heat: `change·drive·h`. Either h follows the time alone,
 //! `1 - exp(-t/time_constant)`, or, with `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
-//! command and h nought at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
+//! command and h zero at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
 //! `at_once_s` the load changes at once, which has no name and speaks only against others.
 
 use super::definition::{

@@ -19,6 +19,6 @@ pub(crate) struct JointTerms {
     /// Time between command and force, and time constant of their first-order lag, s.
     pub(crate) delay: f64,
     pub(crate) lag: f64,
-    /// What a joint and its motor cannot say.
+    /// Notes on what a joint and its motor cannot express.
     pub(crate) notes: Vec<String>,
 }

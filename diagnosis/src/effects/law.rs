@@ -12,7 +12,7 @@ pub struct State {
     pub velocity: f64,
     /// rad/s² or m/s²; asked only by what no plant has.
     pub acceleration: f64,
-    /// Whether the sign of the velocity is unknown: friction is a reaction then and not in the model.
+    /// True if the sign of the velocity is unknown: friction is a reaction then and not in the model.
     pub rest: bool,
     /// Force that the command asks for: gain · effective command, N·m or N.
     pub drive: f64,
@@ -67,12 +67,12 @@ impl Law {
         &self.names
     }
 
-    /// Whether the terms are travel added to what the encoder reads, rather than force.
+    /// True if the terms are travel added to what the encoder reads, rather than force.
     pub fn in_sensor(&self) -> bool {
         self.name.definition().in_sensor()
     }
 
-    /// Whether the force is dry friction, which holds an axis at rest rather than moving it.
+    /// True if the force is dry friction, which holds an axis at rest rather than moving it.
     pub fn is_dry(&self) -> bool {
         self.name.definition().is_dry()
     }

@@ -38,7 +38,7 @@ pub(crate) struct Load {
     lead: Option<(f64, f64)>,
 }
 
-/// What friction and forces on the load do, as accelerations.
+/// Accelerations by friction and by forces on the load.
 struct Held {
     /// To the motor's lead, against it.
     apart: f64,

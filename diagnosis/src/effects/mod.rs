@@ -26,7 +26,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Where an effect sits.
+/// The subsystem that an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs)]
@@ -109,12 +109,12 @@ impl EffectName {
         }
     }
 
-    /// Where it sits.
+    /// Returns the subsystem that it belongs to.
     pub fn subsystem(self) -> Subsystem {
         self.definition().subsystem()
     }
 
-    /// What it is, in words a technician uses.
+    /// Returns a noun phrase for it that a technician understands.
     pub fn in_words(self) -> &'static str {
         self.definition().words()
     }
@@ -129,8 +129,7 @@ impl Serialize for EffectName {
 impl<'de> Deserialize<'de> for EffectName {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let name = String::deserialize(from)?;
-        Self::find(&name)
-            .ok_or_else(|| serde::de::Error::custom(format!("{name} is no effect that is known")))
+        Self::find(&name).ok_or_else(|| serde::de::Error::custom(format!("{name} is not a known effect")))
     }
 }
 
@@ -146,9 +145,9 @@ impl fmt::Display for EffectName {
 pub struct Effect {
     /// Which effect.
     pub name: EffectName,
-    /// What enters non-linearly, by name; SI units, command units or cycles per turn.
+    /// Values that enter non-linearly, by name; SI units, command units or cycles per turn.
     pub shape: BTreeMap<String, f64>,
-    /// What enters linearly, by the name of its term; force units or relative.
+    /// Values that enter linearly, by the name of their term; force units or relative.
     pub coefficients: BTreeMap<String, f64>,
     /// The force itself, where it has no name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -197,8 +196,7 @@ impl TryFrom<InFile> for Effect {
     fn try_from(file: InFile) -> Result<Self, String> {
         let InFile { name, title, formula, words, mut parameters, shape, coefficients, table } = file;
         if name != FORMULA {
-            let known =
-                EffectName::find(&name).ok_or_else(|| format!("{name} is no effect that is known"))?;
+            let known = EffectName::find(&name).ok_or_else(|| format!("{name} is not a known effect"))?;
             return Ok(Self { name: known, shape, coefficients, table });
         }
         let formula =
@@ -245,7 +243,7 @@ impl Effect {
         self.shape.get(key).copied().unwrap_or(otherwise)
     }
 
-    /// Whether a value of the shape that is a yes or no is a yes.
+    /// True if a value of the shape that stands for yes or no is set.
     pub(crate) fn is_set(&self, key: &str) -> bool {
         self.shape_or(key, 0.0) > 0.5
     }
@@ -271,7 +269,7 @@ impl Effect {
         waves
     }
 
-    /// Whether the numbers can be run; the reason where not.
+    /// Checks that the numbers can be run; the reason where not.
     pub(crate) fn check(&self) -> Result<(), String> {
         match (&self.table, self.name) {
             (Some(table), EffectName::Table) => table.check()?,
@@ -292,7 +290,7 @@ impl Effect {
         }
         for key in self.name.definition().needed() {
             if !self.shape.get(*key).is_some_and(|value| *value > 0.0) {
-                return Err(format!("shape.{key} must stand there and be above zero"));
+                return Err(format!("shape.{key} is required and must be above zero"));
             }
         }
         for (key, value) in &self.shape {

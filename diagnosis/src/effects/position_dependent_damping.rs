@@ -13,7 +13,7 @@ struct Law {
 }
 
 impl Law {
-    /// What an inertia J(q) takes beside a constant one, J′v²/2 and its part of the acceleration, by Lagrange's equation.
+    /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and its part of the acceleration.
     fn inertia(&self, state: &State, out: &mut [f64]) {
         let step = 1e-3 * 0.5 * (self.profile.high - self.profile.low);
         let mut beyond = vec![0.0; out.len()];

@@ -1,4 +1,4 @@
-//! A drive that lets go above a force ceiling; the law is in `load`.
+//! A drive that slips above a force limit; the law is in `load`.
 
 use super::definition::{
     Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
@@ -23,7 +23,7 @@ impl ForceLaw for Law {
     }
 }
 
-/// What a grip carries at the least over its load's own friction, of which the rig tells no more than this.
+/// Least force that a grip carries over its load's own friction, about which the rig says no more.
 const HOLDS: f64 = 0.9;
 
 pub(super) struct Defined;
@@ -96,7 +96,7 @@ impl EffectReport for Defined {
         Subsystem::Transmission
     }
     fn words(&self) -> &'static str {
-        "the drive lets go above a force ceiling"
+        "the drive slips above a force limit"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.

@@ -5,7 +5,7 @@ use super::{Effect, EffectName, State, Subsystem};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// What a force without a name may depend on.
+/// The variables that a force without a name may depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variable {
@@ -24,7 +24,7 @@ pub enum Variable {
 }
 
 impl Variable {
-    /// What reports call it.
+    /// Returns its name in reports.
     pub fn in_words(self) -> &'static str {
         match self {
             Self::Speed => "speed",
@@ -37,7 +37,7 @@ impl Variable {
     }
 }
 
-/// A force over a grid, straight between its places and level beyond its ends. A place that stands twice is a jump.
+/// A force over a grid, straight between its places and level beyond its ends. A place given twice is a jump.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The variables: one or two.
@@ -52,7 +52,7 @@ pub struct Table {
 const MOST: usize = 100_000;
 
 impl Table {
-    /// Whether the table can be run; the reason where not.
+    /// Checks that the table can be run; the reason where not.
     pub(crate) fn check(&self) -> Result<(), String> {
         if self.over.is_empty() || self.over.len() > 2 {
             return Err("table.over must hold one or two variables".into());
@@ -72,7 +72,7 @@ impl Table {
         let wanted: usize = self.grid.iter().map(Vec::len).product();
         if wanted > MOST || self.force.len() != wanted {
             return Err(format!(
-                "table.force must hold {wanted} values, one for every place, and {MOST} at the most"
+                "table.force must hold {wanted} values, one for every place, and at most {MOST}"
             ));
         }
         if self.grid.iter().flatten().chain(&self.force).any(|x| !x.is_finite() || x.abs() > 1e30) {

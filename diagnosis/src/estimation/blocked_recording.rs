@@ -27,7 +27,7 @@ pub(crate) struct BlockMotion {
 pub(crate) struct Jumps {
     /// Travel that the encoder seems to have lost so far, rad or m.
     pub(crate) lost: Vec<f64>,
-    /// What each block pays for a jump that was found to begin in it, nats.
+    /// The price of the jump that begins in each block, nats; zero where none does.
     pub(crate) price: Vec<f64>,
 }
 
@@ -86,7 +86,7 @@ impl BlockedRecording {
         self.rows = Arc::new(Rows::clone(&self.rows).with_command(command));
     }
 
-    /// What the filter needs of the recording.
+    /// Returns the view of the recording that the filter needs.
     pub(crate) fn observed(&self) -> Observed<'_> {
         let Blocks { start, span, tau1, tau2, reading_lag, z, quantum, .. } = &*self.blocks;
         let BlockMotion { rest, stuck, .. } = &self.motion;
@@ -104,7 +104,7 @@ impl BlockedRecording {
         n as f64 / (self.blocks.start[n - 1] + self.blocks.span[n - 1])
     }
 
-    /// Mean tilt over a block, rad, and mean load, N·m or N; nought where not recorded.
+    /// Mean tilt over a block, rad, and mean load, N·m or N; zero where not recorded.
     pub(crate) fn tilt_at(&self, block: usize) -> f64 {
         self.blocks.tilt.as_ref().map_or(0.0, |tilt| tilt[block])
     }
@@ -127,7 +127,7 @@ impl BlockedRecording {
         self.motion.v[block] + part.abs() * (self.motion.v[other] - self.motion.v[block])
     }
 
-    /// What an effective command does over each block; that of the command as it was sent where there is none.
+    /// Returns the input of an effective command; that of the command as sent where there is none.
     pub(crate) fn drive(&self, effective: Option<&[f64]>) -> Input {
         effective.map_or_else(|| Input::clone(&self.rows.command_input), |command| self.rows.input(command))
     }
@@ -158,7 +158,7 @@ impl BlockedRecording {
         }
     }
 
-    /// What the command alone does, with `gain` the acceleration per unit of it.
+    /// Returns the input of the command alone; `gain` is the acceleration per unit of it.
     pub(crate) fn command_total(&self, gain: f64) -> Total {
         let mut total = Total::zero(self.block_count());
         self.add_input(&mut total, &self.rows.command_input, gain);
@@ -191,14 +191,14 @@ impl BlockedRecording {
         sum / m as f64 * count
     }
 
-    /// Whether dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides.
+    /// True if dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides.
     pub(crate) fn stops_within(&self, block: usize) -> bool {
         let near = [block.saturating_sub(2), (block + 2).min(self.block_count() - 1)];
         let speed = self.motion.v[block].abs();
         speed < self.blocks.stops_from && near.iter().all(|other| speed < 0.5 * self.motion.v[*other].abs())
     }
 
-    /// Whether each segment is known all but for a few blocks.
+    /// Says of each segment whether the model knows all but a few of its blocks.
     pub(crate) fn known_segments(&self) -> impl Iterator<Item = bool> + '_ {
         self.blocks.segments.windows(2).map(|w| {
             let unknown = self.unknown[w[0]..w[1]].iter().filter(|x| **x).count();

@@ -10,7 +10,7 @@ use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 
-/// What a recording holds, block by block. All vectors have one entry per block unless said otherwise.
+/// The data of a recording, block by block. All vectors have one entry per block unless said otherwise.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     pub(crate) file: String,
@@ -55,7 +55,7 @@ pub(crate) struct Rows {
     pub(crate) hold: Vec<f64>,
     /// Command per row.
     pub(crate) command: Vec<f64>,
-    /// What the command does over each block.
+    /// The input of the command over each block.
     pub(crate) command_input: Input,
     /// Rows taken together for a resonance or a contact, and for a grip.
     pub(crate) of_contact: Slices,
@@ -108,7 +108,7 @@ impl Rows {
         self.hold.len() / self.per_block
     }
 
-    /// What a signal held row by row does over each block.
+    /// Returns the input of a signal held row by row.
     pub(crate) fn input(&self, signal: &[f64]) -> Input {
         let m = self.per_block;
         let n = self.blocks();

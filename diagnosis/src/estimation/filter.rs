@@ -25,7 +25,7 @@ pub(crate) struct Noise {
     pub(crate) rest: f64,
 }
 
-/// What the filter needs of a recording, block by block.
+/// A view of a recording for the filter, block by block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observed<'a> {
     /// Start and length of each block, s.
@@ -100,7 +100,7 @@ impl<const N: usize> Step<N> {
     }
 }
 
-/// Variance of the place at the start over that of one reading: as good as unknown, and far from rounding.
+/// Variance of the position at the start over that of one reading: practically unknown, and far from rounding errors.
 const DIFFUSE: f64 = 1e4;
 
 fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
@@ -116,7 +116,7 @@ fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
     p[1][1] = (speed * speed).max(error / (span * span));
     p[2][2] = noise.slow;
     if N == 4 {
-        // As unsure as the place of which it is the difference.
+        // Same variance as the position it is differenced from.
         p[3][3] = p[0][0];
     }
     p
@@ -258,7 +258,7 @@ impl Gains {
             .collect()
     }
 
-    /// What one unit of an input does to the whitened innovations, with the sign of a regressor.
+    /// Returns the response of the whitened innovations to one unit of an input, with the sign of a regressor.
     pub(crate) fn response(&self, track: &Observed, input: &Input) -> Vec<f64> {
         let all = 0..track.blocks();
         let free = |j: usize| !track.stuck[j];
@@ -274,19 +274,19 @@ impl Gains {
         }
     }
 
-    /// What a reading that jumps by one from block `over.start` on does there.
+    /// Returns the response to a reading that jumps by one from block `over.start` on.
     pub(crate) fn response_to_jump(&self, track: &Observed, over: Range<usize>) -> Vec<f64> {
         self.response_over(track, over, |_| [0.0, 0.0, 1.0])
     }
 
-    /// What a jump of speed by one within block `over.start` does there.
+    /// Returns the response to a jump of speed by one within block `over.start`.
     pub(crate) fn response_to_impact(&self, track: &Observed, over: Range<usize>) -> Vec<f64> {
         let (at, h) = (over.start, track.span[over.start]);
         let impact = [1.0, 0.5 * h, track.tau2[at] / h];
         self.response_over(track, over, |j| if j == at { impact } else { [0.0; 3] })
     }
 
-    /// What changes of speed, of position and of the reading in some blocks do to the innovations there.
+    /// Returns the response to changes of speed, of position and of the reading in some blocks.
     fn response_over(
         &self,
         track: &Observed,
@@ -326,7 +326,7 @@ impl Motion {
     }
 }
 
-/// What an estimate of the motion in a block may know.
+/// The rows that an estimate of the motion in a block may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Knows {
     /// Every row of the recording: the fixed-interval smoother, for recordings that are fitted.
@@ -358,7 +358,7 @@ fn motion_of<const N: usize>(track: &Observed, noise: &Noise, total: &Total, kno
     out
 }
 
-/// What the filter knew after a block's reading.
+/// The filter's state after a block's reading.
 struct Filtered<const N: usize> {
     state: [f64; N],
     covariance: Covariance<N>,
@@ -367,7 +367,7 @@ struct Filtered<const N: usize> {
     gain: [f64; N],
 }
 
-/// What the filter knows after each block's reading.
+/// Runs the filter; returns its state after each block's reading.
 fn filter<const N: usize>(track: &Observed, noise: &Noise, total: &Total) -> Vec<Filtered<N>> {
     let n = track.blocks();
     let mut filtered: Vec<Filtered<N>> = Vec::with_capacity(n);

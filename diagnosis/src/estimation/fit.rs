@@ -21,7 +21,7 @@ pub(crate) struct Prepared {
     pub(crate) gains: Gains,
     /// Per segment: (XᵀX with the residual as the last row and column).
     pub(crate) segments: Vec<Square>,
-    /// What the model pays per segment for jumps that were found in this recording itself, in log-likelihood.
+    /// The price per segment of the jumps found in this recording itself, in log-likelihood.
     surcharges: Vec<f64>,
     /// Bounds of the segments in blocks, and the weight of each.
     bounds: Vec<usize>,
@@ -75,7 +75,7 @@ impl Prepared {
         (self.bounds[segment]..self.bounds[segment + 1], self.weight[segment])
     }
 
-    /// What the model pays for jumps that were found in this recording itself, in log-likelihood.
+    /// Returns the price of the jumps found in this recording itself, in log-likelihood.
     pub(crate) fn surcharge(&self) -> f64 {
         self.surcharges.iter().sum()
     }
@@ -118,7 +118,7 @@ impl Prepared {
     }
 }
 
-/// What a model with lost counts pays in each segment of a recording for the jumps found in it, in log-likelihood.
+/// Returns the price that a model with lost counts pays for the jumps found in each segment of a recording, in log-likelihood.
 fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
     let has_jumps = model.effects.iter().any(|effect| effect.name.definition().is_of_jumps());
     let paid = |bounds: &[usize]| match track.jumps.price.get(bounds[0]..bounds[1]) {
@@ -164,7 +164,7 @@ pub(crate) struct Fit {
 /// A place in the common vector: its key and, where it is a recording's own, which.
 pub(crate) type Place = (Key, Option<usize>);
 
-/// Where each column of each recording stands in the common vector of coefficients.
+/// Returns the place of each column of each recording in the common vector of coefficients.
 pub(crate) fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<Place>) {
     let mut keys: Vec<Place> = Vec::new();
     let places = prepared

@@ -49,7 +49,7 @@ impl Estimator {
     }
 }
 
-/// What the sensor alone puts into an acceleration estimate of some bandwidth, root mean square.
+/// Returns the error of an acceleration estimate of some bandwidth that the sensor alone causes, root mean square.
 fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
     let mut sum = 0.0;
     let mut count = 0.0;
@@ -96,7 +96,7 @@ impl Estimator {
         out
     }
 
-    /// What reading whole counts alone puts into the residual on rows that move, root mean square: the smoothed motion is
+    /// Returns the residual that reading whole counts alone causes on rows that move, root mean square: the smoothed motion is
     /// read anew and goes through the estimator. Slow motion makes of it a sawtooth that no formula for white noise has.
     pub(crate) fn counting(&self, tracks: &[BlockedRecording], noise: &Noise, count: f64) -> f64 {
         let errors: Vec<Vec<f64>> = tracks
@@ -110,7 +110,7 @@ impl Estimator {
         self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
     }
 
-    /// What a white disturbance alone puts into the residual, as an acceleration, root mean square.
+    /// Returns the residual that a white disturbance alone causes, as an acceleration, root mean square.
     pub(crate) fn white(&self, noise: &Noise) -> f64 {
         // ∫ 1/(1 + (f/fc)⁶)² df over both sides = 2·fc · 5/6 · (π/6)/sin(π/6)
         let sixth = std::f64::consts::PI / 6.0;

@@ -1,6 +1,6 @@
-//! What acts on an axis, block by block: one input of a model, and the sum of all of them.
+//! Inputs of a model, block by block: each one, and the sum of all.
 
-/// What an input does over each block, from the state at the block's start.
+/// The effect of an input over each block, from the state at the block's start.
 #[derive(Debug, Clone)]
 pub(crate) enum Input {
     /// Acceleration held over each block, rad/s² or m/s² per unit.

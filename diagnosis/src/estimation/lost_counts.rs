@@ -6,7 +6,7 @@ use crate::estimation::fit::Fit;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
 
-/// What is asked of a jump and of a recording.
+/// The requirements on a jump and on a recording.
 #[derive(Clone, Copy)]
 pub(crate) struct Asked {
     /// Least gain of log-likelihood of a jump.
@@ -34,11 +34,11 @@ const FEWEST_AFTER: usize = 6;
 /// How often what is left is looked through again: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
-/// What a recording seems to have lost.
+/// The counts that a recording seems to have lost.
 pub(crate) struct Losses {
     /// Travel lost so far per block, rad or m; zero everywhere where too few jumps are seen.
     pub(crate) lost: Vec<f64>,
-    /// What the jump that begins in a block costs, nats. When counts get lost and how many nobody can tell beforehand, so every
+    /// The price of the jump that begins in a block, nats. When counts get lost and how many nobody can tell beforehand, so every
     /// jump is found in the very recording that it explains; less this price its gain is at most what the recording is likelier
     /// where each block is as likely to hold it and its size is drawn from a normal distribution of `spread` (Laplace's
     /// approximation of the marginal likelihood), which noise cannot gain by on the mean.
@@ -47,13 +47,13 @@ pub(crate) struct Losses {
     pub(crate) sizes: Vec<f64>,
 }
 
-/// Root mean square of sizes, a count at the least.
+/// Root mean square of sizes, a count at least.
 pub(crate) fn spread_of(sizes: &[f64], count: f64) -> f64 {
     let square = sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64;
     square.sqrt().max(count)
 }
 
-/// What a recording lost, from what a fit of it alone that knows of no jumps leaves; `spread` is how large jumps are where
+/// Finds the counts that a recording lost in the residual of a fit of it alone without jumps; `spread` is the size of jumps where
 /// other recordings tell, rad or m.
 pub(crate) fn find(
     track: &BlockedRecording,
@@ -105,7 +105,7 @@ const FOLLOWS: f64 = 0.8;
 const TELLING: usize = 6;
 const SURELY: f64 = 3.0;
 
-/// Whether jumps come just after the command has changed: what is lost is lost whatever the drive does, what a spring in the
+/// True if jumps come just after the command has changed: what is lost is lost whatever the drive does, what a spring in the
 /// drive takes up is not.
 fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     if jumps.len() < TELLING {
@@ -125,11 +125,11 @@ fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
         0.5 * (below + up_to) as f64 / all.len().max(1) as f64
     };
     let ranks: f64 = jumps.iter().map(|jump| rank(change(jump.block))).sum::<f64>() / jumps.len() as f64;
-    // Ranks that are even between nought and one have a variance of a twelfth.
+    // Ranks that are even between zero and one have a variance of a twelfth.
     ranks > FOLLOWS && ranks - 0.5 > SURELY / (12.0 * jumps.len() as f64).sqrt()
 }
 
-/// Whether jumps come at one angle of the turn: that is a fault of the scale, told as what it is.
+/// True if jumps come at one angle of the turn: that is a fault of the encoder's scale.
 fn follows_angle(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     let Some(turn) = track.blocks.turn.filter(|_| jumps.len() >= TELLING) else { return false };
     let angle = |jump: &Jump| std::f64::consts::TAU * track.motion.x[jump.block] / turn;
@@ -175,7 +175,7 @@ fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: 
     apart
 }
 
-/// What falls into a block shows in part in it and whole in the next one: a response from some block on and the same from the
+/// A jump within a block shows in part in it and whole in the next one: a response from some block on and the same from the
 /// next one on, neither against the other.
 struct Pair {
     first: f64,
@@ -185,7 +185,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// What a response and a later one, as far as `left` goes, explain of what is left.
+    /// Fits a response and a later one to the residual `left`.
     fn new(response: &[f64], later: &[f64], left: &[f64]) -> Self {
         let (square, square_later) = (dot(response, response).max(1e-300), dot(later, later).max(1e-300));
         let both = dot(response, later);
@@ -315,7 +315,7 @@ mod tests {
 
     const ROWS_PER_S: f64 = 5000.0;
 
-    /// What is found to be lost, counts, and the blocks' starts, s, on an axis whose reading and speed change as told.
+    /// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading moves by `counts`.
     fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
         let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
         let recording = Recording {

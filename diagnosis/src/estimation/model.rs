@@ -33,7 +33,7 @@ pub(crate) enum Key {
 pub(crate) struct Column {
     pub(crate) key: Key,
     pub(crate) input: Input,
-    /// Whether each recording has a coefficient of its own.
+    /// True if each recording has a coefficient of its own.
     pub(crate) own: bool,
     pub(crate) prior: Prior,
 }
@@ -46,13 +46,14 @@ pub(crate) struct Nominal {
     pub(crate) external: f64,
     /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard deviation).
     pub(crate) anchor: Option<(f64, f64)>,
-    /// Whether the refit explains most of the force.
+    /// True if the refit explains most of the force.
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
     pub(crate) virtual_inertia: f64,
 }
 
-/// What the law of a joint takes from the whole machine, all per inertia: per unit of command and of the measured load, by dry
+/// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command and of the measured load, by
+/// dry
 /// and viscous friction, and by the weight.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Machine {
@@ -136,12 +137,12 @@ impl Nominal {
         self.rig.model.offset.is_some()
     }
 
-    /// Whether the nominal model holds an effect already, so that it cannot have been left out.
+    /// True if the nominal model holds an effect already, so that it cannot have been left out.
     pub(crate) fn holds(&self, name: EffectName) -> bool {
         name.definition().nominal_term().is_some_and(|term| self.has(term))
     }
 
-    /// Whether the nominal model has a term.
+    /// True if the nominal model has a term.
     pub(crate) fn has(&self, term: NominalTerm) -> bool {
         let model = &self.rig.model;
         match term {
@@ -190,7 +191,7 @@ impl Nominal {
         }
     }
 
-    /// What the coefficient of an effect's term may be for the effect to be what its name says.
+    /// Returns the bounds of a term's coefficient within which the effect is what its name says.
     pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
         let model = &self.rig.model;
         let most = |held: NominalTerm, value| self.has(held).then(|| self.most_friction(value));
@@ -206,7 +207,7 @@ impl Nominal {
         name.definition().limits(term, &allowed)
     }
 
-    /// Most that a friction of the rig may be over the inertia: twice what the rig says, anything where it says nought.
+    /// Most that a friction of the rig may be over the inertia: twice what the rig says, any where it says zero.
     fn most_friction(&self, value: Option<f64>) -> f64 {
         let most = 2.0 * value.unwrap_or(0.0) / self.known_inertia();
         if most > 0.0 { most } else { f64::INFINITY }
@@ -222,7 +223,7 @@ impl Nominal {
         }
     }
 
-    /// Whether effective commands leave less of the command of some recordings than may be left.
+    /// True if effective commands ignore more of the command than is allowed.
     pub(crate) fn ignores_too_much(&self, tracks: &[BlockedRecording], effective: &[Vec<f64>]) -> bool {
         let (mut taken, mut whole) = (0.0, 0.0);
         for (track, effective) in tracks.iter().zip(effective) {
@@ -238,7 +239,7 @@ impl Nominal {
         dry / self.known_inertia()
     }
 
-    /// What the law of a joint takes from the whole machine: each value as `fitted` has it, or as the rig has it.
+    /// Returns the values of the whole machine that the law of a joint uses: each as `fitted` has it, or as the rig has it.
     pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> Machine {
         let model = &self.rig.model;
         let fitted = |key: Key, otherwise: f64| fitted(key).unwrap_or(otherwise);

@@ -131,7 +131,7 @@ pub(crate) fn estimate(
     noise_at(&pattern_search(at, (lower, upper), moved_values, &value))
 }
 
-/// Where a pattern search for the largest value ends within bounds; only the first `moved_values` values move.
+/// Searches for the largest value within bounds by a pattern search; only the first `moved_values` values move.
 fn pattern_search(
     mut at: [f64; 4],
     (lower, upper): ([f64; 4], [f64; 4]),
@@ -171,7 +171,7 @@ fn pattern_search(
     at
 }
 
-/// Where the search starts before anything is known: `scale` is the acceleration that the command makes.
+/// Returns the start of the search before anything is known; `scale` is the acceleration that the command makes.
 pub(crate) fn guess(tracks: &[BlockedRecording], scale: f64) -> Noise {
     let span = tracks[0].blocks.span.iter().sum::<f64>() / tracks[0].block_count() as f64;
     Noise {

@@ -12,7 +12,7 @@ const BROKEN: f64 = 0.5;
 const FEW_COUNTS: f64 = 2000.0;
 /// Part of the force's variance that motion has to explain before its scale or sign is judged.
 const EXPLAINED: f64 = 0.6;
-/// How far off a scale may be before a unit is to blame, as a ratio, and how far from a thousand.
+/// Ratio from which a scale error is taken for a wrong unit, and the largest that is still taken for a factor of a thousand.
 const OFF: f64 = 250.0;
 const FAR: f64 = 4000.0;
 

@@ -3,7 +3,7 @@
 //! With ℓ the position less its filtered reading, ℓ′ = v − ℓ/τ. It is a state of its own beside position and speed, so
 //! every force, linear or not, acts on the axis and only the reading is filtered.
 
-/// What makes up the lag at some time in a block, per unit.
+/// The terms of the lag at some time in a block, per unit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LagTerms {
     /// Of the lag at the block's start.

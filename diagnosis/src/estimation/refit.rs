@@ -146,7 +146,7 @@ pub(crate) fn acceleration_scale(nominal: &Nominal, tracks: &[BlockedRecording])
     if of_command >= least { of_command.max(1e-12) } else { of_motion.max(1e-12) }
 }
 
-/// Whether the command drives the motion, rather than weight or a push at the start.
+/// True if the command drives the motion, rather than weight or a push at the start.
 pub(crate) fn is_driven(nominal: &Nominal, tracks: &[BlockedRecording]) -> bool {
     let square: f64 = tracks.iter().flat_map(|track| track.rows.command.iter()).map(|u| u * u).sum();
     let rows: f64 = tracks.iter().map(|track| track.rows.command.len() as f64).sum();

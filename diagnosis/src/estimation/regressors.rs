@@ -1,4 +1,4 @@
-//! What one effect puts into a recording: the inputs of its terms. Nothing here is fitted.
+//! The inputs of an effect's terms over a recording. Nothing here is fitted.
 
 use crate::effects::definition::Coupling;
 use crate::effects::{Effect, Law, State, Variable};
@@ -68,7 +68,7 @@ pub(crate) fn effect_inputs(
         .collect()
 }
 
-/// What a second mass does is faster than a block.
+/// The input of a second mass, which is faster than a block.
 fn of_second_mass(
     track: &BlockedRecording,
     coupling: Coupling,

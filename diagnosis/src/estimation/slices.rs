@@ -50,7 +50,7 @@ impl Slices {
         self.slices.chunks_exact(self.per_block)
     }
 
-    /// What a signal held slice by slice does over each block.
+    /// Returns the input of a signal held slice by slice.
     pub(crate) fn input(&self, signal: &[f64]) -> Input {
         let blocks = self.slices.len() / self.per_block;
         let [mut dv, mut dq, mut dz] = [0; 3].map(|_| Vec::with_capacity(blocks));

@@ -1,4 +1,4 @@
-//! What a user meets when a file cannot be used.
+//! The error for a file that cannot be used.
 
 use std::fmt;
 

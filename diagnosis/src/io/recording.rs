@@ -7,7 +7,7 @@ use std::path::Path;
 /// One recording. All columns have the same length.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
-    /// What reports call it: the file's name.
+    /// Its name in reports: the file's name.
     pub file: String,
     /// s, strictly increasing.
     pub time_s: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Recording {
     pub position_counts: Vec<f64>,
     /// Inclination below the horizontal, rad.
     pub tilt_rad: Option<Vec<f64>>,
-    /// What a position loop was asked to follow, counts.
+    /// The reference of a position loop, counts.
     pub reference_counts: Option<Vec<f64>>,
     /// An independently measured external load on the coordinate, N·m or N.
     pub force: Option<Vec<f64>>,
@@ -28,7 +28,7 @@ const COLUMNS: [&str; 6] = ["time_s", "command", "position_counts", "tilt_rad", 
 /// Larger than anything a sensor says, small enough that squares of squares stay finite.
 const LARGEST: f64 = 1e15;
 
-/// What a header is that is not one of fields between commas.
+/// Says what a header is that does not have fields between commas; none if it has.
 fn foreign(header: &str) -> Option<String> {
     let by = "let host-sim import read the file, or write it with";
     if header.starts_with(['#', '%']) {
@@ -222,7 +222,7 @@ impl Recording {
         self.time_s.len()
     }
 
-    /// Whether there are no rows.
+    /// True if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
@@ -238,7 +238,7 @@ impl Recording {
     }
 }
 
-/// What rows at a rate, Hz, can show and what not: a swing takes some five rows, and the command is held from row to row.
+/// Says what rows at a rate, Hz, can show: a swing takes some five rows, and the command is held from row to row.
 pub fn shown_at(rate_hz: f64) -> String {
     format!(
         "{rate_hz:.0} rows a second: shows what happens below about {:.0} Hz; delays and lags much shorter than {:.2} ms do not show",

@@ -8,7 +8,7 @@ use crate::io::known_keys;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What kind of coordinate the rig has.
+/// The kind of the rig's coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -114,7 +114,7 @@ fn unit_of_command() -> String {
 pub struct Encoder {
     /// Counts per rad or per m.
     pub counts_per_unit: f64,
-    /// Whether counts have the same zero in every recording.
+    /// True if counts have the same zero in every recording.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub absolute: bool,
     /// Standard deviation of a reading beyond its quantisation, counts.

@@ -4,7 +4,7 @@ use crate::effects::{EffectName, Subsystem, Variable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What the recordings say about the simulation.
+/// The verdict of the recordings on the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -76,7 +76,7 @@ pub struct Named {
     pub name: EffectName,
     /// Every effect that the data cannot tell from it, itself included.
     pub class: Vec<EffectName>,
-    /// Where it sits.
+    /// Returns the subsystem that it belongs to.
     pub subsystem: Subsystem,
     /// Probability that the class holds the truth.
     pub confidence: f64,
@@ -85,7 +85,7 @@ pub struct Named {
     /// Where it shows.
     #[serde(rename = "where")]
     pub place: Place,
-    /// What would decide within the class.
+    /// The recording that would decide within the class.
     pub separating_experiment: Option<String>,
 }
 
@@ -125,12 +125,12 @@ pub struct ByModel {
 pub struct WindowsOff {
     /// Their length, s.
     pub seconds: f64,
-    /// What they are off, rad or m.
+    /// Position error, rad or m.
     #[serde(flatten)]
     pub position: ByModel,
 }
 
-/// What the three models are off in position when they run forward beside the held-out recordings.
+/// Position errors of the three models when they run forward along the held-out recordings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
     /// rad or m.
@@ -170,7 +170,7 @@ pub struct Hypothesis {
     pub name: EffectName,
     /// Log-likelihood of the held-out recordings that it brings over the model without it; none where it was not judged there.
     pub holdout_gain: Option<f64>,
-    /// What speaks for and against it, as its confidence weighs it; only where it came through the search.
+    /// The evidence for and against it, as its confidence weighs it; only where it came through the search.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub evidence: Option<BTreeMap<String, f64>>,
     /// Every effect that the data cannot tell from it, itself included; only where it came through the search.
@@ -184,7 +184,7 @@ pub struct Hypothesis {
 /// A force of any form: what is there and has no name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FreeForm {
-    /// What it depends on.
+    /// The variables that it depends on.
     pub inputs: Vec<Variable>,
     /// Its form in words.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -216,19 +216,19 @@ pub struct Report {
     pub refitted: BTreeMap<String, f64>,
     /// Bandwidth of the residuals, Hz.
     pub residual_bandwidth_hz: f64,
-    /// What the sensor's noise alone puts into the residual, root mean square.
+    /// Residual that the sensor's noise alone causes, root mean square.
     pub noise_floor: f64,
     /// Part of the held-out mean square above the noise that the patched model leaves.
     pub unexplained_fraction: f64,
     /// Every hypothesis that was looked at closely.
     pub hypotheses: Vec<Hypothesis>,
-    /// What a force of any form takes beside the named effects.
+    /// The gain of a force of any form in addition to the named effects.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub free_form: Option<FreeForm>,
     /// Where the mismatch is, when nothing was named.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none", default)]
     pub place: Option<Place>,
-    /// What to record next, when the recordings cannot tell.
+    /// The recording to make next, when the recordings cannot tell.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub separating_experiment: Option<String>,
     /// The three models run forward beside the held-out recordings.

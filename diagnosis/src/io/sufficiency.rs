@@ -1,4 +1,4 @@
-//! Whether recordings can tell anything: the reasons to say that they cannot, before anything is fitted.
+//! The test whether recordings suffice for a diagnosis, before anything is fitted.
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -85,7 +85,7 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
     }
     let travel = counts / rig.encoder.counts_per_unit;
     let asked = rig.actuator.gain.abs() * largest / rig.model.inertia;
-    // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is nought, or is
+    // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is zero, or is
     // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
     if largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds {
         return Some(format!(

@@ -123,7 +123,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
 }
 
-/// Correlation of two signals of the same length; nought where one does not vary.
+/// Correlation of two signals of the same length; zero where one does not vary.
 pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len()).max(1) as f64;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
@@ -138,7 +138,7 @@ pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
 }
 
-/// What is known of a coefficient before the recordings, and how far it may go.
+/// The prior of a coefficient, with its bounds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prior {
     pub(crate) mean: f64,
@@ -157,7 +157,7 @@ impl Prior {
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
     pub(crate) x: Vec<f64>,
-    /// Whether a coefficient stands at a bound.
+    /// True if a coefficient stands at a bound.
     pub(crate) bound: Vec<bool>,
     /// Covariance with the prior, for unit residual variance; zero at bounds.
     pub(crate) covariance: Square,

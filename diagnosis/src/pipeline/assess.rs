@@ -29,7 +29,7 @@ pub(crate) struct Assessment {
     pub(crate) refit: FittedModel,
     /// The model found, its effects weighed.
     pub(crate) weighed: WeighedModel,
-    /// What a force of any form takes beside the named effects.
+    /// The gain of a force of any form in addition to the named effects.
     pub(crate) beside: Option<FreeFormShare>,
     /// The force of any form that explains most, where nothing is named, and the refit with it beside.
     pub(crate) unnamed: Option<Unnamed>,

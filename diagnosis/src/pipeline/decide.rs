@@ -69,7 +69,7 @@ pub(crate) fn decide(
     }))
 }
 
-/// What a decision looks at.
+/// The data that a decision rests on.
 struct Decision<'a> {
     prepared: &'a Prepared,
     assessment: &'a Assessment,
@@ -145,7 +145,7 @@ impl Decision<'_> {
     }
 }
 
-/// What a force of any form takes: alone, where nothing is named, or beside the named effects.
+/// Returns the gain of a force of any form: alone where nothing is named, otherwise in addition to the named effects.
 fn free_form(unnamed: Option<&Unnamed>, beside: Option<&FreeFormShare>) -> Option<FreeForce> {
     let (taken, share_of_ceiling) = match (unnamed, beside) {
         (Some(unnamed), _) => (&unnamed.taken, 0.0),
@@ -170,7 +170,7 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
     if before > 0.0 { (left / before).min(1.0) } else { 0.0 }
 }
 
-/// What was weighed, what was fitted in its place, and what was looked at on the way, each effect once.
+/// Returns the weighed effects, their rivals, and the hypotheses that were rejected on the way, each effect once.
 fn hypotheses(weighed: &WeighedModel) -> Vec<JudgedHypothesis> {
     let of_effect = |effect: &WeighedEffect| JudgedHypothesis {
         name: effect.found.effect.name,
@@ -204,7 +204,7 @@ fn hypotheses(weighed: &WeighedModel) -> Vec<JudgedHypothesis> {
     out
 }
 
-/// Where most of what no effect explains is.
+/// Returns the place of most of what no effect explains.
 fn top_place(holdout: &[BlockedRecording], left: &[Vec<f64>], maps: &[Map]) -> Place {
     let stretch = |(track, left): (&BlockedRecording, &Vec<f64>)| {
         let weight: Vec<f64> =

@@ -13,7 +13,7 @@ use crate::validation::rejection::{Rather, Rejection};
 use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 
-/// What comes out of the stages.
+/// The result of the stages.
 pub(crate) enum Diagnosis {
     /// The recordings cannot tell, and nothing was named.
     CannotTell {
@@ -59,13 +59,13 @@ pub(crate) struct Complete {
     pub(crate) errors: FitTable,
     /// Bandwidth of the residuals, Hz.
     pub(crate) bandwidth_hz: f64,
-    /// What the sensor's noise alone puts into the residual, N·m or N.
+    /// Residual that the sensor's noise alone causes, N·m or N.
     pub(crate) noise_floor: f64,
     /// Part of the held-out mean square above the noise that the patched model leaves.
     pub(crate) unexplained_fraction: f64,
     /// Where the mismatch is, where nothing was named.
     pub(crate) place: Option<Place>,
-    /// What a force of any form takes, alone where nothing is named or beside the named effects.
+    /// The gain of a force of any form: alone where nothing is named, otherwise in addition to the named effects.
     pub(crate) free_form: Option<FreeForce>,
     /// Travel that is to be recorded to fit on.
     pub(crate) beyond_fitted: Option<BeyondFitted>,
@@ -106,14 +106,14 @@ pub(crate) struct JudgedHypothesis {
     pub(crate) name: EffectName,
     /// Held-out gain over the model without it, nats; none where it was not judged there.
     pub(crate) holdout_gain: Option<f64>,
-    /// What its confidence rests on, where that decided.
+    /// The evidence, where the confidence decided.
     pub(crate) evidence: Option<Evidence>,
     pub(crate) class: Vec<EffectName>,
     /// Why it is not named; none if it is.
     pub(crate) rejection: Option<Rejection>,
 }
 
-/// What a force of any form takes.
+/// The gain of a force of any form.
 pub(crate) struct FreeForce {
     pub(crate) inputs: Inputs,
     /// Its shape, where nothing is named.
@@ -132,7 +132,7 @@ pub(crate) struct FreeForce {
 pub struct Series {
     /// The recording's file name.
     pub file: String,
-    /// Whether it was held out.
+    /// True if it was held out.
     pub held_out: bool,
     /// s since the first row.
     pub time_s: Vec<f64>,

@@ -19,7 +19,7 @@ use crate::io::rig::Rig;
 use crate::io::sufficiency;
 use diagnosis::{Diagnosis, Reason};
 
-/// What hears the stage and the fraction done.
+/// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
 /// Diagnoses recordings of a rig.

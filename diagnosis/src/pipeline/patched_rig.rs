@@ -1,4 +1,4 @@
-//! What an effect becomes: the entry of the patched rig, and the place where it acts.
+//! The patched rig, and the place where an effect acts.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::{Key, Nominal, total};
@@ -8,7 +8,7 @@ use crate::selection::context::FittedModel;
 use crate::validation::parameters;
 use crate::validation::residual_maps;
 
-/// Part of its nominal value that an inertia which hardly matters keeps at the least.
+/// Part of its nominal value that an inertia which hardly matters keeps at least.
 const LEAST_INERTIA: f64 = 0.1;
 
 /// The rig with refitted values and the effects found.
@@ -71,7 +71,7 @@ pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], la
     rig
 }
 
-/// Where an effect of the model acts: stretches of time, and the states in which it acts most.
+/// Returns the stretches of time, and the states, in which an effect of the model acts most.
 pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedModel, index: usize) -> Place {
     let mut place = Place::default();
     let mut pooled: Vec<(f64, f64)> = Vec::new();

@@ -35,7 +35,7 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    /// What the searches work on, with the recordings in some motion.
+    /// Returns the context of a search over recordings in some motion.
     pub(crate) fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
         FitContext { nominal: &self.nominal, tracks, span: &self.span, scale: self.scale }
     }
@@ -84,7 +84,7 @@ fn is_balanced(
     estimator.rms(&left, tracks) < BALANCED * estimator.rms(&force, tracks)
 }
 
-/// What a search for lost counts looks with.
+/// The context of a search for lost counts.
 struct JumpSearch<'a> {
     nominal: &'a Nominal,
     /// One count, rad or m.

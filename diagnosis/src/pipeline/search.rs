@@ -24,7 +24,7 @@ use rayon::prelude::*;
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
 
-/// What the search ends with.
+/// The result of the search.
 pub(crate) struct Found {
     /// The fitted recordings in the motion of the model that was found.
     pub(crate) fit: Vec<BlockedRecording>,
@@ -65,7 +65,7 @@ struct SearchState {
     holdout: HoldoutSet,
 }
 
-/// What was looked at so far.
+/// The candidates that were judged so far.
 #[derive(Default)]
 struct Tried {
     rejected: Vec<RejectedHypothesis>,
@@ -120,7 +120,7 @@ impl Search<'_> {
         before.unwrap_or(now)
     }
 
-    /// What of a model stands when all its effects are judged together.
+    /// Removes the effects that do not generalise when all are judged together.
     fn backward_elimination(&self, now: SearchState) -> Found {
         let SearchState { white, slow, tracks, holdout } = now;
         let context = self.context(&tracks);
@@ -129,7 +129,7 @@ impl Search<'_> {
         Found { fit: tracks, holdout, null, standing }
     }
 
-    /// What stands, in its own motion.
+    /// The model found, refitted to the motion that it implies.
     fn state(&self, found: &Found) -> SearchState {
         let context = self.context(&found.fit);
         let last = &found.standing.model;
@@ -240,7 +240,7 @@ impl Search<'_> {
     }
 }
 
-/// What became of a model with one more effect.
+/// The judgement of a model with one more effect.
 enum Judged {
     Generalises(SearchState),
     Rejected {

@@ -16,10 +16,10 @@ use crate::validation::residuals::{above, refit_matters};
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
-/// Part of the refit's mean square that doubtful effects must leave at the most for the mismatch to be called repeatable.
+/// Part of the refit's mean square that doubtful effects must leave at most for the mismatch to be called repeatable.
 const REPEATS: f64 = 0.7;
 
-/// Why the rig's model does not describe these recordings at all; none if it does.
+/// Returns why the rig's model does not describe these recordings at all; none if it does.
 pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason> {
     let table = &weighed.shown.table;
     let force = table.force_rms;

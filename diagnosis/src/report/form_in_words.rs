@@ -112,7 +112,7 @@ impl Sheet {
         self.places().map(|(_, _, f, w)| w * f * f).sum()
     }
 
-    /// Whether it acts against or with a motion of this direction, where most of it does.
+    /// True if it acts against or with a motion of this direction, where most of it does.
     fn sense(&self, direction: f64) -> &'static str {
         let sum: f64 = self.places().map(|(_, _, f, w)| w * f * direction).sum();
         let size: f64 = self.places().map(|(_, _, f, w)| w * f.abs()).sum();
@@ -209,7 +209,7 @@ fn mean(values: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     (if weight > 0.0 { sum / weight } else { 0.0 }, weight)
 }
 
-/// What a form does along one variable: places, and the force there with its weight.
+/// Says how a form changes along one variable, from places and the force there with its weight.
 fn along(variable: Variable, places: &[f64], values: &[(f64, f64)], length: &str) -> String {
     let name = variable.in_words();
     let seen: Vec<(f64, f64)> =
@@ -289,7 +289,7 @@ mod tests {
         ahead.iter().rev().map(|v| -v).chain(ahead.iter().copied()).collect()
     }
 
-    /// The sentence of a force over speed, or over another variable and speed; at a speed of nought the side counts.
+    /// The sentence of a force over speed, or over another variable and speed; at a speed of zero the side counts.
     fn told(other: Option<(Variable, Vec<f64>)>, force: impl Fn(f64, f64, f64) -> f64) -> String {
         let columns = speeds();
         let rows = other.as_ref().map_or(vec![0.0], |(_, places)| places.clone());

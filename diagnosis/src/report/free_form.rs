@@ -1,4 +1,4 @@
-//! What people are told of a force without a name: its entry in the report and its picture.
+//! A force without a name in the report: its entry and its picture.
 
 use crate::effects::Variable;
 use crate::io::rig::Kind;

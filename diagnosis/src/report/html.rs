@@ -57,20 +57,20 @@ fn motion(out: &mut String, outcome: &Outcome) {
     motion_picture::motions(out, first, if found { &["nominal", "patched"] } else { &["nominal", "refit"] });
     out.push_str(
         "<p class=note>In the first picture and in that of the speed the command alone drives the simulation and nothing corrects it: errors of \
-         force add up to errors of place. A line that leaves the picture has run away.</p>",
+         force add up to errors of position. A line that leaves the picture has diverged.</p>",
     );
     motion_picture::table(out, first);
     if let Some(worse) = outcome.report.simulation.as_ref().and_then(|s| s.worse.as_ref()) {
         let _ = write!(
             out,
-            "<p class=next><b>Mind:</b> {}. The force that it leaves is smaller all the same; <code>host-sim simulate --fit</code> fits its values to motion.</p>",
+            "<p class=next><b>Warning:</b> {}, although the force residual is smaller; <code>host-sim simulate --fit</code> fits its values to motion.</p>",
             safe(worse)
         );
     }
     out.push_str("</section>");
 }
 
-/// What to do with all this.
+/// Writes the next steps.
 fn next(out: &mut String, outcome: &Outcome) {
     let r = &outcome.report;
     let holdout = outcome.evidence.simulated.first().map_or("FILE.csv", |one| one.file.as_str());
@@ -79,7 +79,7 @@ fn next(out: &mut String, outcome: &Outcome) {
         .chain(&r.separating_experiment)
         .map(|experiment| {
             format!(
-                "Record what decides: {experiment}. On a device of this project `host-sim characterise --device /dev/ttyACM0 --out bench` \
+                "Record what would decide: {experiment}. On a device of this project `host-sim characterise --device /dev/ttyACM0 --out bench` \
                  plays it; then run `host-sim diagnose` again with the new files."
             )
         })

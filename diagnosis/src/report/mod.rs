@@ -1,4 +1,4 @@
-//! What people and files are told: the verdict, what to record next, the patched rig, and the pages. Nothing here fits.
+//! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
 pub(crate) mod axes;
 pub mod exports;

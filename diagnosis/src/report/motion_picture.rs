@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 /// Points that a line is drawn with.
 const POINTS: usize = 900;
-/// Rows a second in the CSV, at the most.
+/// Rows a second in the CSV, at most.
 const RATE_HZ: f64 = 1000.0;
 
 /// The class of a model in pictures: its colour.
@@ -20,7 +20,7 @@ fn class(model: &str) -> &'static str {
     }
 }
 
-/// What a model is, in words.
+/// Returns the name of a model in words.
 pub(crate) fn words(model: &str) -> &str {
     match model {
         "nominal" => "the simulation as it stands",
@@ -57,7 +57,7 @@ fn line(
     out.push_str("\"/>");
 }
 
-/// Where all but one in a hundred of the values lie.
+/// Returns the range of all but one in a hundred of the values.
 fn bulk(values: &[f64]) -> (f64, f64) {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -191,7 +191,8 @@ fn position(off: Off, unit: &str) -> String {
     format!("{} {unit}", short(off.position_rms))
 }
 
-/// What positions are off, in thousandths of the unit where some are below a thousandth: the factor and the unit's name.
+/// Returns the factor and the name of the unit for position errors: thousandths of the unit where some errors are below a
+/// thousandth.
 pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
     let unit = compared.kind.length();
     let figures = compared.models.iter().map(|m| &m.figures);
@@ -204,7 +205,7 @@ pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
     }
 }
 
-/// How far each model is off, in a table.
+/// Writes the errors of each model as a table.
 pub(crate) fn table(out: &mut String, compared: &Comparison) {
     let (factor, unit) = scale(compared);
     let _ = write!(out, "<div class=scroll><table><tr><th>position off, rms, {unit}</th>");

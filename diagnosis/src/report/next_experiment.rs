@@ -1,4 +1,4 @@
-//! What to record next: the experiment that would separate two effects, or show one at all.
+//! The recording to make next: the experiment that would separate two effects, or show one at all.
 
 use crate::effects::{EffectName as N, experiments};
 use crate::numerics::digits::short_within;
@@ -30,7 +30,7 @@ pub(crate) fn strokes(beyond: BeyondFitted, length: &str) -> String {
     )
 }
 
-/// What a recording needs so that a diagnosis is possible at all.
+/// A recording that makes a diagnosis possible.
 pub(crate) const GENERAL: &str = "ten seconds or more at 500 Hz or more with reversals, several speeds both ways and a \
     command that is not constant, for example a slow triangle with a multisine on top";
 

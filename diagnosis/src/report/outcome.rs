@@ -1,10 +1,10 @@
-//! What a diagnosis hands back: the report, the evidence behind it, the patched rig, and the files they become.
+//! The result of a diagnosis: the report, the evidence behind it, and the rigs.
 
 use crate::effects::EffectName;
 use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Verdict};
-use crate::numerics::digits::short;
+use crate::numerics::digits::{in_sentence, short};
 use crate::pipeline::diagnosis::{Complete, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
 use crate::report::{free_form, next_experiment, text};
 use crate::selection::free_form::Shape;
@@ -13,12 +13,12 @@ use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// What `report.html` plots.
+/// The data that `report.html` plots.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// Every recording, fitted first.
     pub series: Vec<Series>,
-    /// What the patched model leaves, over states.
+    /// Residuals of the patched model over states.
     pub maps: Vec<Map>,
     /// The models run forward beside the held-out recordings.
     pub simulated: Vec<Comparison>,
@@ -37,7 +37,7 @@ pub struct Evidence {
 pub struct Outcome {
     /// `diagnosis.json`.
     pub report: Report,
-    /// What is plotted.
+    /// The data that is plotted.
     pub evidence: Evidence,
     /// The rig as it was given.
     pub nominal_rig: Rig,
@@ -68,22 +68,22 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
             let region = report.effects.first().and_then(|e| e.place.states.first());
             let region = region.map_or(String::new(), |r| {
                 format!(
-                    "; it shows most for {} from {} to {}{}",
+                    "; strongest for {} {} to {}{}",
                     r.variable,
-                    short(r.low),
-                    short(r.high),
+                    in_sentence(r.low),
+                    in_sentence(r.high),
                     unit(&r.variable, kind)
                 )
             });
             format!(
-                "The simulation leaves something out: {out}{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
+                "The simulation leaves out {out}{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
                 percent(fit.refit.holdout),
                 percent(fit.patched.holdout)
             )
         }
         Verdict::NoMismatch => "The simulation explains the recordings down to their noise".into(),
         Verdict::ParametersOnly => format!(
-            "The simulation has the right structure and wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %",
+            "The simulation has the right structure but wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %",
             percent(fit.nominal.holdout),
             percent(fit.refit.holdout)
         ),
@@ -93,7 +93,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
             report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),
         Verdict::RandomDisturbance => format!(
-            "A disturbance of {:.1} % of the force acts on the axis that does not repeat and depends on nothing recorded",
+            "A disturbance of {:.1} % of the force acts on the axis; it does not repeat and depends on nothing that was recorded",
             percent(fit.patched.holdout)
         ),
         Verdict::InsufficientExcitation => format!(
@@ -115,7 +115,7 @@ pub(crate) fn unit(variable: &str, kind: Kind) -> String {
 }
 
 impl Outcome {
-    /// What is handed back of a diagnosis.
+    /// Makes the report and the evidence of a diagnosis.
     pub(crate) fn of(diagnosis: Diagnosis) -> Self {
         match diagnosis {
             Diagnosis::CannotTell { rig, reason, rate_hz } => Self::cannot_tell(&rig, &reason, rate_hz),
@@ -239,12 +239,12 @@ impl Outcome {
             .take(6)
             .collect();
         if !losers.is_empty() {
-            let _ = writeln!(out, "  looked at and rejected: {}", losers.join(", "));
+            let _ = writeln!(out, "  tested and rejected: {}", losers.join(", "));
         }
         out
     }
 
-    /// What the models leave, in force and in motion.
+    /// Writes the errors of the models in force and in motion.
     fn figures(&self, out: &mut String) {
         let r = &self.report;
         let f = &r.fit;
@@ -279,14 +279,14 @@ impl Outcome {
             };
             let _ = writeln!(
                 out,
-                "  held-out position off, free run: {} {}",
+                "  held-out position RMSE, free run: {} {}",
                 of(&simulation.free_run),
                 simulation.unit
             );
             if let Some(window) = simulation.windows.iter().find(|w| w.seconds >= 0.5) {
                 let _ = writeln!(
                     out,
-                    "  held-out position off, windows of {} s: {} {}",
+                    "  held-out position RMSE, windows of {} s: {} {}",
                     window.seconds,
                     of(&window.position),
                     simulation.unit

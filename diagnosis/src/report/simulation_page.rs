@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("report.css");
 
-/// What the models are off in a free run, in one sentence without its full stop.
+/// Returns the position errors of the models in a free run as one sentence without its full stop.
 pub fn sentence(compared: &Comparison) -> String {
     let (factor, unit) = scale(compared);
     let parts: Vec<String> = compared

@@ -6,7 +6,7 @@ use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE
 use crate::validation::confidence::Weakness;
 use crate::validation::rejection::{Rather, Rejection};
 
-/// Why an effect is not named, as a clause.
+/// Says why an effect is not named, as a clause.
 pub(crate) fn rejection(why: &Rejection) -> String {
     match why {
         Rejection::SlowDisturbance => "a slow disturbance explains as much".into(),

@@ -9,10 +9,10 @@ use crate::numerics::linear::correlation;
 use crate::thresholds::{AT_END, BRISTLES};
 use std::f64::consts::TAU;
 
-/// Correlation of tilt and angle from which on they are the same.
+/// Correlation of tilt and angle from which they count as the same.
 const SAME_ANGLE: f64 = 0.98;
 
-/// Whether the tilt of every recording follows its travel.
+/// True if the tilt of every recording follows its travel.
 fn tilt_is_angle(tracks: &[BlockedRecording]) -> bool {
     tracks.iter().all(|track| {
         track.blocks.tilt.as_ref().is_some_and(|tilt| correlation(tilt, &track.motion.x).abs() > SAME_ANGLE)
@@ -26,7 +26,7 @@ fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
     high - low > 1e-9 * (high.abs() + low.abs()).max(1e-300)
 }
 
-/// What recordings span whose motion is smoothed, and what the rig says of their machine.
+/// Returns the range of recordings whose motion is smoothed, with the rig's statement of their machine.
 pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
     let mut speeds: Vec<f64> = tracks.iter().flat_map(|t| t.motion.v.iter().map(|v| v.abs())).collect();
     speeds.sort_by(f64::total_cmp);
@@ -88,7 +88,7 @@ const RUNS_ON: f64 = 100.0;
 /// Part of the travel within which recordings must start for a law of the travel to be the same in all.
 const SAME_PLACE: f64 = 0.3;
 
-/// Whether a law of the travel may hold for all recordings.
+/// True if a law of the travel may hold for all recordings.
 fn has_stroke(span: &Span, nominal: &Nominal) -> bool {
     let runs_on = nominal.rig.kind == Kind::Rotary && span.travel() > RUNS_ON * TAU;
     match nominal.rig.encoder.start_spread {
@@ -106,8 +106,8 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
     name.definition().grid(name, span)
 }
 
-/// Whether an effect shows in such motion: where the inertia hardly matters, a command that holds a part of the motion is none to
-/// clip or to delay, no joint is seen by it, and its scale is what everything is told by.
+/// True if an effect shows in such motion. Where the inertia hardly matters, the command that holds a part of the motion cannot
+/// reveal saturation, delay or a joint, and its scale is the reference for everything else.
 pub(crate) fn is_seen(name: N, nominal: &Nominal) -> bool {
     nominal.virtual_inertia == 0.0 || !name.definition().is_of_command()
 }
@@ -117,7 +117,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<Movable> {
     effect.name.definition().movable(effect, span)
 }
 
-/// Whether a drift is at the end of what may be told from something else: what settles at once is how a recording begins,
+/// True if a drift is at the end of what may be told from something else: what settles at once cannot be told from how a recording begins,
 /// and what has hardly begun at its end is any slow change.
 pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
     effect.name.definition().drifts()

@@ -1,4 +1,4 @@
-//! What every search works on: the recordings with their nominal model, and fits of a model to them.
+//! The context of every search: the recordings with their nominal model, and fits of a model to them.
 
 use crate::effects::Effect;
 use crate::effects::definition::Span;
@@ -28,14 +28,14 @@ pub(crate) struct FitContext<'a> {
     pub(crate) scale: f64,
 }
 
-/// What one value that is fitted costs in log-likelihood: half the logarithm of the number of independent stretches is
+/// Cost of one fitted value in log-likelihood: half the logarithm of the number of independent stretches is
 /// about 3; shapes are searched and cost more.
 pub(crate) const PER_COEFFICIENT: f64 = 2.5;
 const PER_SHAPE: f64 = 4.0;
 /// Most effects that are named together.
 pub(crate) const MOST: usize = 3;
 
-/// What an effect's freedom costs.
+/// Returns the cost of an effect's freedom, nats.
 pub(crate) fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
     let movable = candidates::movable(effect, span).len() as f64;
     let coefficients = effect.name.definition().freedom(effect, tracks);
@@ -53,7 +53,7 @@ impl FitContext<'_> {
         FittedModel { model, noise, fit, merit }
     }
 
-    /// What the freedom of all effects of a model costs.
+    /// Returns the cost of the freedom of all effects of a model, nats.
     fn spent(&self, model: &Model) -> f64 {
         model.effects.iter().map(|effect| cost(effect, self.tracks.len(), self.span)).sum()
     }

@@ -1,4 +1,4 @@
-//! What recordings excite: how many speeds, how many amplitudes. What they never played they cannot tell apart.
+//! The range of speeds and amplitudes in recordings. Effects that look alike within it cannot be told apart.
 
 use crate::effects::definition::Shown;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -80,12 +80,12 @@ impl Excitation {
         Self { speeds, strokes, turns }
     }
 
-    /// Whether all motion is at about one speed.
+    /// True if all motion is at about one speed.
     pub(crate) fn is_one_speed(&self) -> bool {
         self.speeds < ONE_SPEED
     }
 
-    /// What decides between twins.
+    /// Returns what decides between twins.
     pub(crate) fn shown(&self) -> Shown {
         Shown {
             one_speed: self.is_one_speed(),

@@ -18,7 +18,7 @@ const SETTLED: usize = 2;
 const ROUNDS: usize = 8;
 const ENOUGH: f64 = 1.0;
 
-/// Whether the law of an effect is built on the rest of the machine.
+/// True if the law of an effect is built on the rest of the machine.
 pub(crate) fn is_joint(effect: &Effect) -> bool {
     effect.shape.contains_key("per_command")
 }

@@ -225,12 +225,12 @@ fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<u
 
 /// Longest run of neighbouring orders that teeth or poles make.
 const LONGEST_RUN: usize = 4;
-/// How near to a whole number an order is one.
+/// Distance from a whole number within which an order counts as whole.
 const MULTIPLE: f64 = 0.1;
 /// Part of the strongest amplitude that an order must have to count in a run.
 const STANDS: f64 = 0.2;
 
-/// Whether the waves found are those of teeth or poles. A well or a bump at one place needs all orders up to its width, one
+/// True if the waves found are those of teeth or poles. A well or a bump at one place needs all orders up to its width, one
 /// after the other, and repeats only because so little of the travel is seen. Orders count from the turn where it is known,
 /// otherwise from the longest wave.
 pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {

@@ -11,7 +11,7 @@ use crate::numerics::linear::{Factor, Square};
 use crate::selection::context::PER_COEFFICIENT;
 use rayon::prelude::*;
 
-/// What a score test says.
+/// The result of a score test.
 #[derive(Debug, Clone)]
 pub(crate) struct Score {
     /// Gain of log-likelihood if the terms were free.

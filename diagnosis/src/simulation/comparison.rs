@@ -10,7 +10,7 @@ use serde::Serialize;
 /// One model beside a recording.
 #[derive(Debug, Clone)]
 pub struct Simulated {
-    /// What it is called: nominal, refit, patched and so on.
+    /// Its name: nominal, refit, patched and so on.
     pub model: String,
     /// From the first row under the recorded command.
     pub free: Trajectory,
@@ -21,11 +21,11 @@ pub struct Simulated {
     pub under: Option<Trajectory>,
     /// Inertia times acceleration along the recorded motion, N·m or N.
     pub force: Vec<f64>,
-    /// What it is off.
+    /// Its errors.
     pub figures: Figures,
 }
 
-/// What a model is off, root mean square.
+/// Errors of a model, root mean square.
 #[derive(Debug, Clone, Serialize)]
 pub struct Figures {
     /// Of the whole recording.
@@ -59,7 +59,7 @@ impl From<Deviation> for Off {
 pub struct Window {
     /// Their length, s.
     pub seconds: f64,
-    /// What they are off.
+    /// Their errors.
     #[serde(flatten)]
     pub off: Off,
 }
@@ -164,5 +164,5 @@ impl Comparison {
 
 /// Time between two starts from the measured state in the motion that is drawn so, s.
 pub const AFRESH_S: f64 = 2.0;
-/// What counts as worse, as a ratio.
+/// Ratio of errors from which a model counts as worse.
 const MUCH: f64 = 1.05;

@@ -16,7 +16,7 @@ pub struct Motion {
     pub position: Vec<f64>,
     /// rad/s or m/s: the slope of a parabola through the rows around.
     pub velocity: Vec<f64>,
-    /// What a loop was asked to follow, as the position.
+    /// The reference of a position loop, as a position.
     pub reference: Option<Vec<f64>>,
 }
 

@@ -3,7 +3,7 @@
 use crate::effects::{CommandLaw, Law, State};
 use crate::io::rig::Rig;
 
-/// What acts on the plant from outside during a step.
+/// The inputs of the plant from outside during a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Surroundings {
     /// Inclination below the horizontal, rad.
@@ -148,7 +148,7 @@ impl Plant {
         self.velocity
     }
 
-    /// What a sensor without steps reads: the position behind the filter that the rig knows, with what its sensor effects add.
+    /// Returns the reading of a sensor without steps: the position behind the filter that the rig knows, plus its sensor effects.
     pub fn reading(&self) -> f64 {
         self.position - self.lag + self.sensor
     }
@@ -169,7 +169,7 @@ impl Plant {
         self.velocity = velocity;
     }
 
-    /// What the encoder reads, whole counts.
+    /// Returns the reading of the encoder, whole counts.
     pub fn counts(&self) -> f64 {
         (self.reading() * self.rig.encoder.counts_per_unit).floor()
     }

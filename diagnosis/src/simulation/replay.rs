@@ -47,7 +47,7 @@ impl Deviation {
 }
 
 impl Trajectory {
-    /// What it is off.
+    /// Its errors.
     pub fn deviation(&self, motion: &Motion) -> Deviation {
         let square = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum::<f64>();
         let sum = (square(&self.position, &motion.position), square(&self.velocity, &motion.velocity));
@@ -184,7 +184,8 @@ impl<'a> Beside<'a> {
         Deviation::of(sum, rows)
     }
 
-    /// What the position is off at every `every`th row, in windows of `seconds` one after the other, or in one run where that is
+    /// Returns the position errors at every `every`th row, in windows of `seconds` one after the other, or in one run where that
+    /// is
     /// longer than the recording.
     pub(super) fn off(&self, rig: &Rig, seconds: f64, every: usize) -> Vec<f64> {
         let time = &self.motion.time;

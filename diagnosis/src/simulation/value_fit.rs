@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Most iterations, and change of the sum of squares below which it is over.
 const ITERATIONS: usize = 30;
 const ENOUGH: f64 = 1e-4;
-/// Residuals of each recording, at the most.
+/// Residuals of each recording, at most.
 const MOST_ROWS: usize = 4000;
 /// Change of a value, as a part of its size, over which derivatives are taken, and tries of a step.
 const APART: f64 = 5e-4;

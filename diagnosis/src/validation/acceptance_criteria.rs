@@ -1,5 +1,5 @@
-//! An effect as it came through the search, and what speaks for it on fitted and on held-out recordings. Nothing here fits
-//! noise or chooses between effects.
+//! The evidence for an effect on fitted and on held-out recordings, and the criteria that it must meet to be named. Nothing here
+//! fits or chooses between effects.
 
 use crate::effects::{Effect, EffectName};
 use crate::numerics::bootstrap::Gain;
@@ -23,13 +23,13 @@ pub(crate) struct EffectEvidence {
     /// How much less force it leaves on held-out recordings, over the square of what is left.
     pub(crate) force: Gain,
     /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the fitted or on held-out recordings,
-    /// whichever are fewer; nought where it may be named without.
+    /// whichever are fewer; zero where it may be named without it.
     pub(crate) score_z: f64,
     /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
     pub(crate) share: f64,
-    /// Whether one of its values stands at the end of what is possible.
+    /// True if one of its values is at a bound.
     pub(crate) at_bound: bool,
-    /// Whether its waves, if it has any, are those of teeth or poles.
+    /// True if its waves, if it has any, are those of teeth or poles.
     pub(crate) is_comb: bool,
     /// Size that it would have on each recording that plays it, over the size that it has on all, fitted ones first; none
     /// where no fitted or no held-out one does.
@@ -37,14 +37,14 @@ pub(crate) struct EffectEvidence {
 }
 
 impl EffectEvidence {
-    /// Whether it predicts surely, however few moments it acts in. What bends to what any model leaves next to reversals
-    /// reaches that on recordings in which there is nothing.
+    /// True if its score is sure, however few moments it acts in. Presliding models pass this test on null data, so they are
+    /// excluded.
     fn predicts(&self) -> bool {
         !self.effect.name.definition().bends_at_reversals() && self.score_z >= SURE_Z
     }
 
-    /// Whether it stands out of every stretch of the held-out recordings and surely of the others, however little it explains
-    /// beside larger effects.
+    /// True if its gain is certain on every stretch of the held-out recordings and on the fitted ones, however little it explains
+    /// compared with larger effects.
     pub(crate) fn is_certain(&self) -> bool {
         self.steadiest_z() >= CERTAIN_Z
     }
@@ -60,12 +60,12 @@ impl EffectEvidence {
         if self.predicts() { over_time.max(self.score_z) } else { over_time }
     }
 
-    /// Whether its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
+    /// True if its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
     fn stands_out(&self) -> bool {
         self.least_z() >= CERTAIN_Z
     }
 
-    /// Whether it carries to the held-out recordings: by likelihood, or, where it is most of what was left out, by the force
+    /// True if it generalises to the held-out recordings: by likelihood, or, where it is most of what was left out, by the force
     /// that it leaves and the same size as on the fitted ones. Next to reversals a law of slightly another form may be less
     /// likely at many blocks and yet leave a third of the force.
     fn generalises(&self) -> bool {
@@ -81,12 +81,12 @@ impl EffectEvidence {
             || self.predicts()
     }
 
-    /// Whether each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
+    /// True if each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
     fn comes_in_events(&self) -> bool {
         self.effect.name.definition().is_of_jumps()
     }
 
-    /// Whether it is nearly all that was left out and as large on every recording, or most of it and hardly differs between
+    /// True if it is nearly all that was left out and as large on every recording, or most of it and hardly differs between
     /// them, and costs nothing in those moments of the held-out ones that do not play it, however few do.
     fn agrees_everywhere(&self) -> bool {
         let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -HARMLESS * gain.sum;
@@ -103,12 +103,12 @@ impl EffectEvidence {
         self.has_sizes_in(&SAME_SIZE)
     }
 
-    /// Whether it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
+    /// True if it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
     fn recurs(&self) -> bool {
         self.is_same_size() && self.share >= MOST_SHARE && self.holdout.low > 0.0 && self.force.low > 0.0
     }
 
-    /// Whether it takes most of what the others leave, surely, however much they explain.
+    /// True if it takes most of what the others leave, surely, however much they explain.
     fn takes_most_of_the_rest(&self) -> bool {
         self.is_same_size() && self.force.sum >= HALF_OF_FORCE && self.force.low > 0.0
     }
@@ -117,12 +117,12 @@ impl EffectEvidence {
         self.force.sum >= HALF_OF_FORCE && self.share >= NEARLY_ALL_SHARE
     }
 
-    /// Whether it leaves hardly anything and is as large on every recording: its law is right, not only near.
+    /// True if it leaves hardly anything and has the same size on every recording: its law is right, not only nearly right.
     pub(crate) fn fits_everywhere(&self) -> bool {
         self.takes_all() && self.is_same_size()
     }
 
-    /// Whether it may carry beside another effect that is as large: sure on the fitted recordings, and not surely worse than
+    /// True if it may generalise together with another effect of the same size: sure on the fitted recordings, and not surely worse than
     /// nothing on the others.
     pub(crate) fn is_provisional(&self) -> bool {
         self.fit.z >= PROMISING_Z && self.holdout.z > WORSE_Z && self.share >= SHARE
@@ -158,7 +158,7 @@ impl EffectEvidence {
         })
     }
 
-    /// Why an effect may not be named: the first requirement that it does not meet; none if it meets all.
+    /// Returns why an effect may not be named: the first requirement that it does not meet; none if it meets all.
     pub(crate) fn rejection(&self) -> Option<Rejection> {
         if !self.generalises() {
             return Some(self.unsure());
@@ -174,7 +174,7 @@ impl EffectEvidence {
     }
 }
 
-/// How far a rival is behind.
+/// A rival and how far it is behind.
 #[derive(Clone, Debug)]
 pub(crate) struct Rival {
     pub(crate) name: EffectName,
@@ -183,7 +183,7 @@ pub(crate) struct Rival {
     /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
     pub(crate) lead: f64,
     pub(crate) held_out_lead: f64,
-    /// Why it is none although it explains as much.
+    /// Why it may not be named although it explains as much.
     pub(crate) absence: Option<Rejection>,
 }
 

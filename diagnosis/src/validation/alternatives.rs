@@ -48,7 +48,7 @@ pub(crate) fn fit_rivals(
     }
 }
 
-/// What rivals of the effects of a model compete under.
+/// The context in which rivals are compared with the effects of a model.
 struct Contest<'a> {
     context: &'a FitContext<'a>,
     /// The model under white noise.

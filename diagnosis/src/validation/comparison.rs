@@ -1,4 +1,4 @@
-//! What people see of a model: the force that it leaves, beside the simulation as it stands and refitted.
+//! The force residual of a model, compared with the simulation as given and refitted.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
@@ -13,7 +13,7 @@ pub(crate) struct Shown {
     pub(crate) on_fit: Residuals,
     pub(crate) on_holdout: Residuals,
     pub(crate) table: FitTable,
-    /// Whether the nominal values explain held-out recordings better than refitted ones, which then stand for them.
+    /// True if the nominal values explain held-out recordings better than refitted ones, which then stand for them.
     pub(crate) keeps_nominal: bool,
 }
 

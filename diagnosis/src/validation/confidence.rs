@@ -9,10 +9,10 @@ use crate::thresholds::{
 use crate::validation::acceptance_criteria::EffectEvidence;
 use std::collections::BTreeMap;
 
-/// What speaks for and against a name, by key; logarithms are natural.
+/// The evidence for and against a name, by key; logarithms are natural.
 pub(crate) type Evidence = BTreeMap<String, f64>;
 
-/// What the search leaves beside the effect itself.
+/// The residual that the search leaves beside the effect itself.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leftover {
     /// Root mean square of what hangs together over time and is not explained, over the force's.
@@ -44,7 +44,8 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     .into()
 }
 
-/// What each piece of evidence takes from the score of an effect that is as sure as it gets, is all that was left out and leaves nothing.
+/// Returns how much each piece of evidence lowers the score, relative to an effect that is certain, explains everything and
+/// leaves nothing.
 fn takes(evidence: &Evidence) -> impl Iterator<Item = (&'static str, f64)> {
     let best = |key: &str| if key == "least_z" { SUREST_Z.ln() } else { 0.0 };
     WEIGHTS.iter().map(move |(key, weight)| (*key, weight * (best(key) - evidence[*key])))
@@ -56,7 +57,7 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
-/// What takes most from the probability of a name.
+/// The piece of evidence that lowers the probability of a name most.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Weakness {
     /// Its gain is few standard errors.

@@ -1,5 +1,5 @@
-//! How sure each effect found is. What is too unsure goes, and the rest is weighed again without it: a false companion
-//! takes from a true effect what speaks for it.
+//! The confidence of each effect found. Effects that are too unsure are removed and the rest is weighed again: a false effect
+//! takes evidence from a true one.
 
 use crate::effects::EffectName;
 use crate::effects::definition::Definition;
@@ -38,11 +38,11 @@ pub(crate) struct WeighedEffect {
     pub(crate) confidence: f64,
     pub(crate) parameters: BTreeMap<String, Parameter>,
     pub(crate) is_there: bool,
-    /// Whether more effects than a class may hold explain it as well.
+    /// True if more effects than a class may hold explain it as well.
     pub(crate) undecided: bool,
-    /// Part of the travel over which it bends, where that is more than bristles do.
+    /// Part of the travel over which it bends, where that is more than bristles bend.
     pub(crate) creeps: Option<f64>,
-    /// What it would rather be, where something without a name explains surely more.
+    /// The better explanation, where something without a name explains significantly more.
     pub(crate) rather: Option<Rather>,
 }
 
@@ -52,20 +52,20 @@ impl WeighedEffect {
     }
 }
 
-/// The model that stands, its effects weighed, and its residuals.
+/// The model found, its effects weighed, and its residuals.
 pub(crate) struct WeighedModel {
     pub(crate) effects: Vec<WeighedEffect>,
-    /// What went because it was unsure.
+    /// The effects that were removed because they were unsure.
     pub(crate) dropped: Vec<WeighedEffect>,
     /// The model under coloured noise.
     pub(crate) slow: FittedModel,
-    /// What was rejected on the way.
+    /// The hypotheses that were rejected on the way.
     pub(crate) rejected: Vec<RejectedHypothesis>,
     pub(crate) shown: Shown,
     pub(crate) estimator: Estimator,
-    /// What reading whole counts alone puts into the residual, N·m or N.
+    /// Residual that reading whole counts alone causes, N·m or N.
     pub(crate) floor: f64,
-    /// Whether the model leaves little enough of the force to have understood it.
+    /// True if the model leaves little enough of the force to have understood it.
     pub(crate) understood: bool,
     /// Frequency at which a force may swing whatever the axis does, and that force if it does.
     hertz: Option<f64>,
@@ -80,7 +80,7 @@ impl WeighedModel {
         self.effects.iter().map(|e| e.confidence).fold(0.0, f64::max)
     }
 
-    /// Whether it is for its evidence, weighed, that an effect is named or not.
+    /// True if confidence, not a veto, decided.
     pub(crate) fn rests_on_evidence(&self, assessed: &WeighedEffect) -> bool {
         self.contradiction(assessed).is_none()
     }
@@ -90,7 +90,7 @@ impl WeighedModel {
         same_joint(gained(assessed), self.effects.iter().map(gained))
     }
 
-    /// Whether it is one of two drifts that are one of the inertia.
+    /// True if it is one of two drifts that a change of the inertia explains.
     fn drifts_alike(&self, assessed: &WeighedEffect) -> bool {
         let definition = |assessed: &WeighedEffect| assessed.found.effect.name.definition();
         let change = |is_of: fn(&dyn Definition) -> bool| {
@@ -118,7 +118,7 @@ impl WeighedModel {
         self.effects.iter().enumerate().filter_map(is_named).collect()
     }
 
-    /// Why an effect is not named; none if it is.
+    /// Returns why an effect is not named; none if it is.
     pub(crate) fn doubt(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         self.contradiction(assessed).or_else(|| {
             if assessed.undecided {
@@ -132,7 +132,7 @@ impl WeighedModel {
         })
     }
 
-    /// What rules an effect out however much it explains.
+    /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
@@ -165,13 +165,14 @@ fn same_joint(
     all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
 }
 
-/// Whether gain and friction change by the same part: over an inertia that changes, both do.
+/// True if gain and friction change by the same part: over an inertia that changes, both do.
 fn are_alike(gain: f64, friction: f64) -> bool {
     let ratio = friction / gain;
     ratio < ALIKE && ratio * ALIKE > 1.0
 }
 
-/// Confidence of an effect beside an unsure one: what is not among those standing without it is no surer than it.
+/// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at
+/// that one's.
 fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
     if standing.contains(&name) { own } else { own.min(unsure) }
 }
@@ -182,7 +183,7 @@ pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
     if !best.stands_for_swing() {
         return best;
     }
-    // No model of the axis holds what goes its own way.
+    // No model of the axis explains a force that ignores the axis.
     let model = scales.context.fit_slow(Model::default(), &[&scales.null.noise]);
     let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected };
     let refitted = scales.once(nothing, best.hertz);
@@ -190,7 +191,7 @@ pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
     WeighedModel { dropped, swing: best.swing, ..refitted }
 }
 
-/// What every model is weighed with.
+/// The context in which every model is weighed.
 pub(crate) struct Scales<'a> {
     pub(crate) context: &'a FitContext<'a>,
     /// The null under white noise.
@@ -267,7 +268,7 @@ impl Scales<'_> {
         }
     }
 
-    /// What a model leaves of the force.
+    /// The force that a model leaves.
     fn left_over(&self, slow: &FittedModel, shown: &Shown, estimator: &Estimator) -> LeftOver {
         let Self { context, holdout, .. } = *self;
         let Shown { patched, on_holdout, table, .. } = shown;
@@ -322,16 +323,16 @@ impl Scales<'_> {
         let most = if undecided { UNDECIDED } else { 1.0 };
         let confidence = confidence::confidence(&evidence).min(most);
         let creeps = candidates::creeps(&found.effect, context.span)
-            // However far they bend: a spring that creeps follows the time, and no law of the travel holds it.
+            // A spring that creeps depends on time, so no law of the travel fits it everywhere, however far it bends.
             .filter(|_| !found.fits_everywhere());
         let rather = out_of_library::rather(context, patched, i, found.fit.sum);
         WeighedEffect { found, class, evidence, confidence, parameters, is_there, undecided, creeps, rather }
     }
 }
 
-/// What a model leaves of the force.
+/// The force that a model leaves.
 struct LeftOver {
-    /// What reading whole counts alone puts into the residual, N·m or N.
+    /// Residual that reading whole counts alone causes, N·m or N.
     floor: f64,
     evidence: Leftover,
     /// True if the model leaves little enough of the force to have understood it.

@@ -1,4 +1,4 @@
-//! What speaks for each effect of a fitted model, on left-out blocks of the fitted recordings and on held-out ones. Nothing here
+//! The evidence for each effect of a fitted model, on left-out blocks of the fitted recordings and on held-out ones. Nothing here
 //! says what is enough to be named.
 
 use crate::effects::{Effect, EffectName};
@@ -21,10 +21,10 @@ use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
 
-/// Part of a refit's mean square that counts as above the noise at the least: how much of it the noise is, is itself unsure.
+/// Least part of a refit's mean square that counts as above the noise: the noise itself is not known exactly.
 const LEAST_EXPLAINABLE: f64 = 0.2;
 
-/// What speaks for each effect of a model fitted under white noise; its score is that under `slow`.
+/// Gathers the evidence for each effect of a model fitted under white noise; the score is taken under `slow`.
 pub(crate) fn gather_evidence(
     context: &FitContext,
     last: &FittedModel,
@@ -93,7 +93,7 @@ impl<'a> JudgedModel<'a> {
         }
     }
 
-    /// What speaks for effect `i`; its score is that under `slow`.
+    /// Gathers the evidence for effect `i`; the score is taken under `slow`.
     fn evidence(&self, i: usize, slow: &Noise) -> EffectEvidence {
         let Self { context, last, judging, shown, estimator, left, .. } = self;
         let mut less = last.model.clone();
@@ -137,7 +137,7 @@ impl<'a> JudgedModel<'a> {
             .max((square(&less.fitted, tracks) - square(&self.left.fitted, tracks)) / fitted)
     }
 
-    /// True if a value of effect `i` is at the end of what is possible.
+    /// True if a value of effect `i` is at a bound.
     fn is_at_bound(&self, effect: &Effect, i: usize) -> bool {
         let fit = &self.last.fit;
         let definition = effect.name.definition();
@@ -191,7 +191,7 @@ fn score_z_of(
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Whether more of the dry friction goes or comes with time than warming explains.
+/// True if the dry friction changes more with time than warming explains.
 fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
     let definition = name.definition();
     let drifts = definition.drifts() && definition.needs_dry();

@@ -1,4 +1,4 @@
-//! What of a model stands when all its effects are judged together.
+//! Removes the effects that do not generalise when all are judged together.
 
 use crate::effects::EffectName;
 use crate::estimation::filter::Noise;
@@ -23,9 +23,9 @@ pub(crate) struct RejectedHypothesis {
 pub(crate) struct StandingModel {
     /// Under coloured noise.
     pub(crate) model: FittedModel,
-    /// What speaks for each effect.
+    /// The evidence for each effect.
     pub(crate) effects: Vec<EffectEvidence>,
-    /// What was taken out.
+    /// The effects that were removed.
     pub(crate) rejected: Vec<RejectedHypothesis>,
 }
 

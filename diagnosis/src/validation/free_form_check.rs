@@ -1,4 +1,4 @@
-//! Something that is not in the library, as the opponent of every name: a force of any form. Nothing here changes a model.
+//! The check of every name against forces of any form, which stand for what is not in the library.
 
 use crate::effects::{Effect, Variable};
 use crate::estimation::filter::Noise;
@@ -12,7 +12,7 @@ use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rather;
 
-/// What a force of any form would take beside a model.
+/// The gain of a force of any form in addition to a model.
 pub(crate) struct FreeFormShare {
     pub(crate) taken: Taken,
     /// Part of what model and form take of left-out blocks that the model takes, 0 to 1.

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 /// A model laid on one held-out recording.
 pub(crate) struct HoldoutFit {
-    /// What moves the axis, with the recording's own values found on all of it.
+    /// The input of the model, with the recording's own values found on all of it.
     pub(crate) total: Total,
     /// Acceleration by the force that is there all the time, found on all of the recording.
     pub(crate) bias: f64,
@@ -24,7 +24,7 @@ pub(crate) struct HoldoutFit {
     pub(crate) costs: Vec<f64>,
     /// Whitened residual of each block of the segments that the model knows something of, with the own values of the others.
     pub(crate) residual: Vec<f64>,
-    /// What the model pays for jumps found in this very recording, in log-likelihood.
+    /// The price of the jumps found in this recording itself, in log-likelihood.
     pub(crate) surcharge: f64,
 }
 
@@ -236,7 +236,7 @@ impl Sums {
         Self { m, b }
     }
 
-    /// What of the score of column `i` the others leave at `theta`.
+    /// Returns the part of the score of column `i` that the others leave at `theta`.
     fn pull(&self, i: usize, theta: &[f64], one: &Prepared, is_other: impl Fn(usize) -> bool) -> f64 {
         let others = (0..theta.len()).filter(|j| is_other(*j));
         self.b[i] - others.map(|j| self.m.at(i, j) * (theta[j] - one.reference[j])).sum::<f64>()

@@ -1,4 +1,5 @@
-//! What held-out recordings may judge: a law of the travel says nothing of travel where no fitted recording has been.
+//! The travel over which held-out recordings may judge: a law fitted over the travel says nothing of travel that no fitted
+//! recording covers.
 
 use crate::effects::Effect;
 use crate::effects::definition::Span;

@@ -1,4 +1,4 @@
-//! What held-out recordings say of fitted models: gains, alternatives, residual maps, and how sure each effect is.
+//! Validation of fitted models on held-out recordings: gains, alternatives, residual maps, and confidence.
 
 pub(crate) mod acceptance_criteria;
 pub(crate) mod alternatives;

@@ -23,7 +23,7 @@ fn like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
 /// Physics without a name that explains most of what a refit leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Foreign {
-    /// What it is, a noun phrase.
+    /// A noun phrase that says what it is.
     pub(crate) what: String,
     /// The part that it explains, at most 1.
     pub(crate) share: f64,

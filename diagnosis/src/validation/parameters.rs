@@ -91,7 +91,7 @@ pub(crate) fn shape_sd(context: &FitContext, candidate: &FittedModel, effect: us
     step
 }
 
-/// Whether at least one of the values that say how large an effect is cannot be zero.
+/// True if the interval of at least one size of an effect excludes zero.
 pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> bool {
     let drifts = name.definition().drifts();
     let where_or_when = |key: &str| key.starts_with("period") || (drifts && key == "time_constant");
@@ -99,7 +99,7 @@ pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> boo
         || parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
 }
 
-/// Why an effect of a fitted model may not be named although it explains something: it explains it together with others.
+/// Returns why an effect of a fitted model may not be named although it explains something: its own size may be zero.
 pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize) -> Option<Rejection> {
     let name = fitted.model.effects[effect].name;
     let is_there = is_there(name, &parameters(context, fitted, effect));

@@ -52,7 +52,7 @@ pub(crate) enum Rejection {
     Behind { winner: EffectName, z: f64 },
 }
 
-/// What an effect would rather be.
+/// The better explanation of an effect's gain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Rather {
     /// Physics without a name in the library; a noun phrase.

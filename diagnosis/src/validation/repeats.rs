@@ -1,4 +1,4 @@
-//! Whether what is left repeats where the motion repeats: recordings of one trajectory, or periods of one recording.
+//! The test whether the residual repeats where the motion repeats: recordings of one trajectory, or periods of one recording.
 //!
 //! Repeats are found from the motion itself (or from what the loop was asked to follow, where that is recorded); the residuals of
 //! aligned stretches are then correlated. A disturbance that comes from outside does not know when the motion repeats.
@@ -17,7 +17,7 @@ const SHIFT_S: f64 = 1.0;
 /// Samples per second that are compared: enough for the motion of most machines.
 const RATE_HZ: f64 = 50.0;
 
-/// One recording with what is left of it, evenly sampled: the speed or the reference's, and the residual, nought where not known.
+/// One recording with what is left of it, evenly sampled: the speed or the reference's, and the residual, zero where not known.
 struct Sampled {
     motion: Vec<f64>,
     left: Vec<f64>,
@@ -94,7 +94,7 @@ pub(crate) fn correlation_of_repeats(
     (correlation > REPEATS && correlation * independent.sqrt() > SURELY).then_some(correlation)
 }
 
-/// Whether the motion differs within a period: a slow one is like itself a moment later too.
+/// True if the motion differs within a period: a slow one is like itself a moment later too.
 fn is_period(motion: &[f64], period: usize) -> bool {
     let half = period / 2;
     half > 0 && correlation(&motion[..motion.len() - half], &motion[half..]) < 0.5

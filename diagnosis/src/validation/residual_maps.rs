@@ -16,7 +16,7 @@ pub struct Map {
     pub backward: Vec<Option<f64>>,
     /// Part of the held-out mean square that the map of the fitted recordings predicts.
     pub carries: f64,
-    /// Whether that is more than chance.
+    /// True if that is more than chance.
     pub significant: bool,
 }
 
@@ -101,7 +101,7 @@ impl Bins {
         sums.into_iter().map(|cells| cells.map(mean)).collect()
     }
 
-    /// What means take from each segment of a recording, and the square of all that there is.
+    /// Returns the gain of the means on each segment of a recording, and the sum of squares of the residual.
     fn gains(&self, means: &Means, one: &Seen) -> (Vec<f64>, f64) {
         let (mut gains, mut whole) = (vec![0.0; one.track.segment_count()], 0.0);
         for (gain, w) in gains.iter_mut().zip(one.track.blocks.segments.windows(2)) {
@@ -115,7 +115,7 @@ impl Bins {
         (gains, whole)
     }
 
-    /// Whether each recording is told something by the others: a slow disturbance looks like a map of one or two.
+    /// True if the others predict something of each recording: a slow disturbance looks like a map of one or two.
     fn repeats(&self, seen: &[Seen]) -> bool {
         if seen.len() < 2 {
             return true;

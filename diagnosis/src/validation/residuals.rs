@@ -95,7 +95,7 @@ pub(crate) fn above(residual: f64, chance: f64, least: f64) -> f64 {
 /// Part of the force that a refit must take from the held-out residual before values are called wrong.
 const REFIT_MATTERS: f64 = 0.02;
 
-/// Whether other values explain held-out recordings better than the rig's own, each recording's bias left aside.
+/// True if other values explain held-out recordings better than the rig's own, each recording's bias left aside.
 pub(crate) fn refit_matters(
     estimator: &Estimator,
     tracks: &[BlockedRecording],

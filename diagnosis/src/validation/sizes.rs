@@ -1,12 +1,12 @@
-//! How large an effect would be on each recording alone. Nothing here judges.
+//! The size that an effect would have on each recording alone. Nothing here judges.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 
-/// Part of the mean square that an effect makes on one recording from which on another plays it.
+/// Least mean square of an effect on a recording, relative to the largest on any, for the recording to count as exciting it.
 const PLAYED: f64 = 0.03;
 
-/// Sizes on the recordings that play an effect, fitted ones first.
+/// Returns the sizes on the recordings that excite an effect, fitted ones first.
 pub(crate) fn played(fitted: Vec<Size>, holdout: Vec<Size>) -> Vec<f64> {
     let most = fitted.iter().chain(&holdout).map(|size| size.square).fold(0.0, f64::max);
     let of = |sizes: Vec<Size>| -> Vec<f64> {
@@ -16,15 +16,15 @@ pub(crate) fn played(fitted: Vec<Size>, holdout: Vec<Size>) -> Vec<f64> {
     if fitted.is_empty() || holdout.is_empty() { Vec::new() } else { [fitted, holdout].concat() }
 }
 
-/// How large an effect is on one recording.
+/// The size of an effect on one recording.
 pub(crate) struct Size {
-    /// Factor on what it does that would leave the least.
+    /// Factor on its force that would leave the least residual.
     factor: f64,
-    /// Mean square of what it does.
+    /// Mean square of its force.
     square: f64,
 }
 
-/// Sizes of an effect on each recording; what it does is the difference of what is left with it and without it.
+/// Returns the size of an effect on each recording; its force is the difference of the residuals with it and without it.
 pub(crate) fn sizes_on(
     estimator: &Estimator,
     tracks: &[BlockedRecording],

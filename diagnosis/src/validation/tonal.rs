@@ -1,4 +1,5 @@
-//! What explains a residual without being an effect: a force that swings at a frequency of its own, whatever the axis does.
+//! A tonal disturbance: a force that swings at a frequency of its own, whatever the axis does, and explains a residual without
+//! being an effect.
 //! Under a loop the command answers it, and delays, lags and springs take it on.
 
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -20,7 +21,7 @@ const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 const ROOM: f64 = 4.0;
 /// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what comes from outside with
-/// half as much again at the most, and what a lag or a short delay leaves is less than the drive makes.
+/// half as much again at most, and what a lag or a short delay leaves is less than the drive makes.
 const DRIVEN: f64 = 2.25;
 
 /// A force at one frequency on the held-out recordings.
@@ -37,7 +38,7 @@ pub(crate) struct TonalDisturbance {
 const DOMINANT: f64 = 0.4;
 
 impl TonalDisturbance {
-    /// Whether the effects found explain what is a swing.
+    /// True if the effects found explain a swing.
     pub(crate) fn is_mistaken(&self) -> bool {
         self.taken > MISTAKEN
     }
@@ -121,7 +122,7 @@ fn fast(all: &[Samples], hertz: f64) -> f64 {
     all.iter().map(fast).sum()
 }
 
-/// Whether a swing that is `part` of the residual may go its own way, for the axis does not move as fast.
+/// True if a swing that is `part` of the residual may go its own way, for the axis does not move as fast.
 fn is_apart(motion: &[Samples], hertz: f64, part: f64) -> bool {
     let room = (1.0 / (1.0 - part)).clamp(1.0, ROOM);
     let (whole, there) = (square(motion), explained(motion, hertz));

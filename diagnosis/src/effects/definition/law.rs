@@ -10,7 +10,7 @@ use crate::effects::{CommandLaw, Effect, State, Variable};
 pub(crate) trait ForceLaw: std::fmt::Debug + Send + Sync {
     /// Names of the terms, in the order of [`ForceLaw::terms`].
     fn names(&self) -> Vec<String>;
-    /// The terms for one step; `out` has one place per name. `velocity` is nought where its sign is unknown.
+    /// The terms for one step; `out` has one place per name. `velocity` is zero where its sign is unknown.
     fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]);
     /// The part of the force that holds an axis at rest, per unit of the first coefficient, where only a part does.
     fn dry_part(&self, _state: &State) -> f64 {
@@ -33,7 +33,7 @@ pub(crate) enum NominalTerm {
     Weight,
 }
 
-/// What holds a second mass.
+/// The coupling that holds a second mass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Coupling {
     /// Something stiff, a shaft or flanks that touch, which rings with the masses.
@@ -54,32 +54,32 @@ pub(crate) trait EffectLaw: Sync {
         None
     }
 
-    /// Whether the law's terms are travel added to what the encoder reads.
+    /// True if the law's terms are travel added to what the encoder reads.
     fn in_sensor(&self) -> bool {
         false
     }
 
-    /// Whether its force is dry friction, which holds an axis at rest rather than moving it.
+    /// True if its force is dry friction, which holds an axis at rest rather than moving it.
     fn is_dry(&self) -> bool {
         false
     }
 
-    /// Whether its terms are proportional to the command.
+    /// True if its terms are proportional to the command.
     fn scales_drive(&self) -> bool {
         false
     }
 
-    /// Whether its coefficients in a rig are parts of the gain rather than forces.
+    /// True if its coefficients in a rig are parts of the gain rather than forces.
     fn is_relative_to_gain(&self) -> bool {
         self.scales_drive()
     }
 
-    /// Whether each recording has its own phase, so that coefficients are not shared.
+    /// True if each recording has its own phase, so that coefficients are not shared.
     fn has_own_phase(&self) -> bool {
         false
     }
 
-    /// What holds the second mass that its law is of, where it is of one: such a law is faster than a block.
+    /// Returns the coupling of a second mass, where the law has one: such a law is faster than a block.
     fn coupling(&self) -> Option<Coupling> {
         None
     }
@@ -89,17 +89,17 @@ pub(crate) trait EffectLaw: Sync {
         None
     }
 
-    /// Whether it changes with the time of the recording.
+    /// True if it changes with the time of the recording.
     fn drifts(&self) -> bool {
         false
     }
 
-    /// Whether its law is of the travel as far as that was fitted, and says nothing beyond.
+    /// True if its law is of the travel as far as that was fitted, and says nothing beyond.
     fn follows_travel(&self) -> bool {
         false
     }
 
-    /// Whether its one term is the jumps of each recording's readings, which are found before any effect is: each of its moments
+    /// True if its one term is the jumps of each recording's readings, which are found before any effect is: each of its moments
     /// is decided by itself.
     fn is_of_jumps(&self) -> bool {
         false

@@ -41,7 +41,7 @@ impl Reported {
 }
 
 impl Fitted<'_> {
-    /// A coefficient with its standard deviation, per inertia; nought where it is missing.
+    /// A coefficient with its standard deviation, per inertia; zero where it is missing.
     pub(crate) fn term(&self, k: usize) -> (f64, f64) {
         self.terms.get(k).copied().unwrap_or((0.0, 0.0))
     }
@@ -74,10 +74,10 @@ pub(crate) fn sized(pairs: &[(f64, f64)]) -> (f64, f64) {
 
 /// What a report says of an effect.
 pub(crate) trait EffectReport {
-    /// Where it sits.
+    /// Returns the subsystem that it belongs to.
     fn subsystem(&self) -> Subsystem;
 
-    /// What it is, in words that a technician uses.
+    /// Returns a noun phrase for it that a technician understands.
     fn words(&self) -> &'static str;
 
     /// The values that are reported.

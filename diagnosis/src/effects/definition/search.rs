@@ -2,7 +2,7 @@
 
 use crate::effects::{Effect, EffectName};
 
-/// What the recordings span, and what the rig says of the machine: all that a grid of shapes depends on.
+/// The range of the recordings and the rig's statement of the machine: a grid of shapes depends on nothing else.
 #[derive(Debug, Clone)]
 pub(crate) struct Span {
     /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown, rad/s or m/s.
@@ -28,29 +28,29 @@ pub(crate) struct Span {
     pub(crate) clip: f64,
     /// Largest command that may do nothing.
     pub(crate) dead: f64,
-    /// Whether the columns are there and vary.
+    /// True if the columns are there and vary.
     pub(crate) tilt: bool,
     pub(crate) force: bool,
-    /// What the rig says.
+    /// The rig's statement of the machine.
     pub(crate) rig: Believed,
 }
 
-/// What the rig says of the machine.
+/// The rig's statement of the machine.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Believed {
     /// Travel per turn of the motor and of the axis itself, where they are known, rad or m.
     pub(crate) turn: Option<f64>,
     pub(crate) axis_turn: Option<f64>,
-    /// Whether a law of the travel may hold for all recordings.
+    /// True if a law of the travel may hold for all recordings.
     pub(crate) has_stroke: bool,
-    /// Whether the nominal model has an offset, and viscous friction.
+    /// True if the nominal model has an offset, and viscous friction.
     pub(crate) has_offset: bool,
     pub(crate) has_viscous: bool,
-    /// Whether it has a weight whose tilt is the axis' own angle: the gravity of a pendulum.
+    /// True if it has a weight whose tilt is the axis' own angle: the gravity of a pendulum.
     pub(crate) has_gravity: bool,
-    /// Whether gain over inertia was found from force, the rig hardly knowing it.
+    /// True if gain over inertia was found from force, the rig hardly knowing it.
     pub(crate) is_anchored: bool,
-    /// What the law of a joint takes from the whole machine, all per inertia.
+    /// Values of the whole machine that the law of a joint uses, all per inertia.
     pub(crate) machine: Vec<(&'static str, f64)>,
     /// Deceleration by dry friction and acceleration per unit of command, rad/s² or m/s².
     pub(crate) dry: f64,
@@ -83,26 +83,26 @@ pub(crate) const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 /// Anything not below zero.
 pub(crate) const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
 
-/// What recordings show, as far as it decides between twins.
+/// Limits of the recordings that decide whether twins can be told apart.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shown {
-    /// Whether all motion is at one speed, in strokes of one length, within less than a turn, and along a line.
+    /// True if all motion is at one speed, in strokes of one length, within less than a turn, and along a line.
     pub(crate) one_speed: bool,
     pub(crate) one_length: bool,
     pub(crate) less_than_a_turn: bool,
     pub(crate) linear: bool,
-    /// Whether the model leaves much of what the refit left.
+    /// True if the model leaves much of what the refit left.
     pub(crate) leaves_much: bool,
     /// One count, rad or m.
     pub(crate) count: f64,
 }
 
-/// What makes an effect one that any machine may have.
+/// Marks an effect that any machine may have.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Plain {
     /// Place in the order in which plain forces enter a model.
     pub(crate) rank: u8,
-    /// Whether another effect of the library may take the same force.
+    /// True if another effect of the library may take the same force.
     pub(crate) has_twin: bool,
 }
 
@@ -112,7 +112,7 @@ pub(crate) struct Unnamed {
     pub(crate) effect: Effect,
     /// As how many values its freedom counts.
     pub(crate) freedom: f64,
-    /// What it is, in words.
+    /// A noun phrase that says what it is.
     pub(crate) what: String,
 }
 
@@ -124,32 +124,32 @@ pub(crate) type Factors = (&'static str, &'static [f64]);
 
 /// What the search must know of an effect.
 pub(crate) trait EffectSearch {
-    /// Whether it changes a dry friction, which must be there first.
+    /// True if it changes a dry friction, which must be there first.
     fn needs_dry(&self) -> bool {
         false
     }
 
-    /// Whether it is told by what the command does fast, or by the command's scale.
+    /// True if it is told by what the command does fast, or by the command's scale.
     fn is_of_command(&self) -> bool {
         false
     }
 
-    /// Whether it is made of waves that are sought.
+    /// True if it is made of waves that are sought.
     fn is_periodic(&self) -> bool {
         false
     }
 
-    /// Whether and how any machine may have it: such forces are looked for together, before anything else.
+    /// Returns how any machine may have it; none if not. Such forces are looked for together, before anything else.
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         None
     }
 
-    /// Whether waves of such orders of a turn are its own and not another's.
+    /// True if waves of such orders of a turn are its own and not another's.
     fn is_of_orders(&self, _orders: &[f64]) -> bool {
         true
     }
 
-    /// Whether it bends to the little that any model leaves next to reversals, and so gains a little on recordings in which
+    /// True if it bends to the little that any model leaves next to reversals, and so gains a little on recordings in which
     /// there is nothing.
     fn bends_at_reversals(&self) -> bool {
         false
@@ -168,7 +168,7 @@ pub(crate) trait EffectSearch {
         Vec::new()
     }
 
-    /// Whether the likelihood of the first shape value has several optima.
+    /// True if the likelihood of the first shape value has several optima.
     fn has_optima_apart(&self) -> bool {
         false
     }
@@ -179,17 +179,17 @@ pub(crate) trait EffectSearch {
         &[]
     }
 
-    /// Whether values of a shape go together.
+    /// True if values of a shape go together.
     fn is_possible(&self, _effect: &Effect) -> bool {
         true
     }
 
-    /// What the coefficient of a term may be for the effect to be what its name says, per inertia.
+    /// Returns the bounds of a term's coefficient, per inertia, within which the effect is what its name says.
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         FREE
     }
 
-    /// Whether it is in doubt where the coefficient of a term stands at its limit.
+    /// True if it is in doubt where the coefficient of a term stands at its limit.
     fn is_in_doubt_at_limit(&self, _term: usize) -> bool {
         true
     }

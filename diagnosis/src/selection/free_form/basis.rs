@@ -52,18 +52,18 @@ impl Inputs {
         }
     }
 
-    /// What reports call them.
+    /// Returns their names in reports.
     pub(crate) fn in_words(self) -> String {
         let words: Vec<&str> = self.variables().iter().map(|v| v.in_words()).collect();
         words.join(" and ")
     }
 
-    /// Whether each recording has coefficients of its own, as the encoder's zero differs.
+    /// True if each recording has coefficients of its own, as the encoder's zero differs.
     pub(crate) fn own(self) -> bool {
         matches!(self, Self::Angle | Self::AngleCommand)
     }
 
-    /// Whether the form is a part of the command's own force, rather than any force over the command.
+    /// True if the form is a part of the command's own force, rather than any force over the command.
     fn scales_command(self) -> bool {
         matches!(self, Self::TimeCommand | Self::TravelCommand | Self::AngleCommand)
     }
@@ -72,7 +72,7 @@ impl Inputs {
 /// Where the axis is during one block, or a place of a table.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Point {
-    /// Sign of the velocity; nought where that is not known.
+    /// Sign of the velocity; zero where that is not known.
     pub(crate) direction: f64,
     /// Its size, rad/s or m/s.
     pub(crate) speed: f64,

@@ -1,4 +1,4 @@
-//! What left-out blocks say of models with and without free forms.
+//! The comparison of models with and without free forms on left-out blocks.
 
 use super::basis::Inputs;
 use crate::effects::Variable;
@@ -39,12 +39,12 @@ impl Density {
 }
 
 impl Gain {
-    /// Whether it is surely above nought.
+    /// True if it is significantly above zero.
     pub(crate) fn is_sure(&self) -> bool {
         self.sum > 0.0 && self.z() > FORM_SURE_Z
     }
 
-    /// Standard errors above nought, with or without a limit on what a unit counts, whichever is more.
+    /// Returns the standard errors above zero, with or without a limit on what a unit counts, whichever is more.
     pub(crate) fn z(&self) -> f64 {
         (self.sum / self.error.max(1e-300)).max(self.steady)
     }
@@ -56,10 +56,10 @@ pub(crate) struct Densities {
     pub(crate) with: Vec<(Inputs, Density)>,
 }
 
-/// A form that makes an effect needless.
+/// A form that explains the data without an effect.
 pub(crate) struct Against {
     pub(crate) inputs: Inputs,
-    /// What the form takes in the effect's place or beside it, whichever is more, nats.
+    /// Gain of the form in the effect's place or in addition to it, whichever is more, nats.
     pub(crate) most: f64,
     /// How much more that is than the effect takes.
     beyond: Gain,
@@ -67,7 +67,7 @@ pub(crate) struct Against {
 
 /// An effect of a model on left-out blocks.
 pub(crate) struct Standing {
-    /// What it takes.
+    /// Its own gain.
     pub(crate) own: Gain,
     pub(crate) against: Option<Against>,
 }
@@ -80,7 +80,7 @@ pub(crate) struct Taken {
 }
 
 impl Densities {
-    /// What each form takes beside the model, most first.
+    /// Returns the gain of each form in addition to the model, largest first.
     pub(crate) fn taken(&self) -> Vec<Taken> {
         let one =
             |(inputs, with): &(Inputs, Density)| Taken { inputs: *inputs, gain: with.over(&self.alone) };
@@ -116,7 +116,7 @@ impl Densities {
     }
 }
 
-/// Whether what a form takes is sure and enough to be told.
+/// True if the gain of a form is sure and large enough to be reported.
 pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
     let blocks: usize = tracks.iter().map(BlockedRecording::block_count).sum();
     taken.gain.is_sure() && taken.gain.sum > 0.5 * FORM_TOLD * blocks as f64
@@ -135,7 +135,7 @@ mod tests {
         Densities { alone: of(alone), with: vec![(Inputs::Speed, of(with))] }
     }
 
-    /// Whether an effect stands that takes `own` where the form takes `form` and both together `both`.
+    /// True if an effect stands that takes `own` where the form takes `form` and both together `both`.
     fn stands(own: f64, form: f64, both: f64) -> bool {
         densities(own, both).standing(&densities(0.0, form), None).against.is_none()
     }

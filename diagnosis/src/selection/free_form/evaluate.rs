@@ -92,7 +92,7 @@ impl Base {
     }
 }
 
-/// Root mean square of the acceleration that one unit of an input makes; nought in the sensor.
+/// Root mean square of the acceleration that one unit of an input makes; zero in the sensor.
 fn size(input: &Input, track: &BlockedRecording) -> f64 {
     let mean = |square: f64| (square / track.block_count() as f64).sqrt();
     match input {

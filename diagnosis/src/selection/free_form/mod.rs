@@ -1,4 +1,4 @@
-//! A force of any form over given inputs, and how much it takes on blocks that were left out: the opponent of every name.
+//! A force of any form over given inputs, and its gain on left-out blocks: every name is checked against it.
 //! It changes no model. The method: docs/free-form.md.
 
 mod basis;

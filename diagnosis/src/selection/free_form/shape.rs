@@ -55,7 +55,7 @@ fn grid(variable: Variable, inputs: Inputs, warps: &Warps) -> Vec<f64> {
     }
 }
 
-/// A point with one variable set; `side` is the sign of the speed where that is nought.
+/// A point with one variable set; `side` is the sign of the speed where that is zero.
 fn set(point: &mut Point, variable: Variable, value: f64, side: f64) {
     match variable {
         Variable::Speed => {
