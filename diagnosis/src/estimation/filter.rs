@@ -45,7 +45,7 @@ pub(crate) struct Observed<'a> {
 }
 
 impl Observed<'_> {
-    fn blocks(&self) -> usize {
+    pub(super) fn blocks(&self) -> usize {
         self.span.len()
     }
 }
@@ -63,17 +63,17 @@ pub(crate) struct Gains {
 
 /// A covariance of the states position, speed, disturbance and, as the fourth where the rig declares a filter in the
 /// reading, the lag of the reading.
-type Covariance<const N: usize> = [[f64; N]; N];
+pub(super) type Covariance<const N: usize> = [[f64; N]; N];
 
 /// One block: what the state becomes over it, what of the state its mean reading shows, and the noise that it adds.
-struct Step<const N: usize> {
-    transition: [[f64; N]; N],
-    seen: [f64; N],
+pub(super) struct Step<const N: usize> {
+    pub(super) transition: [[f64; N]; N],
+    pub(super) seen: [f64; N],
     noise: Covariance<N>,
 }
 
 impl<const N: usize> Step<N> {
-    fn new(track: &Observed, noise: &Noise, j: usize) -> Self {
+    pub(super) fn new(track: &Observed, noise: &Noise, j: usize) -> Self {
         let h = track.span[j];
         let white = if track.rest[j] { noise.rest.max(noise.white) } else { noise.white };
         let rho = (-h / noise.tau).exp();
@@ -103,7 +103,7 @@ impl<const N: usize> Step<N> {
 /// Variance of the position at the start over that of one reading: practically unknown, and far from rounding errors.
 const DIFFUSE: f64 = 1e4;
 
-fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
+pub(super) fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
     let reach = track.z.iter().fold(0.0_f64, |m, z| m.max(z.abs())).max(1e-12);
     let duration = track.start[track.blocks() - 1].max(1e-3);
     let speed = 100.0 * reach / duration.min(1.0);
@@ -123,7 +123,11 @@ fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
 }
 
 /// Measurement update: innovation variance, gain, covariance after it.
-fn update<const N: usize>(p: &Covariance<N>, seen: &[f64; N], r: f64) -> (f64, [f64; N], Covariance<N>) {
+pub(super) fn update<const N: usize>(
+    p: &Covariance<N>,
+    seen: &[f64; N],
+    r: f64,
+) -> (f64, [f64; N], Covariance<N>) {
     let a = times(p, seen);
     let s = product(seen, &a) + r;
     let k = a.map(|a| a / s);
@@ -137,7 +141,7 @@ fn update<const N: usize>(p: &Covariance<N>, seen: &[f64; N], r: f64) -> (f64, [
     (s, k, after)
 }
 
-fn predict<const N: usize>(p: &Covariance<N>, step: &Step<N>) -> Covariance<N> {
+pub(super) fn predict<const N: usize>(p: &Covariance<N>, step: &Step<N>) -> Covariance<N> {
     let f = &step.transition;
     let mut out = step.noise;
     for i in 0..N {
@@ -151,16 +155,12 @@ fn predict<const N: usize>(p: &Covariance<N>, step: &Step<N>) -> Covariance<N> {
     out
 }
 
-fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+pub(super) fn product<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-fn times<const N: usize>(m: &[[f64; N]; N], x: &[f64; N]) -> [f64; N] {
+pub(super) fn times<const N: usize>(m: &[[f64; N]; N], x: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|i| product(&m[i], x))
-}
-
-fn transposed_times<const N: usize>(m: &[[f64; N]; N], x: &[f64; N]) -> [f64; N] {
-    std::array::from_fn(|i| (0..N).map(|k| m[k][i] * x[k]).sum())
 }
 
 /// A stretch whose mean square innovation is above this counts by the logarithm of it: one bad stretch (an impact, a
@@ -296,158 +296,4 @@ impl Gains {
         let mut walk = Walk::new(self, track, 0.0);
         over.map(|j| -walk.step(j, 0.0, input(j))).collect()
     }
-}
-
-/// State at the middle of each block.
-#[derive(Debug, Clone)]
-pub(crate) struct Motion {
-    pub(crate) x: Vec<f64>,
-    pub(crate) v: Vec<f64>,
-    /// Disturbance acceleration that the inputs do not explain.
-    pub(crate) d: Vec<f64>,
-    /// Standard deviation of the velocity.
-    pub(crate) v_sd: Vec<f64>,
-}
-
-impl Motion {
-    fn of(blocks: usize) -> Self {
-        let none = || vec![0.0; blocks];
-        Self { x: none(), v: none(), d: none(), v_sd: none() }
-    }
-
-    /// Enters the state at the start of block `j`, of which the input changes the speed by `dv`.
-    fn enter(&mut self, j: usize, [q, v, d]: [f64; 3], variance: f64, dv: f64, span: f64) {
-        let half = 0.5 * span;
-        let a = d + dv / span;
-        self.x[j] = q + (v + 0.5 * a * half) * half;
-        self.v[j] = v + a * half;
-        self.d[j] = d;
-        self.v_sd[j] = variance.max(0.0).sqrt();
-    }
-}
-
-/// The rows that an estimate of the motion in a block may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Knows {
-    /// Every row of the recording: the fixed-interval smoother, for recordings that are fitted.
-    All,
-    /// The rows up to the block's own: the filter, for recordings that judge. What knows the rows to come knows the disturbance
-    /// that a force is to be told from.
-    Past,
-}
-
-/// The motion under the model's input.
-pub(crate) fn motion(track: &Observed, noise: &Noise, total: &Total, knows: Knows) -> Motion {
-    if track.reading_lag.is_empty() {
-        motion_of::<3>(track, noise, total, knows)
-    } else {
-        motion_of::<4>(track, noise, total, knows)
-    }
-}
-
-fn motion_of<const N: usize>(track: &Observed, noise: &Noise, total: &Total, knows: Knows) -> Motion {
-    let filtered = filter::<N>(track, noise, total);
-    if knows == Knows::All {
-        return smooth(track, noise, total, &filtered);
-    }
-    let mut out = Motion::of(filtered.len());
-    for (j, Filtered { state, covariance, .. }) in filtered.iter().enumerate() {
-        let state = [state[0], state[1], state[2]];
-        out.enter(j, state, covariance[1][1], total.dv[j], track.span[j]);
-    }
-    out
-}
-
-/// The filter's state after a block's reading.
-struct Filtered<const N: usize> {
-    state: [f64; N],
-    covariance: Covariance<N>,
-    innovation: f64,
-    variance: f64,
-    gain: [f64; N],
-}
-
-/// Runs the filter; returns its state after each block's reading.
-fn filter<const N: usize>(track: &Observed, noise: &Noise, total: &Total) -> Vec<Filtered<N>> {
-    let n = track.blocks();
-    let mut filtered: Vec<Filtered<N>> = Vec::with_capacity(n);
-    let mut p = initial::<N>(track, noise);
-    let mut s = [0.0; N];
-    s[0] = track.z[0];
-    for j in 0..n {
-        let step = Step::<N>::new(track, noise, j);
-        let (dv, dq, mut dz) = (total.dv[j], total.dq[j], total.dz[j]);
-        let lag = track.reading_lag.get(j);
-        if let Some(LagStep { seen, .. }) = lag {
-            dz -= seen.dv * dv + seen.dq * dq;
-        }
-        let innovation = track.z[j] - (product(&step.seen, &s) + dz);
-        let (variance, gain, covariance) = update(&p, &step.seen, noise.sensor * track.quantum[j]);
-        let state = std::array::from_fn(|i| s[i] + gain[i] * innovation);
-        s = times(&step.transition, &state);
-        s[0] += dq;
-        s[1] += dv;
-        if let Some(LagStep { end, .. }) = lag {
-            s[3] += end.dv * dv + end.dq * dq;
-        }
-        p = predict(&covariance, &step);
-        filtered.push(Filtered { state, covariance, innovation, variance, gain });
-    }
-    filtered
-}
-
-/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
-/// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
-fn smooth<const N: usize>(
-    track: &Observed,
-    noise: &Noise,
-    total: &Total,
-    filtered: &[Filtered<N>],
-) -> Motion {
-    let n = track.blocks();
-    let mut out = Motion::of(n);
-    // What later readings say: the adjoint and its covariance.
-    let (mut adjoint, mut known) = ([0.0; N], [[0.0; N]; N]);
-    for j in (0..n).rev() {
-        let Filtered { state, covariance, innovation, variance, gain } = &filtered[j];
-        let step = Step::<N>::new(track, noise, j);
-        let f = &step.transition;
-        if j + 1 < n {
-            adjoint = transposed_times(f, &adjoint);
-            known = between(f, &known);
-        }
-        let back = times(covariance, &adjoint);
-        let less = product(&covariance[1], &times(&known, &covariance[1]));
-        let state = [0, 1, 2].map(|i| state[i] - back[i]);
-        out.enter(j, state, covariance[1][1] - less, total.dv[j], track.span[j]);
-        // Back over the block's own reading.
-        let seen = &step.seen;
-        let of_gain = product(gain, &adjoint);
-        adjoint = std::array::from_fn(|i| adjoint[i] - seen[i] * (of_gain + innovation / variance));
-        let mut left = [[0.0; N]; N];
-        for (i, row) in left.iter_mut().enumerate() {
-            *row = std::array::from_fn(|k| f64::from(u8::from(i == k)) - gain[i] * seen[k]);
-        }
-        known = between(&left, &known);
-        for i in 0..N {
-            for k in 0..N {
-                known[i][k] += seen[i] * seen[k] / variance;
-            }
-        }
-    }
-    out
-}
-
-/// Mᵀ·P·M of a symmetric P.
-fn between<const N: usize>(m: &[[f64; N]; N], p: &Covariance<N>) -> Covariance<N> {
-    let mut out = [[0.0; N]; N];
-    let columns: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|k| m[k][i]));
-    for i in 0..N {
-        let row = times(p, &columns[i]);
-        for j in i..N {
-            out[i][j] = product(&row, &columns[j]);
-            out[j][i] = out[i][j];
-        }
-    }
-    out
 }

@@ -3,7 +3,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, robust_loss};
 use crate::estimation::input::Total;
-use crate::estimation::model::{Column, Key, Model, Nominal, total};
+use crate::estimation::model::{Column, Model, total};
+use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Prior, Solution, Square, bounded};
 use rayon::prelude::*;

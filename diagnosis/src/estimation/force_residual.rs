@@ -4,8 +4,9 @@
 //! under uneven time stamps; its bandwidth is what the report states.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Knows, Noise, Observed, motion};
+use crate::estimation::filter::{Noise, Observed};
 use crate::estimation::input::Total;
+use crate::estimation::smoother::{Knows, motion};
 use std::f64::consts::TAU;
 
 /// Largest bandwidth, Hz.

@@ -291,7 +291,8 @@ mod tests {
     use super::*;
     use crate::effects::{Effect, EffectName};
     use crate::estimation::filter::Noise;
-    use crate::estimation::model::{Model, Nominal};
+    use crate::estimation::model::Model;
+    use crate::estimation::nominal::Nominal;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
     use crate::numerics::bootstrap::Random;
@@ -328,7 +329,7 @@ mod tests {
         let count = 1.0 / rig.encoder.counts_per_unit;
         let mut tracks = [BlockedRecording::new(&recording, &rig)];
         tracks[0].motion.v.fill(3.0);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
         let lost = find(&tracks[0], &fit, count, asked, None).lost;
@@ -374,8 +375,7 @@ mod tests {
             let mut tracks = [BlockedRecording::new(&recording, &rig)];
             tracks[0].motion.v.fill(3.0);
             tracks[0].motion.rest.fill(false);
-            let nominal =
-                Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+            let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
             let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
             let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
             let found = find(&tracks[0], &fit, count, any, Some(2.0 * count));

@@ -2,6 +2,7 @@
 
 pub(crate) mod blocked_recording;
 pub(crate) mod blocks;
+pub(crate) mod effective_command;
 pub(crate) mod filter;
 pub(crate) mod fit;
 pub(crate) mod force_residual;
@@ -9,9 +10,11 @@ pub(crate) mod input;
 pub(crate) mod lost_counts;
 pub(crate) mod model;
 pub(crate) mod noise;
+pub(crate) mod nominal;
 pub(crate) mod plausibility;
 pub(crate) mod quasi_static;
 pub(crate) mod reading_lag;
 pub(crate) mod refit;
 pub(crate) mod regressors;
 pub(crate) mod slices;
+pub(crate) mod smoother;

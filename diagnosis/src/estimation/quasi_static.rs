@@ -7,8 +7,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::input::Total;
-use crate::estimation::model::Nominal;
 use crate::estimation::noise;
+use crate::estimation::nominal::Nominal;
 use crate::estimation::refit::seen_acceleration;
 
 /// Part of the drive's force below which the inertia's own hardly matters.

@@ -1,11 +1,13 @@
 //! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Knows, Noise, motion};
+use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::input::Total;
-use crate::estimation::model::{Key, Model, Nominal};
+use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
+use crate::estimation::nominal::{Key, Nominal};
+use crate::estimation::smoother::{Knows, motion};
 use crate::numerics::linear::{Prior, Square, bounded};
 
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.

@@ -1,7 +1,8 @@
 //! The patched rig, and the place where an effect acts.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::{Key, Nominal, total};
+use crate::estimation::model::total;
+use crate::estimation::nominal::{Key, Nominal};
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch};
 use crate::selection::context::FittedModel;
@@ -112,19 +113,7 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
         if !intervals.is_empty() {
             place.recordings.push(Stretch { file: track.blocks.file.clone(), intervals_s: intervals });
         }
-        let states: Vec<f64> = match variable {
-            "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),
-            "travel" => track.motion.x.clone(),
-            "angle" => track
-                .motion
-                .x
-                .iter()
-                .map(|x| nominal.rig.turn().map_or(*x, |turn| x.rem_euclid(turn)))
-                .collect(),
-            "time" => track.blocks.start.clone(),
-            "tilt" => track.blocks.tilt.clone().unwrap_or_default(),
-            _ => track.motion.v.iter().map(|v| v.abs()).collect(),
-        };
+        let states = states(variable, track, nominal.rig.turn());
         pooled.extend(states.into_iter().zip(weight));
     }
     let (a, b): (Vec<f64>, Vec<f64>) = pooled.into_iter().unzip();
@@ -132,4 +121,16 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
         place.states.push(Region { variable: variable.into(), low, high });
     }
     place
+}
+
+/// Returns a variable of a recording, block by block; without its sign where an effect depends on its size.
+fn states(variable: &str, track: &BlockedRecording, turn: Option<f64>) -> Vec<f64> {
+    match variable {
+        "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),
+        "travel" => track.motion.x.clone(),
+        "angle" => track.motion.x.iter().map(|x| turn.map_or(*x, |turn| x.rem_euclid(turn))).collect(),
+        "time" => track.blocks.start.clone(),
+        "tilt" => track.blocks.tilt.clone().unwrap_or_default(),
+        _ => track.motion.v.iter().map(|v| v.abs()).collect(),
+    }
 }

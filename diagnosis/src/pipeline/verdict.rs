@@ -3,7 +3,7 @@
 use super::diagnosis::Reason;
 use crate::effects::CommandLaw;
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::Nominal;
+use crate::estimation::nominal::Nominal;
 use crate::io::schema::Verdict;
 use crate::selection::excitation::Excitation;
 use crate::thresholds::UNDERSTOOD;

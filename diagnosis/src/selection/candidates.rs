@@ -3,7 +3,7 @@
 use crate::effects::definition::{Believed, Movable, NominalTerm, Span};
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::Nominal;
+use crate::estimation::nominal::Nominal;
 use crate::io::rig::Kind;
 use crate::numerics::linear::correlation;
 use crate::thresholds::{AT_END, BRISTLES};
@@ -136,10 +136,11 @@ pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::filter::{Gains, Knows, Noise};
+    use crate::estimation::filter::{Gains, Noise};
     use crate::estimation::input::{Input, Total};
     use crate::estimation::refit::estimate_motion;
     use crate::estimation::regressors::effect_inputs;
+    use crate::estimation::smoother::Knows;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
@@ -158,7 +159,7 @@ mod tests {
             ..Recording::default()
         };
         let rig = Rig::of_values(0.01, 0.02, 0.05);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let mut tracks = [BlockedRecording::new(&recording, &nominal.rig)];
         let totals = [tracks[0].command_total(nominal.gain())];
         estimate_motion(&mut tracks, &totals, &NOISE, 1e-3, knows);
@@ -245,8 +246,7 @@ mod tests {
         let mut is_looked_for = |start_spread| {
             rig.encoder.start_spread = start_spread;
             let rig = rig.clone();
-            let nominal =
-                Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+            let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
             let mut span = span();
             span.rig.has_stroke = has_stroke(&span, &nominal);
             let any = |name: N| !shapes(name, &span, &nominal).is_empty();

@@ -3,10 +3,12 @@
 use crate::effects::Effect;
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::effective_command::effective_commands;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
-use crate::estimation::model::{Model, Nominal, effective_commands};
+use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
+use crate::estimation::nominal::Nominal;
 use crate::selection::candidates;
 use rayon::prelude::*;
 

@@ -4,8 +4,9 @@
 use crate::effects::Effect;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
-use crate::estimation::model::{Machine, Model};
+use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
+use crate::estimation::nominal::Machine;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::shape_search::descend;

@@ -3,9 +3,11 @@
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N, wave_mean};
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::effective_command::effective_command;
 use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
-use crate::estimation::model::{Model, Nominal, effective_command};
+use crate::estimation::model::Model;
+use crate::estimation::nominal::Nominal;
 use crate::numerics::golden_section::golden;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};

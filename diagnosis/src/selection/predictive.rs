@@ -103,7 +103,8 @@ mod tests {
     use crate::effects::{Effect, EffectName};
     use crate::estimation::blocked_recording::BlockedRecording;
     use crate::estimation::filter::Noise;
-    use crate::estimation::model::{Model, Nominal};
+    use crate::estimation::model::Model;
+    use crate::estimation::nominal::Nominal;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
@@ -134,7 +135,7 @@ mod tests {
             .collect();
         track.motion.v = v;
         let tracks = [track];
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let noise = Noise { sensor: 1.0, white: 2e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
         let cost = |effects: Vec<Effect>| -> f64 {
             let model = Model { effects, ..Model::default() };

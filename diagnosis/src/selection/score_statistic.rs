@@ -2,9 +2,11 @@
 
 use crate::effects::Effect;
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::effective_command::{effective_command, effective_commands};
 use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::input::Input;
-use crate::estimation::model::{Model, Nominal, effective_command, effective_commands};
+use crate::estimation::model::Model;
+use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
@@ -109,7 +111,7 @@ pub(crate) fn score(
     let sums = project(fit, residuals, &terms, effect.name.definition().has_own_phase());
     if effective.is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.
-        let gain = fit.value(crate::estimation::model::Key::Gain).unwrap_or(0.0);
+        let gain = fit.value(crate::estimation::nominal::Key::Gain).unwrap_or(0.0);
         let value = gain * sums.score[0] - 0.5 * gain * gain * sums.information.at(0, 0);
         return Score { gain: if value.is_finite() { value } else { 0.0 } };
     }

@@ -6,7 +6,8 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::input::Total;
-use crate::estimation::model::{Key, Model, Nominal, total};
+use crate::estimation::model::{Model, total};
+use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
 use crate::selection::context::FittedModel;
@@ -316,7 +317,7 @@ mod tests {
         };
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let track = BlockedRecording::new(&recording, &rig);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0 };
         let model = Model::default();
         let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);

@@ -3,11 +3,12 @@
 
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::Knows;
 use crate::estimation::input::Total;
-use crate::estimation::model::{Model, Nominal};
+use crate::estimation::model::Model;
 use crate::estimation::noise::guess;
+use crate::estimation::nominal::Nominal;
 use crate::estimation::refit::estimate_motion;
+use crate::estimation::smoother::Knows;
 use crate::selection::context::FittedModel;
 use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::known_travel::known;

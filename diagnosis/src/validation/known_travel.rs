@@ -63,7 +63,7 @@ pub(crate) fn beyond(tracks: &[BlockedRecording], model: &Model, span: &Span) ->
 mod tests {
     use super::*;
     use crate::effects::EffectName as N;
-    use crate::estimation::model::Nominal;
+    use crate::estimation::nominal::Nominal;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
     use crate::selection::candidates::span_of;
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
-        let nominal = Nominal { rig, external: 0.0, anchor: None, is_balanced: true, virtual_inertia: 0.0 };
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let span = span_of(&[slide(10.0)], &nominal);
         let model = |name| Model { effects: vec![Effect::shaped(name, &[])], ..Model::default() };
         let unknown = |to: f64, name| {

@@ -3,7 +3,7 @@
 use crate::effects::definition::{Fitted, NominalTerm, Reported};
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::{Key, Nominal};
+use crate::estimation::nominal::{Key, Nominal};
 use crate::io::schema::Parameter;
 use crate::numerics::linear::Square;
 use crate::selection::context::{FitContext, FittedModel};

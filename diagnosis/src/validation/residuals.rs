@@ -4,7 +4,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::input::Total;
-use crate::estimation::model::{Nominal, total};
+use crate::estimation::model::total;
+use crate::estimation::nominal::Nominal;
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::selection::context::FittedModel;
 use crate::validation::holdout_likelihood::evaluate_all;

@@ -7,7 +7,8 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise};
 use crate::estimation::fit::{Prepared, layout};
 use crate::estimation::input::Input;
-use crate::estimation::model::{Key, Model, Nominal};
+use crate::estimation::model::Model;
+use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::{Factor, Square, dot};
 use rayon::prelude::*;
 
