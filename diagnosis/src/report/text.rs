@@ -3,8 +3,7 @@
 use crate::numerics::bootstrap::Gain;
 use crate::pipeline::diagnosis::Reason;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
-use crate::validation::confidence::Weakness;
-use crate::validation::rejection::{Rather, Rejection};
+use crate::validation::rejection::{Rather, Rejection, Weakness};
 
 /// Says why an effect is not named, as a clause.
 pub(crate) fn rejection(why: &Rejection) -> String {

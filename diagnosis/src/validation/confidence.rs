@@ -7,6 +7,7 @@ use crate::thresholds::{
     BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS,
 };
 use crate::validation::acceptance_criteria::EffectEvidence;
+use crate::validation::rejection::Weakness;
 use std::collections::BTreeMap;
 
 /// The evidence for and against a name, by key; logarithms are natural.
@@ -57,25 +58,12 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
-/// The piece of evidence that lowers the probability of a name most.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Weakness {
-    /// Its gain is few standard errors.
-    UnsureGain { z: f64 },
-    /// It explains a small part of what the noise leaves.
-    SmallShare { share: f64 },
-    /// This part of what the refit leaves beyond chance is still there with it.
-    LeftOver { part: f64 },
-}
-
-impl Weakness {
-    /// The weakest piece of some evidence.
-    pub(crate) fn of(evidence: &Evidence) -> Self {
-        match takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key) {
-            "least_z" => Self::UnsureGain { z: evidence["least_z"].exp() },
-            "share" | "share_of_bristles" => Self::SmallShare { share: evidence["share"].exp() },
-            _ => Self::LeftOver { part: evidence["unexplained"] },
-        }
+/// Returns the piece of evidence that lowers the probability most.
+pub(crate) fn weakness(evidence: &Evidence) -> Weakness {
+    match takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key) {
+        "least_z" => Weakness::UnsureGain { z: evidence["least_z"].exp() },
+        "share" | "share_of_bristles" => Weakness::SmallShare { share: evidence["share"].exp() },
+        _ => Weakness::LeftOver { part: evidence["unexplained"] },
     }
 }
 
@@ -94,7 +82,7 @@ mod tests {
     #[test]
     fn the_weakness_is_what_takes_most_from_the_probability() {
         let sure = ("least_z", SUREST_Z.ln());
-        let weakest = |change: &[(&str, f64)]| Weakness::of(&evidence(&[&[sure], change].concat()));
+        let weakest = |change: &[(&str, f64)]| weakness(&evidence(&[&[sure], change].concat()));
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
         let unsure = weakest(&[("least_z", 2.5_f64.ln())]);
         assert!(matches!(unsure, Weakness::UnsureGain { z } if near(z, 2.5)), "{unsure:?}");

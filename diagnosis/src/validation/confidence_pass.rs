@@ -15,7 +15,7 @@ use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDE
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
-use crate::validation::confidence::{self, Evidence, Leftover, Weakness};
+use crate::validation::confidence::{self, Evidence, Leftover};
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library;
@@ -124,7 +124,7 @@ impl WeighedModel {
             if assessed.undecided {
                 Some(Rejection::Undecided)
             } else if assessed.confidence < NAMED {
-                let weakness = Weakness::of(&assessed.evidence);
+                let weakness = confidence::weakness(&assessed.evidence);
                 Some(Rejection::Improbable { probability: assessed.confidence, weakness })
             } else {
                 None

@@ -3,7 +3,6 @@
 use crate::effects::EffectName;
 use crate::numerics::bootstrap::Gain;
 use crate::selection::free_form::Inputs;
-use crate::validation::confidence::Weakness;
 
 /// Why an effect is not named.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,4 +58,15 @@ pub(crate) enum Rather {
     Unnamed { what: String },
     /// A force of a form that the effect cannot have: gains on left-out blocks, nats, of the form and of the effect.
     FreeForm { over: Inputs, form: f64, effect: f64 },
+}
+
+/// The piece of evidence that lowers the probability of a name most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Weakness {
+    /// Its gain is few standard errors.
+    UnsureGain { z: f64 },
+    /// It explains a small part of what the noise leaves.
+    SmallShare { share: f64 },
+    /// This part of what the refit leaves beyond chance is still there with it.
+    LeftOver { part: f64 },
 }
