@@ -5,24 +5,20 @@ use std::collections::VecDeque;
 
 /// An effect on the command, with its state. Steps may be of any length: each answer is the mean over its step.
 #[derive(Debug, Clone)]
-pub enum CommandLaw {
+pub(crate) enum CommandLaw {
     /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass whole.
-    #[allow(missing_docs)]
     Deadband { half_width: f64, shift: bool },
     /// Commands beyond the limit are held at it.
-    #[allow(missing_docs)]
     Clip { limit: f64 },
     /// A transport delay, s; the queue holds (length, command) of what is under way.
-    #[allow(missing_docs)]
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },
     /// A first-order lag, s.
-    #[allow(missing_docs)]
     Lag { time_constant: f64, state: Option<f64> },
 }
 
 impl CommandLaw {
     /// The law of an effect on the command; none where the effect acts elsewhere.
-    pub fn new(effect: &Effect) -> Option<Self> {
+    pub(crate) fn new(effect: &Effect) -> Option<Self> {
         effect.name.definition().command_law(effect)
     }
 
@@ -37,7 +33,7 @@ impl CommandLaw {
     }
 
     /// The mean effective command over a step of `dt` s during which `command` is held.
-    pub fn step(&mut self, command: f64, dt: f64) -> f64 {
+    pub(crate) fn step(&mut self, command: f64, dt: f64) -> f64 {
         match self {
             Self::Deadband { half_width, shift } => {
                 if command.abs() <= *half_width {

@@ -446,7 +446,7 @@ struct Entry {
 }
 
 /// Reads the text of a file of effects; a reason with its place where it cannot be used.
-pub fn read_effects(text: &str, file: &str) -> Result<Vec<EffectName>, String> {
+pub(crate) fn read_effects(text: &str, file: &str) -> Result<Vec<EffectName>, String> {
     let read: File = toml::from_str(text).map_err(|cause| {
         let line =
             cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);

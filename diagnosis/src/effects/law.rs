@@ -68,17 +68,17 @@ impl Law {
     }
 
     /// True if the terms are travel added to what the encoder reads, rather than force.
-    pub fn in_sensor(&self) -> bool {
+    pub(crate) fn in_sensor(&self) -> bool {
         self.name.definition().in_sensor()
     }
 
     /// True if the force is dry friction, which holds an axis at rest rather than moving it.
-    pub fn is_dry(&self) -> bool {
+    pub(crate) fn is_dry(&self) -> bool {
         self.name.definition().is_dry()
     }
 
     /// The part of a force without a name that holds an axis at rest, per unit of its coefficient, N·m or N.
-    pub fn dry_part(&self, state: &State) -> f64 {
+    pub(crate) fn dry_part(&self, state: &State) -> f64 {
         self.law.dry_part(state)
     }
 

@@ -15,8 +15,9 @@ mod load;
 mod travel_profile;
 mod waves;
 
-pub use command::CommandLaw;
-pub use formula::{Formula, FormulaId, FormulaText, read_effects};
+pub(crate) use command::CommandLaw;
+pub(crate) use formula::read_effects;
+pub use formula::{Formula, FormulaId, FormulaText};
 pub(crate) use law::wave_mean;
 pub use law::{Law, State};
 pub use table::{Table, Variable};
@@ -110,7 +111,7 @@ impl EffectName {
     }
 
     /// Returns the subsystem that it belongs to.
-    pub fn subsystem(self) -> Subsystem {
+    pub(crate) fn subsystem(self) -> Subsystem {
         self.definition().subsystem()
     }
 
@@ -231,7 +232,7 @@ impl Effect {
     }
 
     /// A force without a name; `turn` is the travel of one turn where it is over the angle.
-    pub fn tabled(table: Table, turn: Option<f64>) -> Self {
+    pub(crate) fn tabled(table: Table, turn: Option<f64>) -> Self {
         let mut effect = Self::shaped(EffectName::Table, &[]);
         effect.shape.extend(turn.map(|turn| ("turn".to_owned(), turn)));
         effect.table = Some(table);

@@ -228,7 +228,7 @@ impl Recording {
     }
 
     /// From the first row to the last, s.
-    pub fn duration_s(&self) -> f64 {
+    pub(crate) fn duration_s(&self) -> f64 {
         self.time_s[self.len() - 1] - self.time_s[0]
     }
 

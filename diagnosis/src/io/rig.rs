@@ -290,27 +290,27 @@ impl Rig {
     }
 
     /// Relative standard deviation of the inertia.
-    pub fn inertia_sd(&self) -> f64 {
+    pub(crate) fn inertia_sd(&self) -> f64 {
         self.uncertainty.inertia.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
     /// Relative standard deviation of the gain.
-    pub fn gain_sd(&self) -> f64 {
+    pub(crate) fn gain_sd(&self) -> f64 {
         self.uncertainty.gain.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
     /// Relative standard deviation of the viscous friction.
-    pub fn viscous_sd(&self) -> f64 {
+    pub(crate) fn viscous_sd(&self) -> f64 {
         self.uncertainty.viscous.unwrap_or(UNDECLARED_FRICTION).max(1e-4)
     }
     /// Relative standard deviation of the dry friction.
-    pub fn coulomb_sd(&self) -> f64 {
+    pub(crate) fn coulomb_sd(&self) -> f64 {
         self.uncertainty.coulomb.unwrap_or(UNDECLARED_FRICTION).max(1e-4)
     }
     /// Relative standard deviation of the gravity of an off-centre mass.
-    pub fn gravity_sd(&self) -> f64 {
+    pub(crate) fn gravity_sd(&self) -> f64 {
         self.uncertainty.gravity.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
     /// Relative standard deviation of the weight.
-    pub fn weight_sd(&self) -> f64 {
+    pub(crate) fn weight_sd(&self) -> f64 {
         self.uncertainty.weight.unwrap_or(UNDECLARED_EASY).max(1e-4)
     }
 }

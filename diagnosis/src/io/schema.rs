@@ -35,7 +35,7 @@ pub struct Parameter {
 
 impl Parameter {
     /// The unit as people read it: nothing where there is none.
-    pub fn unit_in_words(&self) -> &str {
+    pub(crate) fn unit_in_words(&self) -> &str {
         if self.unit == "1" { "" } else { &self.unit }
     }
 }

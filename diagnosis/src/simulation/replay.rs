@@ -147,7 +147,7 @@ impl<'a> Beside<'a> {
     }
 
     /// The same under the recorded reference, with the loop that ran then.
-    pub fn under_reference(&self, rig: &Rig, feedback: PositionLoop) -> Trajectory {
+    pub(crate) fn under_reference(&self, rig: &Rig, feedback: PositionLoop) -> Trajectory {
         self.whole(rig, Some(feedback))
     }
 
