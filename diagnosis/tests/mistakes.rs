@@ -122,7 +122,7 @@ fn units_signs_and_columns_that_are_mistaken_get_the_sentence_that_helps() {
         "a turned sign",
         &rig(),
         |r| r.position_counts.iter_mut().for_each(|q| *q = -*q),
-        "a sign is turned; turn the sign of actuator.gain",
+        "a sign is wrong; change the sign of actuator.gain",
     );
     helps("at rest", &rig(), |r| r.position_counts.fill(17.0), "is at rest");
 }
@@ -188,13 +188,13 @@ fn files_and_keys_that_are_mistaken_are_refused_with_their_place() {
             "misspelt.toml",
             "fit.csv",
             "holdout.csv",
-            "[model] viscuos is no key of a rig file; do you mean [model] viscous",
+            "[model] viscuos is not a key of a rig file; do you mean [model] viscous",
         ),
         (
             "misplaced.toml",
             "fit.csv",
             "holdout.csv",
-            "[encoder] limit is no key of a rig file; it belongs into [actuator], as limit",
+            "[encoder] limit is not a key of a rig file; it belongs in [actuator], as limit",
         ),
         (
             "weight.toml",

@@ -56,7 +56,7 @@ fn no_counts(recording: &Recording) -> Option<String> {
     let span = spread(counts);
     (broken(counts) > BROKEN && span > 0.0 && span < FEW_COUNTS).then(|| {
         format!(
-            "position_counts of {} are no whole counts and span {span:.4}: they seem to be in radians, degrees or metres; multiply them by counts_per_unit, or let host-sim import do it with --column position=position_counts:deg",
+            "position_counts of {} are not whole counts and span {span:.4}: they seem to be in radians, degrees or metres; multiply them by counts_per_unit, or let host-sim import do it with --column position=position_counts:deg",
             recording.file
         )
     })
@@ -136,7 +136,7 @@ fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
     let ratio = inertia / rig.model.inertia;
     if ratio < -0.1 && work < 0.0 {
         return Some(format!(
-            "the axis of {file} moves against its command, whose work is negative: a sign is turned; turn the sign of actuator.gain, or of one column"
+            "the axis of {file} moves against its command, whose work is negative: a sign is wrong; change the sign of actuator.gain, or of one column"
         ));
     }
     if (OFF..FAR).contains(&ratio) {

@@ -50,10 +50,10 @@ pub(crate) fn unknown(rig: &toml::Table) -> Option<String> {
                         near(keys).filter(|(d, _)| *d == 0).map(|(_, known)| (other, known))
                     })
                     .next()
-                    .map(|(other, known)| format!("it belongs into {}, as {known}", place(other).trim()))
+                    .map(|(other, known)| format!("it belongs in {}, as {known}", place(other).trim()))
             });
         let hint = hint.unwrap_or_else(|| format!("known are {}", keys.join(", ")));
-        return Some(format!("{}{key} is no key of a rig file; {hint}", place(table)));
+        return Some(format!("{}{key} is not a key of a rig file; {hint}", place(table)));
     }
     None
 }
@@ -68,12 +68,12 @@ mod tests {
         assert_eq!(said("format = 1\n[model]\ninertia = 1.0\nviscous = 2.0"), None);
         assert_eq!(
             said("[model]\nviscos = 2.0").as_deref(),
-            Some("[model] viscos is no key of a rig file; do you mean [model] viscous")
+            Some("[model] viscos is not a key of a rig file; do you mean [model] viscous")
         );
         assert_eq!(
             said("[model]\ncounts_per_unit = 2.0").as_deref(),
             Some(
-                "[model] counts_per_unit is no key of a rig file; it belongs into [encoder], as counts_per_unit"
+                "[model] counts_per_unit is not a key of a rig file; it belongs in [encoder], as counts_per_unit"
             )
         );
         assert!(

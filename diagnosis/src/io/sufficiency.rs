@@ -89,12 +89,12 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
     // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
     if largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds {
         return Some(format!(
-            "{file} travels {travel:.3} {}, which its command cannot bring about with the rig's inertia and gain: a unit is off",
+            "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: a unit is wrong",
             rig.kind.length()
         ));
     }
     None
 }
 
-/// How many times as far as its command can bring it an axis travels where a unit is off.
+/// Travel over the farthest that the command can cause from which a unit is wrong.
 const IMPOSSIBLE: f64 = 30.0;

@@ -123,7 +123,7 @@ fn numbers(out: &mut String, outcome: &Outcome) {
         "<section><h2>Before and after, on recordings that were not used for fitting</h2><div class=bars>",
     );
     let models = [
-        ("the simulation as it stands", "a", f.nominal),
+        ("the simulation as it is", "a", f.nominal),
         ("with its values refitted", "b", f.refit),
         ("with what was found", "c", f.patched),
     ];
@@ -139,7 +139,7 @@ fn numbers(out: &mut String, outcome: &Outcome) {
     }
     let _ = write!(
         out,
-        "</div><p class=note>Root mean square of the force that each model leaves, in per cent of the force itself ({} {unit}), below {:.0} Hz.",
+        "</div><p class=note>Root mean square force residual of each model, in per cent of the force itself ({} {unit}), below {:.0} Hz.",
         short(f.force_rms.holdout),
         outcome.report.residual_bandwidth_hz
     );
@@ -193,7 +193,7 @@ fn one(out: &mut String, effect: &Named, kind: Kind) {
     for region in &effect.place.states {
         let _ = write!(
             out,
-            "<p>Shows most for {} between {} and {}{}.</p>",
+            "<p>Strongest for {} from {} to {}{}.</p>",
             safe(&region.variable),
             short(region.low),
             short(region.high),
@@ -229,16 +229,16 @@ fn over_time(out: &mut String, outcome: &Outcome) {
     let marked = "<span><i class=\"key m\"></i> where</span>";
     let (after, marks_say) = match &outcome.report {
         report if !report.effects.is_empty() || outcome.evidence.form.is_some() => {
-            ("with what was found", format!(" {marked} what was found acts most"))
+            ("with what was found", format!(" {marked} the effects found are strongest"))
         }
         report if report.place.is_some() => {
-            ("with its values refitted", format!(" {marked} that leaves most"))
+            ("with its values refitted", format!(" {marked} its residual is largest"))
         }
         _ => ("with its values refitted", String::new()),
     };
     let _ = write!(
         out,
-        "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it stands</span> <span><i class=\"key c\"></i> \
+        "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it is</span> <span><i class=\"key c\"></i> \
          {after}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
     );
     for series in &outcome.evidence.series {
@@ -289,7 +289,7 @@ fn over_states(out: &mut String, outcome: &Outcome) {
     let model = if outcome.report.effects.is_empty() { "refitted" } else { "patched" };
     let _ = write!(
         out,
-        "<section><h2>Where: what is left, over states</h2><p class=note><span><i class=\"key f\"></i> moving forward</span> <span><i class=\"key r\"></i> moving \
+        "<section><h2>Where: residual over states</h2><p class=note><span><i class=\"key f\"></i> moving forward</span> <span><i class=\"key r\"></i> moving \
          backward.</span> Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
     );
     for map in &outcome.evidence.maps {
@@ -326,12 +326,9 @@ fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
         out.push_str("\"/>");
     }
     let carries = if map.significant {
-        format!(
-            "carries to the held-out recordings: {:.0} % of what is left there",
-            100.0 * map.carries.max(0.0)
-        )
+        format!("predicts {:.0} % of the held-out residual", 100.0 * map.carries.max(0.0))
     } else {
-        "does not carry to the held-out recordings".to_owned()
+        "does not generalise to the held-out recordings".to_owned()
     };
     let _ = write!(
         out,
@@ -347,7 +344,7 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
         return;
     }
     out.push_str(
-        "<section><h2>What was considered</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
+        "<section><h2>What was tested</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
     );
     let gain = |h: &Hypothesis| h.holdout_gain.unwrap_or(f64::NEG_INFINITY);
     let mut sorted: Vec<_> = r.hypotheses.iter().collect();

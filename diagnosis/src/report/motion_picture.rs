@@ -23,7 +23,7 @@ fn class(model: &str) -> &'static str {
 /// Returns the name of a model in words.
 pub(crate) fn words(model: &str) -> &str {
     match model {
-        "nominal" => "the simulation as it stands",
+        "nominal" => "the simulation as it is",
         "refit" => "with its values refitted",
         "patched" => "with what was found",
         "motion-fitted" => "with values fitted by motion",

@@ -48,7 +48,7 @@ pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[Stri
         safe(&first)
     );
     for note in notes {
-        let _ = write!(out, "<p class=next><b>Mind:</b> {}.</p>", safe(note));
+        let _ = write!(out, "<p class=next><b>Warning:</b> {}.</p>", safe(note));
     }
     for one in compared {
         let names: Vec<&str> = one.models.iter().map(|m| m.model.as_str()).collect();
@@ -131,7 +131,7 @@ mod tests {
         );
         let places: Vec<usize> = [
             "<h1>Run over the",
-            "<b>Mind:</b> a note.",
+            "<b>Warning:</b> a note.",
             "<h3>Position</h3>",
             "<h3>Position, started from the measured state every 2 s</h3>",
             "<h3>Speed</h3>",
