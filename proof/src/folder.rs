@@ -58,6 +58,14 @@ fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought
         .get(id)
         .cloned()
         .ok_or_else(|| format!("the key tells nothing of the case {}", path.display()))?;
+    Ok(Brought { id: id.into(), paths: paths(path)?, truth })
+}
+
+/// The files of the case in a folder.
+///
+/// # Errors
+/// One sentence: what is missing or cannot be read.
+pub(crate) fn paths(path: &Path) -> Result<Paths, String> {
     let (mut fit, mut holdout) = (Vec::new(), Vec::new());
     let entries = std::fs::read_dir(path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
     for entry in entries.flatten() {
@@ -73,7 +81,7 @@ fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought
     if fit.is_empty() || holdout.is_empty() {
         return Err(format!("{} needs fit*.csv and holdout*.csv, at least one of each", path.display()));
     }
-    Ok(Brought { id: id.into(), paths: Paths { rig: path.join("rig.toml"), fit, holdout }, truth })
+    Ok(Paths { rig: path.join("rig.toml"), fit, holdout })
 }
 
 fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {

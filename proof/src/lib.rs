@@ -11,6 +11,7 @@ mod cases;
 mod dynamics;
 mod folder;
 mod generator;
+mod inject;
 mod judge;
 mod key;
 mod machines;
@@ -53,6 +54,9 @@ pub fn run(options: &Options) -> Result<(), String> {
         None if options.reports.is_some() => Box::new(tool::Finished),
         None => Box::new(tool::Diagnosis),
     };
+    if !options.inject.is_empty() {
+        return inject::run(options, &*tool);
+    }
     if !options.cases_from.is_empty() {
         return options.cases_from.iter().try_for_each(|top| judge_folder(options, top, &*tool));
     }
@@ -125,7 +129,7 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<(), Strin
     } else {
         bench::measure_speed(options.seed, tool).ok()
     };
-    let size = if options.quick { "quick run".into() } else { format!("{} draws a cell", options.cases) };
+    let size = if options.quick { "quick run".into() } else { format!("{} draws a cell", options.draws()) };
     let run = report::Run {
         options: options.clone(),
         tool: tool_name(options),
@@ -169,7 +173,7 @@ fn gate(sums: &sums::Sums) -> Result<(), String> {
 }
 
 fn wanted(options: &Options) -> Vec<Spec> {
-    let amounts = if options.quick { Amounts::quick() } else { Amounts::full(options.cases) };
+    let amounts = if options.quick { Amounts::quick() } else { Amounts::full(options.draws()) };
     let mut specs = cases::list(amounts, options.seed);
     if let Some(text) = &options.only {
         specs.retain(|s| s.category.matches(text) || s.hidden.iter().any(|h| h.contains(text.as_str())));

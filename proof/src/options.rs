@@ -7,8 +7,8 @@ use std::path::PathBuf;
 pub struct Options {
     /// Seed of every draw: the same seed gives the same cases to the last byte.
     pub seed: u64,
-    /// Draws of every effect at every strength; pairs, nulls and the rest in proportion.
-    pub cases: usize,
+    /// Draws of every effect at every strength, with pairs, nulls and the rest in proportion; or effects to conceal in all.
+    pub cases: Option<usize>,
     /// The small fixed run.
     pub quick: bool,
     /// Cases that run at the same time.
@@ -23,6 +23,10 @@ pub struct Options {
     pub calibrate: Vec<PathBuf>,
     /// Folders of cases that somebody else made: judge these and draw none.
     pub cases_from: Vec<PathBuf>,
+    /// Folders of real machines: conceal effects in their recordings and judge those.
+    pub inject: Vec<PathBuf>,
+    /// Diagnoses of these machines as they are, which count whatever made them.
+    pub untouched: Option<PathBuf>,
     /// Reports stay here, in a folder for every case.
     pub keep: Option<PathBuf>,
     /// Reports that are there already, in a folder for every case: judge these and run no tool.
@@ -37,7 +41,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             seed: 1,
-            cases: 2,
+            cases: None,
             quick: false,
             jobs: 2,
             minutes: None,
@@ -45,6 +49,8 @@ impl Default for Options {
             only: None,
             calibrate: Vec::new(),
             cases_from: Vec::new(),
+            inject: Vec::new(),
+            untouched: None,
             keep: None,
             reports: None,
             tool: None,
@@ -57,7 +63,7 @@ impl Default for Options {
 pub(crate) const SPEED: &str = "speed";
 
 /// The flags that take a value.
-const FLAGS: [&str; 12] = [
+const FLAGS: [&str; 14] = [
     "--seed",
     "--cases",
     "--jobs",
@@ -66,6 +72,8 @@ const FLAGS: [&str; 12] = [
     "--write",
     "--calibrate",
     "--cases-from",
+    "--inject",
+    "--untouched",
     "--keep",
     "--reports",
     "--tool",
@@ -83,6 +91,11 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
   --cases-from DIR  judge the cases of a folder with its key.json or believed.tsv and draw none; again for more folders.
                     docs/benchmark.md tells the format
+  --inject DIR  conceal known effects in the recordings of real machines of a folder (a folder a machine, with rig.toml,
+                fit*.csv and holdout*.csv) and judge these; again for more folders. --cases K: K effects in all (44)
+  --untouched DIR  with --inject: the diagnoses of the machines as they are, in a folder for every machine, whatever version
+                made them, so that two versions meet the same cases. Without it they are made anew for each version and
+                kept in inject-untouched of the folder of --out
   --keep DIR    leave the reports in DIR, in a folder for every case
   --reports DIR judge the reports that --keep, or another program, left in DIR, and run no tool; with --cases-from
   --tool 'PROGRAM --rig {rig} --fit {fit} --holdout {holdout} --out {out}'  judge another program; a file that there are
@@ -93,6 +106,11 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
 ";
 
 impl Options {
+    /// Draws of every effect at every strength.
+    pub(crate) fn draws(&self) -> usize {
+        self.cases.unwrap_or(2)
+    }
+
     /// The time in which cases may begin.
     pub(crate) fn budget(&self) -> Option<std::time::Duration> {
         self.minutes.map(|m| std::time::Duration::from_secs(60 * m))
@@ -121,13 +139,17 @@ impl Options {
                 |what: &str| value.parse::<u64>().map_err(|_| format!("{flag} takes {what}, not `{value}`"));
             match flag.as_str() {
                 "--seed" => options.seed = whole("a whole number from 0")?,
-                "--cases" => options.cases = whole("a whole number from 1")?.clamp(1, 1000) as usize,
+                "--cases" => {
+                    options.cases = Some(whole("a whole number from 1")?.clamp(1, 10_000) as usize);
+                }
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
                 "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
                 "--only" => options.only = Some(value),
                 "--calibrate" => options.calibrate = value.split(',').map(PathBuf::from).collect(),
                 "--write" => options.write = Some(PathBuf::from(value)),
                 "--cases-from" => options.cases_from.push(PathBuf::from(value)),
+                "--inject" => options.inject.push(PathBuf::from(value)),
+                "--untouched" => options.untouched = Some(PathBuf::from(value)),
                 "--keep" => options.keep = Some(PathBuf::from(value)),
                 "--reports" => options.reports = Some(PathBuf::from(value)),
                 "--tool" => options.tool = Some(value),
@@ -145,6 +167,16 @@ impl Options {
         }
         if self.reports.is_some() && (self.tool.is_some() || self.keep.is_some()) {
             return Err("--reports runs no tool, so it goes neither with --tool nor with --keep".into());
+        }
+        if self.untouched.is_some() && self.inject.is_empty() {
+            return Err("--untouched goes with --inject: the diagnoses are of its machines".into());
+        }
+        let others = !self.cases_from.is_empty() || self.write.is_some() || self.reports.is_some();
+        if !self.inject.is_empty() && others {
+            return Err(
+                "--inject draws cases of its own, so it does not go with --cases-from, --write or --reports"
+                    .into(),
+            );
         }
         if self.write.is_some() && !self.cases_from.is_empty() {
             return Err("--write draws cases, so it does not go with --cases-from".into());
@@ -164,7 +196,7 @@ mod tests {
     #[test]
     fn flags_are_read_and_wrong_ones_named() {
         let o = parse("--seed 7 --cases 3 --quick --jobs 1").unwrap().unwrap();
-        assert_eq!((o.seed, o.cases, o.quick, o.jobs), (7, 3, true, 1));
+        assert_eq!((o.seed, o.cases, o.quick, o.jobs), (7, Some(3), true, 1));
         assert_eq!(parse("--help"), Ok(None));
         assert!(parse("--sed 7").unwrap_err().contains("--sed"));
         assert!(parse("--seed x").unwrap_err().contains("`x`"));
@@ -173,6 +205,8 @@ mod tests {
         assert!(parse("--cases-from a --cases-from b --reports r").unwrap_err().contains("one --cases-from"));
         assert!(parse("--reports r").unwrap_err().contains("one --cases-from"));
         assert!(parse("--write w --cases-from a").unwrap_err().contains("--write"));
+        assert!(parse("--untouched a").unwrap_err().contains("--inject"));
+        assert!(parse("--inject a --write b").unwrap_err().contains("--write"));
         assert!(parse("--seed").unwrap_err().contains("needs a value"));
     }
 }

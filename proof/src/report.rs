@@ -334,7 +334,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
         "source": run.source,
         "seed": run.options.seed,
         "quick": run.options.quick,
-        "draws": run.options.cases,
+        "draws": run.options.draws(),
         "only": run.options.only,
         "planned": run.planned,
         "unbuilt": run.unbuilt,

@@ -4,8 +4,8 @@
 mod joint;
 mod known;
 mod laws;
-mod motion;
-mod recording;
+pub(crate) mod motion;
+pub(crate) mod recording;
 mod residual;
 mod rig;
 #[cfg(test)]

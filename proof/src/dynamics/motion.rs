@@ -99,7 +99,7 @@ impl Motion {
 }
 
 /// Cubic Hermite interpolation with slopes of the parabola through three neighbours, uneven stamps.
-fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
+pub(crate) fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let n = stamps.len();
     let chord = |i: usize| (values[i + 1] - values[i]) / (stamps[i + 1] - stamps[i]);
     let slope = |i: usize| {
@@ -127,7 +127,7 @@ fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
 }
 
 /// The mean of a held signal over the cell of width `h` about each grid point.
-fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f64> {
+pub(crate) fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f64> {
     let n = stamps.len();
     let mut sum = vec![0.0; n];
     for i in 1..n {
@@ -152,7 +152,7 @@ fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f64> {
 }
 
 /// Mean of the sign over the cell about each row, of a signal that goes straight from row to row.
-fn directions(speed: &[f64]) -> Vec<f64> {
+pub(crate) fn directions(speed: &[f64]) -> Vec<f64> {
     let half = |inner: f64, outer: f64| {
         // From the row to the middle between the rows.
         let middle = 0.5 * (inner + outer);

@@ -1,0 +1,72 @@
+//! The diagnosis of every carrier as it is: what its model leaves, which is the measure of what is concealed, and what it
+//! names, which is not false later. Kept in a working folder, for it takes as long as the cases.
+
+use std::path::{Path, PathBuf};
+
+use super::carrier::Place;
+use crate::tool::{self, Answer, Tool};
+
+/// What the tool says of an untouched machine.
+#[derive(Clone, Debug)]
+pub(crate) struct Untouched {
+    pub(crate) answer: Answer,
+    /// Rms that the tool's own model leaves on the recordings to fit on, N·m or N.
+    pub(crate) left: f64,
+}
+
+/// A number that changes with the tool and with the files.
+fn stamp(place: &Place, tool: &str) -> String {
+    // FNV-1a.
+    let mut hash = 0xCBF2_9CE4_8422_2325_u64;
+    let mut eat = |bytes: &[u8]| {
+        bytes.iter().for_each(|b| hash = (hash ^ u64::from(*b)).wrapping_mul(0x0100_0000_01B3));
+    };
+    eat(tool.as_bytes());
+    let files = std::iter::once(&place.paths.rig).chain(&place.paths.fit).chain(&place.paths.holdout);
+    // A file that cannot be read fails where it is used.
+    files.for_each(|f| eat(&std::fs::read(f).unwrap_or_default()));
+    format!("{hash:016x}")
+}
+
+/// Which tool this is, for the stamp: its command line, or the program itself.
+pub(crate) fn tool_mark(line: Option<&str>) -> String {
+    if let Some(line) = line {
+        return line.into();
+    }
+    let exe = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+    let sum = exe.iter().fold(7_u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(*b)));
+    format!("{sum:016x}")
+}
+
+/// Asks the tool about the carrier, or reads what it said before. `fixed`: reports that count whatever made them.
+///
+/// # Errors
+/// Why there is no fit.
+pub(crate) fn ask(
+    place: &Place,
+    tool: &dyn Tool,
+    mark: &str,
+    work: &Path,
+    fixed: bool,
+) -> Result<Untouched, String> {
+    let out: PathBuf = work.join(&place.id);
+    let (file, report) = (out.join("stamp"), out.join("diagnosis.json"));
+    let now = stamp(place, mark);
+    let kept = report.is_file() && (fixed || std::fs::read_to_string(&file).is_ok_and(|old| old == now));
+    let answer = if kept {
+        tool::ask(&tool::Finished, &place.paths, &out)?
+    } else {
+        tool::ask(tool, &place.paths, &out)?
+    };
+    if !kept {
+        std::fs::write(&file, now).map_err(|e| format!("cannot write {}: {e}", file.display()))?;
+    }
+    let text = std::fs::read_to_string(&report).map_err(|e| format!("{}: {e}", report.display()))?;
+    let value: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    let left = value["fit"]["patched"]["fit"].as_f64().unwrap_or(0.0);
+    if left > 0.0 && answer.bandwidth_hz > 0.0 {
+        Ok(Untouched { answer, left })
+    } else {
+        Err("no fit".into())
+    }
+}
