@@ -16,6 +16,7 @@ mod table;
 mod untouched;
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use carrier::{Carrier, Place};
@@ -42,6 +43,8 @@ const CASES: usize = 44;
 struct Known {
     place: Place,
     untouched: Untouched,
+    /// What the plain rival finds on it, once it has been asked.
+    plain: OnceLock<Vec<(&'static str, f64)>>,
 }
 
 /// Which case to draw.
@@ -68,7 +71,7 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
     let (mut known, mut without) = (Vec::new(), Vec::new());
     for (place, untouched) in places.into_iter().zip(asked.into_iter().flatten()) {
         match untouched {
-            Ok(untouched) => known.push(Known { place, untouched }),
+            Ok(untouched) => known.push(Known { place, untouched, plain: OnceLock::new() }),
             Err(why) => without.push(format!("{} ({why})", place.id)),
         }
     }
@@ -189,7 +192,7 @@ fn run_case(
         answer,
         own: chosen.untouched.answer.effects.clone(),
         plain: plain(&ground.written(&drawn)),
-        plain_own: plain(&ground.carrier),
+        plain_own: chosen.plain.get_or_init(|| plain(&ground.carrier)).clone(),
         seconds,
     };
     std::fs::remove_dir_all(&dir).map_err(|e| format!("cannot remove {}: {e}", dir.display()))?;

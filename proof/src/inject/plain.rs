@@ -3,6 +3,8 @@
 //! its size is the same on both within a factor of two. Laws of the command act on the command that the model so far
 //! predicts, never on the recorded one, which holds the noise that is to be explained.
 
+use std::rc::Rc;
+
 use super::carrier::Carrier;
 use super::plain_laws::{Candidate, candidates};
 use super::regress::{Block, left_on, left_out, solve};
@@ -33,8 +35,11 @@ struct Tried {
 pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
     let sights: Vec<Sight> = carrier.recordings().map(|r| Sight::of(r, &carrier.rig, band(r))).collect();
     let fits = carrier.fits.len();
-    let mut taken: Vec<Tried> = Vec::new();
+    let mut taken: Vec<Rc<Tried>> = Vec::new();
     let mut found: Vec<Found> = Vec::new();
+    let all = candidates(carrier, &sights);
+    // What does not rest on the predicted command is the same in every round.
+    let mut kept: Vec<Option<Rc<Tried>>> = all.iter().map(|_| None).collect();
     if sights.iter().any(|s| s.rows() < 40) {
         return found;
     }
@@ -43,12 +48,18 @@ pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
         let coefficients = solve(&base[..fits]);
         let errors = (left_out(&base[..fits]), held_out(&base[fits..], &coefficients, &taken, &sights));
         let predicted = predictions(&sights, &coefficients);
-        let mut best: Option<(Found, Tried)> = None;
-        for candidate in candidates(carrier, &sights) {
+        let mut best: Option<(Found, Rc<Tried>)> = None;
+        for (candidate, kept) in all.iter().zip(&mut kept) {
             if found.iter().any(|f| f.name == candidate.name) {
                 continue;
             }
-            let tried = columns(&candidate, &sights, &predicted);
+            let tried = match kept {
+                Some(tried) => Rc::clone(tried),
+                None => Rc::new(columns(candidate, &sights, &predicted)),
+            };
+            if !candidate.by_command {
+                *kept = Some(Rc::clone(&tried));
+            }
             let Some(share) = share(&sights, fits, &taken, &tried, errors) else { continue };
             if share >= least && best.as_ref().is_none_or(|(f, _)| share > f.share) {
                 best = Some((Found { name: tried.name, share }, tried));
@@ -73,7 +84,7 @@ fn columns(candidate: &Candidate, sights: &[Sight], predicted: &[Vec<f64>]) -> T
 }
 
 /// Nominal columns and those of the laws; a periodic law has two columns for every recording to fit on.
-fn blocks(sights: &[Sight], fits: usize, laws: &[Tried]) -> Vec<Block> {
+fn blocks(sights: &[Sight], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
     let one = |(r, sight): (usize, &Sight)| {
         let mut columns = sight.nominal.clone();
         for law in laws {
@@ -92,7 +103,7 @@ fn blocks(sights: &[Sight], fits: usize, laws: &[Tried]) -> Vec<Block> {
 }
 
 /// Rms left on the held-out recordings: the phase of a periodic law is found there, its amplitude is not.
-fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Tried], sights: &[Sight]) -> f64 {
+fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights: &[Sight]) -> f64 {
     let mut blocks: Vec<Block> = holdouts.to_vec();
     let mut at = sights[0].nominal.len();
     let fits = sights.len() - holdouts.len();
@@ -119,13 +130,15 @@ fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Tried], sights: &[
 }
 
 /// The smaller of the two shares of the force error that a law takes; nothing where its sizes do not agree.
-fn share(sights: &[Sight], fits: usize, taken: &[Tried], tried: &Tried, before: (f64, f64)) -> Option<f64> {
-    let all = |extra: &Tried| {
-        let mut list: Vec<Tried> = taken.iter().map(Tried::copy).collect();
-        list.push(extra.copy());
-        list
-    };
-    let laws = all(tried);
+fn share(
+    sights: &[Sight],
+    fits: usize,
+    taken: &[Rc<Tried>],
+    tried: &Rc<Tried>,
+    before: (f64, f64),
+) -> Option<f64> {
+    let mut laws = taken.to_vec();
+    laws.push(Rc::clone(tried));
     let base = blocks(sights, fits, &laws);
     let coefficients = solve(&base[..fits]);
     let nominal = base[0].columns.len() - if tried.periodic { 2 * fits } else { tried.columns[0].len() };
@@ -150,12 +163,6 @@ fn share(sights: &[Sight], fits: usize, taken: &[Tried], tried: &Tried, before: 
     let held = 1.0 - held_out(&base[fits..], &coefficients, &laws, sights) / before.1;
     let least = left.min(held);
     least.is_finite().then_some(least)
-}
-
-impl Tried {
-    fn copy(&self) -> Self {
-        Self { name: self.name, columns: self.columns.clone(), periodic: self.periodic }
-    }
 }
 
 /// The drive's force that the nominal model alone asks for, on every recording's grid: its laws so far are small beside it.

@@ -15,6 +15,8 @@ pub(crate) struct Candidate {
     pub(crate) name: &'static str,
     pub(crate) columns: Columns,
     pub(crate) periodic: bool,
+    /// It acts on the command that is predicted.
+    pub(crate) by_command: bool,
 }
 
 struct Builder(Vec<Candidate>);
@@ -23,12 +25,13 @@ impl Builder {
     /// A column of the motion: time, place, speed, direction by their index.
     fn motion(&mut self, name: &'static str, value: impl Fn(&Sight, usize) -> f64 + 'static) {
         let columns: Columns = Box::new(move |s, _| vec![(0..s.time.len()).map(|i| value(s, i)).collect()]);
-        self.0.push(Candidate { name, columns, periodic: false });
+        self.0.push(Candidate { name, columns, periodic: false, by_command: false });
     }
 
     /// A column of the predicted force of the drive.
     fn command(&mut self, name: &'static str, value: impl Fn(&Sight, &[f64]) -> Vec<f64> + 'static) {
-        self.0.push(Candidate { name, columns: Box::new(move |s, u| vec![value(s, u)]), periodic: false });
+        let columns: Columns = Box::new(move |s, u| vec![value(s, u)]);
+        self.0.push(Candidate { name, columns, periodic: false, by_command: true });
     }
 
     /// A sine and a cosine of a multiple of the angle, times a factor.
@@ -42,7 +45,7 @@ impl Builder {
                 all().map(|i| factor(i) * at(i).cos()).collect(),
             ]
         });
-        self.0.push(Candidate { name, columns, periodic: true });
+        self.0.push(Candidate { name, columns, periodic: true, by_command });
     }
 }
 
@@ -172,5 +175,5 @@ fn eccentricity(b: &mut Builder, turn: f64) {
         };
         vec![of(f64::sin), of(f64::cos)]
     });
-    b.0.push(Candidate { name: "encoder_eccentricity", columns, periodic: true });
+    b.0.push(Candidate { name: "encoder_eccentricity", columns, periodic: true, by_command: false });
 }
