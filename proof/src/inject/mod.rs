@@ -45,6 +45,22 @@ struct Known {
     untouched: Untouched,
     /// What the plain rival finds on it, once it has been asked.
     plain: OnceLock<Vec<(&'static str, f64)>>,
+    /// Its recordings, once a draw has asked for them; none where they cannot be read.
+    ground: OnceLock<Option<Ground>>,
+}
+
+impl Known {
+    fn new(place: Place, untouched: Untouched) -> Self {
+        Self { place, untouched, plain: OnceLock::new(), ground: OnceLock::new() }
+    }
+
+    fn ground(&self) -> Option<&Ground> {
+        let read = || {
+            let carrier = Carrier::read(&self.place.paths).ok()?;
+            Some(Ground::new(carrier, self.untouched.answer.bandwidth_hz))
+        };
+        self.ground.get_or_init(read).as_ref()
+    }
 }
 
 /// Which case to draw.
@@ -71,7 +87,7 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
     let (mut known, mut without) = (Vec::new(), Vec::new());
     for (place, untouched) in places.into_iter().zip(asked.into_iter().flatten()) {
         match untouched {
-            Ok(untouched) => known.push(Known { place, untouched, plain: OnceLock::new() }),
+            Ok(untouched) => known.push(Known::new(place, untouched)),
             Err(why) => without.push(format!("{} ({why})", place.id)),
         }
     }
@@ -137,7 +153,7 @@ fn draw<'a>(
     wish: &Wish,
     known: &'a [Known],
     seed: u64,
-) -> Result<Option<(&'a Known, Ground, Drawn)>, String> {
+) -> Result<Option<(&'a Known, &'a Ground, Drawn)>, String> {
     let mut machines: Vec<&str> = known.iter().map(|k| k.place.machine.as_str()).collect();
     machines.sort_unstable();
     machines.dedup();
@@ -150,8 +166,7 @@ fn draw<'a>(
         if chosen.untouched.answer.effects.iter().any(|e| e.holds(wish.hidden)) {
             continue;
         }
-        let Ok(carrier) = Carrier::read(&chosen.place.paths) else { continue };
-        let ground = Ground::new(carrier, chosen.untouched.answer.bandwidth_hz);
+        let Some(ground) = chosen.ground() else { continue };
         if let Some(drawn) = ground.draw(wish.hidden, wish.factor * chosen.untouched.left, &mut rng) {
             return Ok(Some((chosen, ground, drawn)));
         }
@@ -169,7 +184,7 @@ fn run_case(
     let Some((chosen, ground, drawn)) = draw(wish, known, options.seed)? else { return Ok(None) };
     let id = format!("{:04}", wish.id);
     let dir = scratch.join(&id);
-    let paths = write(&chosen.place.paths, &ground, &drawn, &dir)?;
+    let paths = write(&chosen.place.paths, ground, &drawn, &dir)?;
     let out = options.keep.as_ref().map_or_else(|| dir.join("out"), |keep| keep.join(&id));
     let start = Instant::now();
     let answer = tool::ask(tool, &paths, &out);
