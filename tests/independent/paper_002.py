@@ -1,0 +1,159 @@
+"""Paper 002: second-order pre-puncture, the tracking wall, LuGre friction by fine RK4, the guide for the direction, withdrawal."""
+
+import math
+
+import numpy
+from device import TICK_S, hand
+
+LAYERS = (("skin", 0.0, 0.8), ("fat", 2.5, 1.5), ("muscle", 8.0, 2.0), ("bursa", 20.0, 2.5), ("tendon", 23.0, 3.0), ("cartilage", 29.0, 4.0))
+BACK = 0.3  # of the cutting force on the way out
+WALL_N_PER_MM = 0.8
+SCALE = 0.65
+SINE = math.sin(math.radians(45.0))
+
+LUGRE = {"s0": 1.5, "s1": 0.0001, "s2": 0.001, "coulomb": 0.3, "static": 0.35, "stribeck": 2.0}
+
+
+def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0):
+    """The text of a profile: the layers of section IV, with or without a wall of skin that gives way at 1 N after 1.2 mm."""
+    wall = (
+        "[layer.wall]\nelastic = { vertex_mm = 0.0, compliance_mm2_per_n = 1.44, base_n = 0.0 }\npuncture_mm = 1.2\n"
+        "relief = { vertex_mm = 1.6, compliance_mm2_per_n = 1000.0, base_n = 0.0 }\nunload_n_per_mm = 0.05\n"
+    )
+    text = (
+        f'format = 1\nname = "independent"\nentry_deg = {entry_deg}\nforce_scale = {scale}\n'
+        f'[law]\nmodel = "sparte"\ntracking_n_per_mm = {WALL_N_PER_MM}\nrelax_ms = 300\n'
+        f"[law.friction]\nstiffness_n_per_mm = {LUGRE['s0']}\ndamping_n_s_per_mm = {LUGRE['s1']}\nviscous_n_s_per_mm = {LUGRE['s2']}\n"
+        f"sliding_n = {LUGRE['coulomb']}\nsticking_n = {LUGRE['static']}\nstribeck_mm_s = {LUGRE['stribeck']}\n"
+        "[law.fixture]\nlateral_n_per_deg = 0.2\nlargest_deg = 10.0\n"
+    )
+    for index, (tissue, depth_mm, cutting_n) in enumerate(layers):
+        text += f'[[layer]]\ntissue = "{tissue}"\ndepth_mm = {depth_mm}\ncutting = {{ inwards_n = {cutting_n}, outwards_n = {BACK * cutting_n} }}\n'
+        text += wall if skin_wall and index == 0 else ""
+    return text
+
+
+def way_between_counts(depth_mm):
+    """The needle's way as straight lines between the ticks at which the encoder steps, where the true depth is between two counts."""
+    steps = numpy.flatnonzero(numpy.diff(depth_mm)) + 1
+    ticks = numpy.concatenate([[0], steps, [len(depth_mm) - 1]])
+    middles = 0.5 * (depth_mm[steps - 1] + depth_mm[steps])
+    return numpy.interp(numpy.arange(len(depth_mm)), ticks, numpy.concatenate([depth_mm[:1], middles, depth_mm[-1:]]))
+
+
+def lugre(depth_mm, sub=8):
+    """The bristle state by the classical Runge-Kutta method, `sub` steps to a tick.
+
+    dz/dt = v - s0 |v| z / g(v),  g = Fc + (Fs - Fc) exp(-(v/vs)^2),  F = s0 z + s1 dz/dt + s2 v.
+    """
+    speed = numpy.gradient(way_between_counts(depth_mm), TICK_S)
+    force, z = numpy.zeros(len(speed)), 0.0
+    s0, step = LUGRE["s0"], TICK_S / sub
+
+    def rate(z, v):
+        g = LUGRE["coulomb"] + (LUGRE["static"] - LUGRE["coulomb"]) * math.exp(-((v / LUGRE["stribeck"]) ** 2))
+        return v - s0 * abs(v) * z / g
+
+    for tick in range(len(speed)):
+        v0 = float(speed[tick])
+        v1 = float(speed[min(tick + 1, len(speed) - 1)])
+        if v0 != 0.0 or v1 != 0.0:
+            for part in range(sub):
+                a, b = v0 + (v1 - v0) * part / sub, v0 + (v1 - v0) * (part + 1) / sub
+                middle = 0.5 * (a + b)
+                k1 = rate(z, a)
+                k2 = rate(z + 0.5 * step * k1, middle)
+                k3 = rate(z + 0.5 * step * k2, middle)
+                k4 = rate(z + step * k3, b)
+                z += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+        force[tick] = s0 * z + LUGRE["s1"] * rate(z, v0) + LUGRE["s2"] * v0
+    return force
+
+
+def periodic_penetration(device, report):
+    """LuGre alone, as its authors identify it: a needle that goes back and forth in one block, at four paces."""
+    block = shoulder((("muscle", 0.0, 0.0),), skin_wall=False, entry_deg=90.0)
+    steps = ["to_mm = 8.0\nspeed_mm_s = 10.0"]
+    for speed in (1.0, 3.0, 10.0, 30.0):
+        steps += [f"to_mm = 10.0\nspeed_mm_s = {speed}", f"to_mm = 8.0\nspeed_mm_s = {speed}"]
+    recording = device.record(block, hand([*steps, "to_mm = -1.0\nspeed_mm_s = 10.0"]), 8.0)
+    rows = recording.inside()
+    wanted = SCALE * lugre(recording.depth_mm[rows])
+    difference = recording.force_n[rows] - wanted
+    # The needle enters from outside with a speed and no bristle bent: the first mm is left to the change of bodies.
+    settled = recording.depth_mm[rows] > 1.0
+    report.within("LuGre by RK4, periodic penetration at 1 to 30 mm/s, rms", math.sqrt((difference[settled] ** 2).mean()), 0.010, "N")
+    report.within("LuGre by RK4, the same, largest", numpy.abs(difference[settled]).max(), 0.060, "N")
+
+
+def tracking_wall(depth_mm, layer_forces):
+    """A wall that follows the tip and is never further away than the cutting force allows; `layer_forces(depth)` gives in and out."""
+    force, wall = numpy.zeros(len(depth_mm)), depth_mm[0]
+    for tick, tip in enumerate(depth_mm):
+        inwards, outwards = layer_forces(tip)
+        wall = min(max(wall, tip - inwards / WALL_N_PER_MM), tip + outwards / WALL_N_PER_MM)
+        force[tick] = WALL_N_PER_MM * (tip - wall)
+    return force
+
+
+def straight_injection(device, report):
+    """Section IV, second injection, with layers that only cut: every tick against the wall and LuGre; plateaus against the paper's numbers."""
+    steps = ["to_mm = 50.0\nspeed_mm_s = 6.0", "to_mm = -1.0\nspeed_mm_s = 6.0"]
+    recording = device.record(shoulder(skin_wall=False), hand(steps), 18.0)
+    rows = recording.inside()
+    depth = recording.depth_mm[rows]
+
+    def layer_forces(tip_mm):
+        cut = [force for _, at, force in LAYERS if tip_mm >= at / SINE]
+        return (cut[-1], BACK * cut[-1]) if cut else (0.0, 0.0)
+
+    wanted = SCALE * (tracking_wall(depth, layer_forces) + lugre(depth))
+    difference = recording.force_n[rows] - wanted
+    # At a border of two layers the device changes over a count earlier or later.
+    border = numpy.min([numpy.abs(depth - at / SINE) for _, at, _ in LAYERS], axis=0) < 2.0 * recording.depth_step_mm
+    settled = (depth > 1.0) & ~border
+    report.within("tracking wall and LuGre, straight injection, rms", math.sqrt((difference[settled] ** 2).mean()), 0.010, "N")
+    report.within("tracking wall and LuGre, the same, largest", numpy.abs(difference[settled]).max(), 0.080, "N")
+    friction = LUGRE["coulomb"] + LUGRE["s2"] * 6.0
+    bounds = [at / SINE for _, at, _ in LAYERS] + [50.0]
+    way_in, way_out = numpy.arange(len(depth)) < numpy.argmax(depth), numpy.arange(len(depth)) > numpy.argmax(depth)
+    for (tissue, _, cutting_n), begin, end in zip(LAYERS, bounds, bounds[1:]):
+        late = way_in & (depth > begin + 0.7 * (end - begin)) & (depth < end - 0.1)
+        felt = recording.force_n[rows][late].mean() / SCALE - friction
+        report.within(f"cutting force, {tissue}, {cutting_n:g} N printed", felt - cutting_n, 0.02, "N")
+        late = way_out & (depth > begin + 0.1) & (depth < begin + 0.25 * (end - begin))
+        report.holds(f"withdrawal, {tissue}: the other direction", recording.force_n[rows][late].mean() < -0.1, f"{recording.force_n[rows][late].mean():.3f} N")
+
+
+def skin_pushed_in(device, report):
+    """Stage 1: a polynomial of second order that rises steadily, then falls sharply."""
+    steps = ["to_mm = 3.0\nspeed_mm_s = 3.0", "to_mm = -1.0\nspeed_mm_s = 6.0"]
+    recording = device.record(shoulder((("skin", 0.0, 0.8), ("muscle", 40.0, 2.0)), entry_deg=90.0), hand(steps), 3.2)
+    rows = recording.way_in()
+    depth, force = recording.depth_mm[rows], recording.force_n[rows] / SCALE
+    pushing = (depth > 0.6) & (depth < 1.15)
+    coefficients = numpy.polyfit(depth[pushing], force[pushing], 2)
+    residual = numpy.abs(force[pushing] - numpy.polyval(coefficients, depth[pushing])).max()
+    report.within("before the puncture the force is a polynomial of second order", residual, 0.010, "N")
+    peak = force[depth < 1.3].max()
+    report.within("before the puncture it rises to the patient's 1 N", peak - 1.0, 0.02, "N")
+    after = force[(depth > 1.22) & (depth < 1.3)].min()
+    report.holds("then it falls sharply", after < 0.5 * peak, f"{peak:.3f} N, then {after:.3f} N")
+
+
+def direction(device, report):
+    """The guide: 0.2 N for every degree off the entry's direction, up to 10 degrees, and a barrier beyond."""
+    for turned_deg, barriers in ((4.0, 0), (8.0, 0), (13.0, 1)):
+        steps = ["to_mm = 15.0\nspeed_mm_s = 10.0", f"seconds = 1.0\nturned_deg = {turned_deg}",
+                 "to_mm = -1.0\nspeed_mm_s = 10.0", "seconds = 0.5\nturned_deg = 0.0"]  # fmt: skip
+        insertion = device.record(shoulder(skin_wall=True), hand(steps), 5.5).score[0]
+        wanted = 0.2 * min(turned_deg, 10.0)
+        report.within(f"direction, {turned_deg:g} degrees off: lateral force", insertion["largest_lateral_n"] - wanted, 0.03, "N")
+        report.holds(f"direction, {turned_deg:g} degrees off: barriers", insertion["barriers"] == barriers, f"{insertion['barriers']}")
+
+
+def check(device, report):
+    skin_pushed_in(device, report)
+    periodic_penetration(device, report)
+    straight_injection(device, report)
+    direction(device, report)
