@@ -50,6 +50,64 @@ fn what_the_diagnosis_found_is_felt_by_a_quarter_only() {
     assert!(html.contains("7 times a turn") && !html.contains("http"), "{html}");
 }
 
+/// Compensates and checks that no phase is felt more afterwards than before.
+fn compensated(found: &Rig) -> (VirtualLine, compensate::Outcome, Vec<String>) {
+    let (mut line, mut steps) = (line(rig_hidden()), Vec::new());
+    let outcome = compensate::compensate(&mut line, found, 1.0, |step| {
+        steps.push(step.to_string());
+        Ok(())
+    })
+    .expect("it is compensated");
+    println!("{:?}\n{:?}\n{:?} {:?}", outcome.before, outcome.after, outcome.weight_mnm, outcome.taken_back);
+    for ((phase, before), (_, after)) in outcome.before.phases().into_iter().zip(outcome.after.phases()) {
+        assert!(after <= before + f64::max(2e-3, 0.05 * before), "{phase}: {after} N after {before} N");
+    }
+    (line, outcome, steps)
+}
+
+#[test]
+fn a_weight_that_the_report_does_not_have_is_measured() {
+    let mut found = rig("hidden-found.toml");
+    found.model.weight = None;
+    let (_, outcome, steps) = compensated(&found);
+    let weight = outcome.weight_mnm.expect("it shows");
+    assert!((weight / 1.5 - 1.0).abs() < 0.05, "{weight} mN·m, hidden.toml has 1.5");
+    assert!(
+        steps[0].contains("lay the device level") && steps[1].contains("to find the weight"),
+        "{steps:?}"
+    );
+    assert!(outcome.taken_back.is_empty(), "{:?}", outcome.taken_back);
+    assert!(outcome.after.all() <= outcome.before.all() / 4.0, "{:?}", outcome.after);
+}
+
+#[test]
+fn what_makes_the_hand_feel_more_is_taken_back() {
+    let mut wrong = rig("hidden-found.toml");
+    // hidden.toml has no offset.
+    wrong.model.offset = Some(1.0e-3);
+    let (line, outcome, steps) = compensated(&wrong);
+    assert!(outcome.is_compensated);
+    assert_eq!(outcome.taken_back.len(), 1, "{:?}", outcome.taken_back);
+    assert!(outcome.taken_back[0].starts_with("the drive's offset"), "{:?}", outcome.taken_back);
+    assert!(steps.iter().any(|step| step.contains("the same without friction")), "{steps:?}");
+    let kept = line.device().plan().device().compensation;
+    assert_eq!(kept.gains.drive, Gain(0));
+    assert!(kept.gains.friction > Gain(0) && kept.gains.angle > Gain(0));
+    assert!(outcome.after.all() <= outcome.before.all() / 4.0, "{:?}", outcome.after);
+}
+
+#[test]
+fn a_report_of_nothing_that_helps_leaves_the_device_as_it_was() {
+    let mut wrong = rig("hidden-found.toml");
+    wrong.effects.clear();
+    wrong.model.offset = Some(1.5e-3);
+    (wrong.model.coulomb, wrong.model.viscous, wrong.model.weight) = (None, None, Some(0.0));
+    let (line, outcome, _) = compensated(&wrong);
+    assert!(!outcome.is_compensated && outcome.taken_back.len() == 1, "{:?}", outcome.taken_back);
+    assert!(!line.device().plan().device().compensation.is_some());
+    assert!(page::html(&outcome).contains("the device is as it was before"));
+}
+
 #[test]
 fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
     let found = coefficients::found(&rig("hidden-found.toml"), &Device::default(), 1.0).expect("sound");

@@ -19,7 +19,8 @@ use std::sync::atomic::AtomicBool;
 /// Take away from the hand what a diagnosis found of the device's own forces.
 ///
 /// Cogging, friction, weight, offset, ripple and deadband of the report are stored on the device and fed forward, each below
-/// 100 %. The roller turns slowly before and after; compensation.html shows what a hand would feel of the mechanism.
+/// 100 %. The roller turns slowly before and after; what would be felt more than before is taken back, and compensation.html
+/// shows what a hand would feel of the mechanism. A weight that the report does not have is measured first.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim characterise --device /dev/ttyACM0 --out bench
@@ -100,7 +101,8 @@ impl Compensate {
         let outcome =
             compensate::compensate(&mut line, rig, self.gain, |step| consent.ask(&step, step.moves()))?;
         let mut lines = self.write(&outcome)?;
-        lines.extend(outcome.left_out.iter().cloned());
+        lines.extend(outcome.weight_mnm.map(|weight| format!("weight measured={weight:.3} mN·m")));
+        lines.extend(outcome.taken_back.iter().chain(&outcome.left_out).cloned());
         let (before, after) = (&outcome.before, &outcome.after);
         let mut compare = |what: &str, before: f64, after: f64| {
             lines.push(format!("{what} before={:.1} after={:.1} mN rms", before * 1e3, after * 1e3));
@@ -109,7 +111,13 @@ impl Compensate {
         compare("hold", before.hold, after.hold);
         compare("withdrawal", before.withdrawal, after.withdrawal);
         compare("all", before.all(), after.all());
-        Ok(lines)
+        if outcome.is_compensated {
+            return Ok(lines);
+        }
+        Err(Failure::failed(format_args!(
+            "the device is as it was before: {}; characterise and diagnose again",
+            outcome.taken_back.join("; ")
+        )))
     }
 
     /// Writes the page and the device's part; the files' names.
@@ -117,7 +125,7 @@ impl Compensate {
         let Some(out) = &self.out else { return Ok(Vec::new()) };
         let refuse = |cause: std::io::Error| {
             Failure::input(format_args!(
-                "{}: cannot be written ({cause}); the device is compensated; choose another --out",
+                "{}: cannot be written ({cause}); what the device feeds forward stays; choose another --out",
                 out.display()
             ))
         };

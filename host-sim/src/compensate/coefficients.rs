@@ -29,6 +29,8 @@ pub struct Found {
     pub waves: Vec<(u16, f64, f64)>,
     /// Inertia in kg·m² on the device's scale.
     pub inertia: f64,
+    /// True if the rig has a weight, found or given; one of zero counts.
+    pub has_weight: bool,
     /// What was found and cannot be fed forward, a sentence each.
     pub left_out: Vec<String>,
 }
@@ -55,6 +57,7 @@ struct Sums {
     dry: [f64; 2],
     viscous: [f64; 2],
     weight: f64,
+    has_weight: bool,
     offset: f64,
     deadband: f64,
     waves: Vec<(u16, f64, f64)>,
@@ -72,6 +75,7 @@ impl Sums {
             dry: [value(model.coulomb); 2],
             viscous: [value(model.viscous); 2],
             weight: value(model.weight),
+            has_weight: model.weight.is_some(),
             offset: value(model.offset),
             deadband: 0.0,
             waves: Vec::new(),
@@ -90,7 +94,10 @@ impl Sums {
                 self.dry = [self.dry[0] + dry, self.dry[1] - dry];
                 self.viscous = [self.viscous[0] + viscous, self.viscous[1] - viscous];
             }
-            EffectName::TiltGravity => self.weight += value("weight"),
+            EffectName::TiltGravity => {
+                self.weight += value("weight");
+                self.has_weight = true;
+            }
             EffectName::Cogging | EffectName::MassImbalance => {
                 let waves = self.read_waves(effect, self.scale);
                 self.waves.extend(waves);
@@ -167,7 +174,7 @@ impl Sums {
                 "the report found nothing that a device can feed forward; see report.html for what it found",
             ));
         }
-        Ok(Found { compensation, waves, inertia, left_out: self.left_out })
+        Ok(Found { compensation, waves, inertia, has_weight: self.has_weight, left_out: self.left_out })
     }
 }
 

@@ -29,6 +29,11 @@ pub struct Felt {
 }
 
 impl Felt {
+    /// The three phases with their names.
+    pub fn phases(&self) -> [(&'static str, f64); 3] {
+        [("insertion", self.insertion), ("hold", self.hold), ("withdrawal", self.withdrawal)]
+    }
+
     /// All three together.
     pub fn all(&self) -> f64 {
         ((self.insertion.powi(2) + self.hold.powi(2) + self.withdrawal.powi(2)) / 3.0).sqrt()

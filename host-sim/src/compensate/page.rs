@@ -9,9 +9,11 @@ use control_core::compensation::Gain;
 /// The page.
 pub fn html(outcome: &Outcome) -> String {
     let (before, after) = (&outcome.before, &outcome.after);
+    let not_kept =
+        if outcome.is_compensated { "" } else { " Nothing of it helped: the device is as it was before." };
     let lead = format!(
         "Of the mechanism's own forces a hand would have felt {} mN and feels {} mN now (root mean square over insertion, hold and \
-         withdrawal at 10 mm/s; the device's servo stood in for the hand).",
+         withdrawal at 10 mm/s; the device's servo stood in for the hand).{not_kept}",
         decimal(before.all() * 1e3, 1),
         decimal(after.all() * 1e3, 1)
     );
@@ -56,12 +58,18 @@ pub fn html(outcome: &Outcome) -> String {
     sheet.figures(&[(chart.svg(), "Way in and way out together.".into())]);
     sheet.heading("What is fed forward");
     sheet.table(&["part", "found", "gain"], &parts(outcome));
-    for left_out in &outcome.left_out {
-        sheet.note(left_out);
+    if let Some(weight) = outcome.weight_mnm {
+        sheet.note(&format!(
+            "The report has no weight. It was measured by the slow turn, level and tilted: {} mN·m with the needle straight down.",
+            decimal(weight, 3)
+        ));
+    }
+    for sentence in outcome.taken_back.iter().chain(&outcome.left_out) {
+        sheet.note(sentence);
     }
     if let Some(angle) = outcome.angle {
         sheet.note(&format!(
-            "The rotor's angle was found by the slow turn: nought at {} counts, agreement {}. After a restart it is found again \
+            "The rotor's angle was found by the slow turn: zero at {} counts, agreement {}. After a restart it is found again \
              (compensate --align); until then nothing that depends on it is fed forward.",
             angle.count,
             decimal(angle.agreement, 2)
