@@ -9,6 +9,15 @@ macro_rules! say {
     }};
 }
 
+/// Prints a line that is no result: an address, advice. Not with `--quiet`.
+macro_rules! note {
+    ($($text:tt)*) => {
+        if !$crate::cli::output::is_quiet() {
+            say!($($text)*);
+        }
+    };
+}
+
 /// Examples at the end of a help, and how to type them where nothing is installed.
 macro_rules! examples {
     ($text:literal) => {

@@ -108,6 +108,25 @@ fn bad_input_is_one_line_and_status_two() {
 }
 
 #[test]
+fn what_is_misspelt_missing_or_empty_is_named_with_what_to_do() {
+    let dir = folder("words");
+    refused(&run(&["import", "a.csv", "--inertai", "0.1", "--out", "o"]), 2, &["--inertai", "--inertia"]);
+    refused(&run(&["compensate", "--report", "r"]), 2, &["--out <DIR> is missing", "compensate --help"]);
+    let rig = dir.join("rig.toml");
+    let text_of_rig = "format = 1\nkind = \"rotary\"\n[model]\ninertai = 0.1\n[actuator]\ngain = 1.0\ncommand_unit = \"A\"\n\
+                       [encoder]\ncounts_per_unit = 100.0\n";
+    std::fs::write(&rig, text_of_rig).expect("written");
+    let arguments = ["simulate", "--rig", text(&rig), "--recording", "a.csv", "--out", "o"];
+    refused(&run(&arguments), 2, &["inertai is no key", "do you mean [model] inertia"]);
+    // Before the scripted hand touches the skin.
+    let outside = dir.join("outside.mcap");
+    let said =
+        run_well(&["run", "--headless", "--fast", "--quiet", "--seconds", "0.5", "--record", text(&outside)]);
+    assert!(said.contains("samples=5000"), "results are no chatter: {said}");
+    refused(&run(&["score", text(&outside)]), 2, &["outside.mcap", "no insertion", "record one first"]);
+}
+
+#[test]
 fn a_port_in_use_is_one_line_and_status_one() {
     let taken = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
     let port = taken.local_addr().expect("it is bound").port().to_string();

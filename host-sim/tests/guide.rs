@@ -1,4 +1,4 @@
-//! The commands of docs/diagnosis.md, run as they stand there, and what the guide says that they print.
+//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the guide says that they print.
 
 mod common;
 
@@ -8,14 +8,15 @@ use diagnosis::simulation::{Plant, Surroundings};
 use std::path::Path;
 use std::process::Command;
 
+const TRAINING: &str = include_str!("../../docs/training.md");
 const GUIDE: &str = include_str!("../../docs/diagnosis.md");
 /// How far a figure of the guide may be from what is printed, as a ratio.
 const FIGURES_WITHIN: f64 = 0.2;
 
-/// The indented blocks of a section, without their indent.
-fn blocks(heading: &str) -> Vec<String> {
+/// The indented blocks of a section of a guide, without their indent.
+fn blocks(guide: &str, heading: &str) -> Vec<String> {
     let (_, section) =
-        GUIDE.split_once(&format!("{heading}\n")).unwrap_or_else(|| panic!("no section {heading}"));
+        guide.split_once(&format!("{heading}\n")).unwrap_or_else(|| panic!("no section {heading}"));
     let mut out: Vec<String> = Vec::new();
     let mut is_inside = false;
     for line in section.lines().take_while(|line| !line.starts_with("## ")) {
@@ -90,7 +91,7 @@ fn the_first_commands_run_as_they_stand() {
         }
     }
     std::fs::write(dir.join("log.csv"), log).expect("written");
-    let commands = &blocks("# From your recordings to your simulator")[0];
+    let commands = &blocks(GUIDE, "# From your recordings to your simulator")[0];
     assert_eq!(commands.matches("host-sim ").count(), 4, "{commands}");
     let said = run_in(&dir, commands);
     assert!(said.contains("dry friction (99 % sure)"), "{said}");
@@ -103,7 +104,7 @@ fn the_first_commands_run_as_they_stand() {
 #[test]
 fn the_worked_example_finds_what_was_hidden_and_prints_what_the_guide_says() {
     let dir = folder("guide-example");
-    let blocks = blocks("## One example to run");
+    let blocks = blocks(GUIDE, "## One example to run");
     let [commands, printed] = &blocks[..] else { panic!("{blocks:?}") };
     let said = run_in(&dir, commands);
     let (words, figures) = words_and_figures(printed);
@@ -130,4 +131,28 @@ fn line_is_quoted(line: &str, quoted: &str) -> bool {
     let begin: Vec<&str> = line.split_whitespace().take(4).collect();
     let begin = begin.join(" ");
     quoted.lines().any(|line| line.split_whitespace().collect::<Vec<_>>().join(" ").starts_with(&begin))
+}
+
+#[cfg(unix)]
+#[test]
+fn the_commands_of_the_training_guide_run_as_they_stand() {
+    let dir = folder("guide-training");
+    let commands = &blocks(TRAINING, "# Training: patients, procedures, scores, debrief, papers")[0];
+    let commands = commands.replace("cargo run --release -- ", "host-sim ");
+    assert_eq!(commands.matches("host-sim ").count(), 6, "{commands}");
+    let said = run_in(&dir, &commands);
+    for file in
+        ["debrief/debrief.html", "papers/paper-000.html", "papers/paper-001.html", "papers/paper-002.html"]
+    {
+        assert!(dir.join(file).exists(), "{file} is missing: {said}");
+    }
+    // Five rounds of the procedure a recording; the debrief compares the first with the last.
+    let score = said.lines().find(|line| line.starts_with("insertions=")).expect("the score's last line");
+    let debrief = said.lines().find(|line| line.contains("debrief.html")).expect("the debrief's line");
+    assert!(score.starts_with("insertions=5 "), "{score}");
+    assert!(debrief.ends_with("insertions=10"), "{debrief}");
+    let page = std::fs::read_to_string(dir.join("debrief/debrief.html")).expect("it can be read");
+    for name in ["monday.mcap, insertion 1", "friday.mcap, insertion 5"] {
+        assert!(page.contains(name), "{name} is not compared");
+    }
 }

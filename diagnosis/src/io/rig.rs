@@ -176,14 +176,15 @@ impl Rig {
 
     /// Checks the text of a rig file; `file` is what errors call it.
     pub fn parse(text: &str, file: &str) -> Result<Self, InputError> {
+        // First, because a misspelt key is missing under its right name too.
+        if let Some(what) = text.parse().ok().as_ref().and_then(known_keys::unknown) {
+            return Err(InputError::new(format!("{file}: {what}")));
+        }
         let rig: Self = toml::from_str(text).map_err(|cause| {
             let line =
                 cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
             InputError::new(format!("{file}, line {line}: {}; see the rig format", cause.message()))
         })?;
-        if let Some(what) = text.parse().ok().as_ref().and_then(known_keys::unknown) {
-            return Err(InputError::new(format!("{file}: {what}")));
-        }
         rig.check().map_err(|what| InputError::new(format!("{file}: {what}")))?;
         Ok(rig)
     }

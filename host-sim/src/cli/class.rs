@@ -1,5 +1,6 @@
 //! `host-sim class`: the instructor's page; and the flags by which `run` joins a class.
 
+use super::output;
 use super::run::stop_on_signals;
 use clap::Args;
 use control_core::Device;
@@ -54,8 +55,8 @@ impl Class {
             Box::new(move || board.text(&name, address, Instant::now(), &mut sent))
         };
         let server = visualizer::serve_watched(Arc::new(watch), self.port).map_err(Failure::failed)?;
-        say!("class {name} listens at {address}");
-        say!("class page at {}", server.url());
+        note!("class {name} listens at {address}");
+        output::page("class page", &server.url());
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(PAUSE);
         }

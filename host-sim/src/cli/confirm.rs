@@ -1,5 +1,6 @@
 //! What a person has to agree to before a motor moves: on the terminal, or in the page of a guide.
 
+use super::output;
 use clap::Args;
 use host_sim::failure::Failure;
 use host_sim::guide::Guide;
@@ -30,7 +31,7 @@ impl ConsentFlags {
             let guide = Guide::new(title, device, stop.clone());
             let server = visualizer::serve_guide(guide.watches(), guide.said(), self.port);
             let server = server.map_err(Failure::failed)?;
-            say!("guide at {}", server.url());
+            output::page("guide", &server.url());
             Some((guide, server))
         } else {
             None

@@ -117,12 +117,12 @@ fn next(done: &import::Imported, out: &std::path::Path) {
         held.push(last);
     }
     if held.is_empty() {
-        say!("next: another recording, to hold out, or import this one again with --split 0.6");
+        note!("next: another recording, to hold out, or import this one again with --split 0.6");
         return;
     }
     let list =
         |option: &str, files: &[&String]| files.iter().map(|f| format!(" {option} {f}")).collect::<String>();
-    say!(
+    note!(
         "next: host-sim diagnose --rig {}{}{} --out {}",
         done.rig.display(),
         list("--fit", &fit),

@@ -9,6 +9,7 @@ mod diagnose;
 mod export;
 mod fit_force;
 mod import;
+pub(crate) mod output;
 mod progress;
 mod recordings;
 mod run;
@@ -16,6 +17,7 @@ mod simulate;
 mod streams;
 mod training;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Parser, Subcommand};
 use host_sim::failure::Failure;
 
@@ -25,6 +27,12 @@ use host_sim::failure::Failure;
 #[derive(Parser)]
 #[command(version, after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Cli {
+    /// Print results and errors only: no progress, no addresses, no advice
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Open no browser by itself, as a program from `cargo xtask dist` does when it serves a page
+    #[arg(long, global = true)]
+    no_browser: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -50,6 +58,7 @@ enum Command {
 
 impl Cli {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        output::set(self.quiet, self.no_browser);
         match self.command {
             // As if `run` had been said: its defaults stand in one place.
             None => Self::parse_from(["host-sim", "run"]).run(),
@@ -72,15 +81,34 @@ impl Cli {
     }
 }
 
-/// What the parser has to say, in one line.
+/// Returns what the parser has to say, in one sentence.
 pub(crate) fn usage(error: &clap::Error) -> Failure {
     let drawn = error.to_string();
+    // The last line of help that the parser names: of the command that was asked for.
+    let help = drawn.lines().find_map(|line| line.trim().strip_prefix("Usage: ")).map_or(
+        "host-sim --help".into(),
+        |usage| {
+            let command: Vec<&str> =
+                usage.split_whitespace().take_while(|word| !word.starts_with(['-', '<', '['])).collect();
+            format!("{} --help", command.join(" "))
+        },
+    );
+    if let Some(ContextValue::Strings(missing)) =
+        error.get(ContextKind::InvalidArg).filter(|_| error.kind() == ErrorKind::MissingRequiredArgument)
+    {
+        let (what, them) = if missing.len() == 1 { ("is", "it") } else { ("are", "them") };
+        return Failure::input(format_args!(
+            "{} {what} missing; add {them}, see {help}",
+            missing.join(" and ")
+        ));
+    }
     let said: Vec<&str> = drawn
         .lines()
         .map(str::trim)
         .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
         .filter(|line| !line.is_empty())
+        .map(|line| line.trim_start_matches("tip: "))
         .collect();
     let said = said.join("; ");
-    Failure::input(format_args!("{}; see host-sim --help", said.trim_start_matches("error: ")))
+    Failure::input(format_args!("{}; see {help}", said.trim_start_matches("error: ")))
 }

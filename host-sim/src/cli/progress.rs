@@ -14,9 +14,9 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Quiet unless standard error is a terminal.
+    /// Quiet unless standard error is a terminal, and with `--quiet`.
     pub(crate) fn new(what: &'static str) -> Self {
-        Self { what, on: std::io::stderr().is_terminal(), drawn: None }
+        Self { what, on: std::io::stderr().is_terminal() && !super::output::is_quiet(), drawn: None }
     }
 
     /// Shows `done` of `all`, where that is known.

@@ -1,6 +1,7 @@
 //! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
 
 use super::class::ClassFlags;
+use super::output;
 use super::progress::Progress;
 use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
@@ -234,7 +235,7 @@ impl Run {
 /// Serves the page and says where.
 pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
     let server = visualizer::serve(session, port).map_err(Failure::failed)?;
-    say!("visualizer at {}", server.url());
+    output::page("visualizer", &server.url());
     Ok(server)
 }
 

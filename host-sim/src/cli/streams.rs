@@ -29,7 +29,7 @@ impl StreamFlags {
         }
         let served = streams::serve(session, &self.streams, self.token.as_ref()).map_err(Failure::failed)?;
         for (kind, address) in served.addresses() {
-            say!("{kind} stream at {address}");
+            note!("{kind} stream at {address}");
         }
         Ok(Some(served))
     }

@@ -8,7 +8,7 @@ use host_sim::patients;
 use host_sim::profile::{BUILT_IN, Profile};
 use host_sim::reproduce::{PAPERS, Paper, reproduce};
 use host_sim::score::{Insertion, score};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Print a trainee's figures for every insertion and in all: time, path, force, the vessel, angle, smoothness.
 ///
@@ -71,8 +71,9 @@ impl Score {
         if self.json {
             let text = serde_json::to_string_pretty(&scored).map_err(Failure::failed)?;
             say!("{text}");
-            return Ok(());
+            return check(&scored.insertions, &self.file);
         }
+        check(&scored.insertions, &self.file)?;
         say!(
             "begin_s  time_s  lumen_s  path_mm  depth_mm  overshoot_mm  peak_force_n  punctures  vessel   passes  angle_deg (error, rms)  smoothness"
         );
@@ -82,6 +83,18 @@ impl Score {
         print_total(&scored.insertions);
         Ok(())
     }
+}
+
+/// Refuses a recording in which there is nothing to judge.
+fn check(insertions: &[Insertion], file: &Path) -> Result<(), Failure> {
+    if insertions.is_empty() { Err(without_insertion(file)) } else { Ok(()) }
+}
+
+fn without_insertion(file: &Path) -> Failure {
+    Failure::input(format_args!(
+        "{}: no insertion in it: the needle never touched the skin; record one first",
+        file.display()
+    ))
 }
 
 fn print_row(one: &Insertion) {
@@ -137,10 +150,7 @@ impl Debrief {
             attempts.extend(debrief::attempts(&read(file)?, given.as_ref())?);
         }
         let Some(html) = debrief::html(&attempts) else {
-            return Err(Failure::input(format_args!(
-                "{}: no insertion in it: the needle never touched the skin; record one first",
-                self.files[0].display()
-            )));
+            return Err(without_insertion(&self.files[0]));
         };
         std::fs::create_dir_all(&self.out).map_err(|cause| {
             Failure::input(format_args!(

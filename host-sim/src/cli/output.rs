@@ -1,0 +1,46 @@
+//! What is printed beside results, and the browser that a program for people without a terminal opens by itself.
+
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Set while a program is built for people who start it by a double click: `cargo xtask dist`.
+const OPENS_BROWSER: bool = option_env!("HOST_SIM_OPENS_BROWSER").is_some();
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+static NO_BROWSER: AtomicBool = AtomicBool::new(false);
+
+/// Notes what the command line asks for; what was asked for once stays so.
+pub(crate) fn set(quiet: bool, no_browser: bool) {
+    QUIET.fetch_or(quiet, Ordering::Relaxed);
+    NO_BROWSER.fetch_or(no_browser, Ordering::Relaxed);
+}
+
+/// Returns true if only results and errors are printed.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Says where a page is, and opens it where this program does so.
+pub(crate) fn page(what: &str, url: &str) {
+    note!("{what} at {url}");
+    if OPENS_BROWSER && !NO_BROWSER.load(Ordering::Relaxed) {
+        open(url);
+    }
+}
+
+/// Asks the system for its browser. Where there is none the address that was printed remains.
+fn open(url: &str) {
+    let mut command = if cfg!(target_os = "windows") {
+        let mut command = Command::new("rundll32");
+        command.arg("url.dll,FileProtocolHandler");
+        command
+    } else if cfg!(target_os = "macos") {
+        Command::new("open")
+    } else {
+        Command::new("xdg-open")
+    };
+    let quiet = command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if let Ok(mut opener) = quiet.spawn() {
+        std::thread::spawn(move || opener.wait());
+    }
+}
