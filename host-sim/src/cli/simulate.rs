@@ -8,12 +8,14 @@ use diagnosis::simulation::comparison::Comparison;
 use diagnosis::simulation::replay::WINDOWS_S;
 use diagnosis::simulation::value_fit;
 use host_sim::failure::Failure;
+use host_sim::recording::simulated;
 use std::path::{Path, PathBuf};
 
 /// Run the nominal, refitted and patched simulation beside a recording: free run, windows of 0.05 to 5 s, and under the recorded
 /// reference.
 ///
-/// Writes simulation.html, simulation.json and a CSV for each recording. Give a rig, or the patched-rig.toml of a report: the
+/// Writes simulation.html, simulation.json, and a CSV and an MCAP for each recording (for Foxglove, Rerun and PlotJuggler: recorded,
+/// simulated and what is left). Give a rig, or the patched-rig.toml of a report: the
 /// nominal and refitted rigs beside it are simulated too. With --fit the values of the last of them are fitted once more, by
 /// what its free run is off on these recordings, which serves trajectories and is no evidence of physics.
 #[derive(Args)]
@@ -127,25 +129,21 @@ impl Simulate {
         }
         let json = serde_json::to_string_pretty(&motion_picture::summary(&compared, &notes))
             .map_err(Failure::failed)?;
+        let page = simulation_page::page(&models[0].1.name, &compared, &notes, &self.next(&last));
         let mut files = vec![
-            (
-                "simulation.html".to_owned(),
-                simulation_page::page(&models[0].1.name, &compared, &notes, &self.next(&last)),
-            ),
-            ("simulation.json".to_owned(), json + "\n"),
+            ("simulation.html".to_owned(), page.into_bytes()),
+            ("simulation.json".to_owned(), (json + "\n").into_bytes()),
         ];
         for (k, one) in compared.iter().enumerate() {
-            let name = if compared.len() == 1 {
-                "simulation.csv".into()
-            } else {
-                format!("simulation-{}.csv", k + 1)
-            };
-            files.push((name, motion_picture::csv(one)));
+            let name =
+                if compared.len() == 1 { "simulation".into() } else { format!("simulation-{}", k + 1) };
+            files.push((format!("{name}.csv"), motion_picture::csv(one).into_bytes()));
+            files.push((format!("{name}.mcap"), simulated::mcap(one)?));
         }
-        files.extend(fitted_rig.map(|rig| ("fitted-rig.toml".to_owned(), rig.to_toml())));
+        files.extend(fitted_rig.map(|rig| ("fitted-rig.toml".to_owned(), rig.to_toml().into_bytes())));
         let write = || {
             std::fs::create_dir_all(&self.out)?;
-            files.iter().try_for_each(|(name, text)| std::fs::write(self.out.join(name), text))
+            files.iter().try_for_each(|(name, bytes)| std::fs::write(self.out.join(name), bytes))
         };
         write().map_err(|cause| {
             Failure::failed(format_args!(

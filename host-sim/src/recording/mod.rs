@@ -5,4 +5,5 @@ pub mod export;
 mod intact;
 pub mod messages;
 pub mod read;
+pub mod simulated;
 pub mod write;
