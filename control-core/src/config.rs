@@ -236,7 +236,7 @@ impl Default for Patient {
         // Bits of Q16: 65,536 is one.
         let layers = [
             layer(Tissue::Skin, 0, Some(wall(9 << 16, 3 << 16, 4 << 16, 163_840)), 1_311),
-            layer(Tissue::Muscle, 2 << 16, None, 1_311),
+            layer(Tissue::Fat, 2 << 16, None, 1_311),
             layer(Tissue::Vessel, 314_573, Some(wall(4 << 16, 98_304, 147_456, 147_456)), 1_311),
             layer(Tissue::FarWall, 511_181, Some(wall(4 << 16, 98_304, 147_456, 147_456)), 1_311),
         ];

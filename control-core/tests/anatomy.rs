@@ -188,7 +188,7 @@ fn a_needle_off_the_axis_meets_less_of_the_vessel_and_far_off_none_of_it() {
     for offset in [2.0, 5.0] {
         let mut needle = Needle::new(&beside(offset), 30.0);
         let (contacts, punctures) = needle.met(9.0);
-        assert_eq!((contacts.len(), punctures.len()), (2, 1), "skin and muscle");
+        assert_eq!((contacts.len(), punctures.len()), (2, 1), "skin and fat");
         assert_eq!(through(&mut needle, 20.0), (vec![VesselState::Outside, VesselState::Beside], 0));
         assert!(needle.met(25.0).0.is_empty());
     }
@@ -242,7 +242,7 @@ fn the_skins_own_slope_is_no_part_of_the_angle() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
-    /// Never the muscle before the skin has given way.
+    /// Never the fat before the skin has given way.
     #[test]
     fn events_come_in_the_order_of_the_anatomy(
         degrees in 8.0..90.0_f64,
@@ -268,6 +268,6 @@ proptest! {
         prop_assert!(order.is_sorted(), "{:?}", order);
         let reached = config.patient.layers.iter().filter(|l| l.depth.0.to_num::<f64>() / degrees.to_radians().sin() < 55.0);
         prop_assert!(order.iter().filter(|(_, what)| *what == 'c').count() >= reached.count());
-        prop_assert!(config.patient.layers[1].tissue == Tissue::Muscle);
+        prop_assert!(config.patient.layers[1].tissue == Tissue::Fat);
     }
 }

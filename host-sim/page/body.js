@@ -76,6 +76,7 @@ export class BodyView {
   /** Another anatomy. */
   setScene(scene) {
     this.scene = scene;
+    this.depth.max = scene.needle.length_mm;
     if (this.picture) this.build();
   }
 

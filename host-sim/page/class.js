@@ -81,7 +81,7 @@ class Card {
     const { depth_mm: depth, angle_rad: angle, force_n: force, motor_n: motor, vessel } = this.pose;
     this.section ??= new Section(this.canvas, palette, true);
     this.tissue.move(depth, angle, force, vessel, seconds);
-    this.section.draw({ depth, angle, force, motor, seconds, hand: 0, person: false, canDrag: false }, this.tissue);
+    this.section.draw({ depth, angle, force, motor, seconds, hand: 0, person: false, ghost: NaN }, this.tissue);
   }
 }
 

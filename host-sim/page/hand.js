@@ -2,8 +2,10 @@
 
 /** Arrow keys move the hand so far, with Shift ten times. */
 const KEY_STEP_MM = 0.2;
-/** How far the hand may be moved from the entry point. */
-const REACH_MM = { low: -30, high: 60 };
+/** How far the hand may draw the tip back from the entry point; inwards it goes until the hub meets the skin. */
+const DRAWN_BACK_MM = -15;
+/** What uses the space bar itself. */
+const CONTROLS = "button, input, select, textarea, summary, a";
 /** A phone has none. */
 const KEYS = matchMedia("(any-pointer: fine)").matches ? ", or arrow keys" : "";
 /** The server hears of a new hand a little later; until then what it says of the old one does not count. */
@@ -26,11 +28,14 @@ export class Hand {
     this.pointer = null;
     this.unsent = false;
     this.takenAt = -Infinity;
+    this.deepest = 0; // where the hub meets the skin, mm
     this.skinTilt = 0; // what the tilt reads with the needle laid on the skin, rad
     canvas.addEventListener("pointerdown", (event) => this.take(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.letGo(event));
     document.addEventListener("keydown", (event) => this.key(event));
+    // A button that was clicked, not pressed by a key, gives the focus back, so that Space stops again.
+    document.addEventListener("click", (event) => event.detail > 0 && event.target.closest?.("button")?.blur());
     document.getElementById("stop").addEventListener("click", () => this.stop());
     document.getElementById("start").addEventListener("click", () => link.send({ do: "start" }));
     this.zero = document.getElementById("zero");
@@ -43,15 +48,18 @@ export class Hand {
     this.note = document.getElementById("hand-note");
   }
 
-  /** Whether there is a simulated hand at all, and a device that has a zero. */
-  allow(movable, isDevice, travel, skinTilt) {
-    this.movable = movable;
-    this.skinTilt = skinTilt;
-    document.getElementById("turn").hidden = !movable;
-    this.zero.hidden = !isDevice;
-    this.canvas.dataset.fixed = String(!movable);
-    this.canvas.setAttribute("aria-valuemax", travel.toFixed(0));
-    this.demo.hidden = !movable;
+  /** Follows the scene: whether there is a simulated hand at all, a device that has a zero, or a recording. */
+  followScene(scene) {
+    this.movable = scene.hand;
+    this.source = scene.source.kind;
+    this.skinTilt = scene.skin_tilt_rad;
+    this.deepest = Math.min(scene.travel_mm, scene.needle.length_mm);
+    document.getElementById("turn").hidden = !this.movable;
+    this.zero.hidden = this.source === "recording";
+    this.canvas.dataset.fixed = String(!this.movable);
+    this.canvas.setAttribute("aria-valuemin", String(DRAWN_BACK_MM));
+    this.canvas.setAttribute("aria-valuemax", this.deepest.toFixed(0));
+    this.demo.hidden = !this.movable;
     this.say();
   }
 
@@ -70,8 +78,8 @@ export class Hand {
 
   say() {
     this.demo.disabled = !this.person;
-    let text = "Moved by hand, on the device";
-    if (this.movable) text = this.person ? `You hold the needle: drag${KEYS}` : "Demo hand: drag to take the needle";
+    let text = this.source === "recording" ? "Recording" : "Moved by hand, on the device";
+    if (this.movable) text = this.person ? `You hold the needle: drag${KEYS}` : "Demo: drag to take it";
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 
@@ -81,11 +89,11 @@ export class Hand {
     this.unsent = false;
     this.link.send({ do: "drag", depth_mm: Math.round(this.depth * 1000) / 1000 });
     this.canvas.setAttribute("aria-valuenow", this.depth.toFixed(1));
-    this.canvas.setAttribute("aria-valuetext", `${this.depth.toFixed(1)} mm`);
+    this.canvas.setAttribute("aria-valuetext", `${this.depth.toFixed(1)} millimetres along the needle`);
   }
 
   want(depth) {
-    this.depth = Math.min(REACH_MM.high, Math.max(REACH_MM.low, depth));
+    this.depth = Math.min(this.deepest, Math.max(DRAWN_BACK_MM, depth));
     this.unsent = true;
     if (!this.person) {
       this.person = true;
@@ -99,6 +107,7 @@ export class Hand {
     this.pointer = event.pointerId;
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.dataset.held = "true";
+    this.section.held = true;
     // A hand that already holds the needle goes on from where it is; a new one takes it where the tip is.
     this.grabbed = { depth: this.person ? this.depth : this.actual, x: event.clientX, y: event.clientY };
     this.want(this.grabbed.depth);
@@ -116,6 +125,7 @@ export class Hand {
     this.tell();
     this.pointer = null;
     this.canvas.dataset.held = "false";
+    this.section.held = false;
     this.link.send({ do: "release" });
   }
 
@@ -134,11 +144,12 @@ export class Hand {
     this.link.send({ do: "stop" });
   }
 
-  /** Space and Escape stop wherever the focus is, and nothing else. */
+  /** Escape stops wherever the focus is and closes what lies over the page; Space stops where no control has the focus. */
   key(event) {
-    if (event.key === " " || event.key === "Escape") {
+    if (event.key === "Escape" || (event.key === " " && !document.activeElement?.matches(CONTROLS))) {
       event.preventDefault();
       if (!event.repeat) this.stop();
+      if (event.key === "Escape") for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
       return;
     }
     const direction = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];

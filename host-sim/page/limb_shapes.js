@@ -1,23 +1,29 @@
 // Shapes of the three-dimensional view that never deform, and the matrices that place them. Numbers only: nothing here draws.
 
+import { HUB_CONE_MM } from "./needle.js";
 import { ALONG_MM, HALF_WIDTH_MM, LIMB_RADIUS_MM } from "./picture.js";
 
-const NEEDLE = { radius: 0.41, length: 34, bevel: 2.1, hub: 1.7, hubLength: 7 };
 /** The limb beyond what is simulated, mm along. */
 export const LIMB_MM = [-60, 80];
 export const DEEP_MM = 34;
 const AROUND = 20;
+/** Where the limb's skin ends, as an angle about its axis. */
+const LOWEST = Math.acos(1 - DEEP_MM / LIMB_RADIUS_MM);
+
+/** Angles in even steps. */
+function steps(from, to) {
+  return Array.from({ length: AROUND + 1 }, (_, i) => from + ((to - from) * i) / AROUND);
+}
 
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** Limb beside the block, needle, square, box: each `{ places, normals, triangles }`, four numbers a point. */
+/** Limb beside the block, square, box: each `{ places, normals, triangles }`, four numbers a point. */
 export function shapes() {
   const square = { places: [0, 0, 0, 1, 1, 0, 0, 1, 1, 0, 1, 1, 0, 0, 1, 1], normals: new Array(16).fill(0), triangles: [0, 1, 2, 0, 2, 3] };
   return {
     limbBehind: limb(-1),
     limbBefore: limb(1),
-    needle: turned([[-NEEDLE.length, NEEDLE.radius], [-NEEDLE.bevel, NEEDLE.radius], [0, 0.02]]),
-    hub: turned([[-NEEDLE.length - NEEDLE.hubLength, NEEDLE.hub], [-NEEDLE.length - 2, NEEDLE.hub], [-NEEDLE.length, NEEDLE.radius]]),
+    limbEnds: limbEnds(),
     square,
     box: box(),
   };
@@ -41,24 +47,66 @@ function limb(side) {
     }
   };
   const edge = Math.asin(HALF_WIDTH_MM / LIMB_RADIUS_MM);
-  const steps = (from, to) => Array.from({ length: AROUND + 1 }, (_, i) => from + ((to - from) * i) / AROUND);
-  const lowest = Math.acos(1 - DEEP_MM / LIMB_RADIUS_MM);
-  patch([LIMB_MM[0], ALONG_MM[0]], steps(0, lowest));
-  patch([ALONG_MM[1], LIMB_MM[1]], steps(0, lowest));
-  patch(ALONG_MM, steps(edge, lowest));
+  patch([LIMB_MM[0], ALONG_MM[0]], steps(0, LOWEST));
+  patch([ALONG_MM[1], LIMB_MM[1]], steps(0, LOWEST));
+  patch(ALONG_MM, steps(edge, LOWEST));
   return { places, normals, triangles };
 }
 
-/** A body turned about x from pairs of x and radius. */
-function turned(profile) {
+/** What closes the limb behind the needle's plane at both of its ends. */
+function limbEnds() {
+  const places = [];
+  const normals = [];
+  const triangles = [];
+  for (const x of LIMB_MM) {
+    const first = places.length / 4;
+    const point = (y, z) => {
+      places.push(x, y, z, 1);
+      normals.push(Math.sign(x), 0, 0, 0);
+    };
+    point(0, DEEP_MM);
+    for (const angle of steps(0, LOWEST)) point(-LIMB_RADIUS_MM * Math.sin(angle), LIMB_RADIUS_MM * (1 - Math.cos(angle)));
+    for (let i = 1; i <= AROUND; i++) triangles.push(first, first + i, first + i + 1);
+  }
+  return { places, normals, triangles };
+}
+
+/** Cannula and hub of a scene's needle, the tip at the origin, x towards it; each as those of `shapes`. */
+export function needleShapes({ length_mm: length, diameter_mm: diameter, bevel_mm: bevel, hub_length_mm: hubLength, hub_diameter_mm: hubDiameter }) {
+  const radius = diameter / 2;
+  const [front, back] = [-length, -length - hubLength];
+  return {
+    cannula: cannula(length, radius, bevel),
+    hub: turned([[back, 0], [back, hubDiameter / 2], [front - HUB_CONE_MM, hubDiameter / 2], [front, radius], [front, 0]], -radius),
+  };
+}
+
+/** A tube that is ground at its end: the tip is the deepest edge, at the origin, and the ground face looks up. */
+function cannula(length, radius, bevel) {
+  const tube = turned([[-length, radius], [0, radius]], -radius);
+  const { places, normals, triangles } = tube;
+  // The last ring slants back towards its upper edge; z points down.
+  for (let i = AROUND; i < 2 * AROUND; i++) places[4 * i] = (bevel * places[4 * i + 2]) / (2 * radius);
+  const size = Math.hypot(2 * radius, bevel);
+  const face = [(2 * radius) / size, 0, -bevel / size, 0];
+  const first = places.length / 4;
+  for (let i = AROUND; i < 2 * AROUND; i++) {
+    places.push(...places.slice(4 * i, 4 * i + 4));
+    normals.push(...face);
+  }
+  for (let i = 1; i < AROUND - 1; i++) triangles.push(first, first + i, first + i + 1);
+  return tube;
+}
+
+/** A body turned about an axis along x at the height `axis`, from pairs of x and radius. */
+function turned(profile, axis) {
   const places = [];
   const normals = [];
   const triangles = [];
   for (const [x, radius] of profile) {
     for (let i = 0; i < AROUND; i++) {
       const [s, c] = [Math.sin((i / AROUND) * 2 * Math.PI), Math.cos((i / AROUND) * 2 * Math.PI)];
-      // The ground face: the tip lies at the edge that is deepest.
-      places.push(x, radius * s, radius * c, 1);
+      places.push(x, radius * s, axis + radius * c, 1);
       normals.push(0, s, c, 0);
     }
   }

@@ -47,8 +47,6 @@ void main() {
       if (open) base = blood;
       else if (at.z > walls.x - edge && at.z < walls.y + edge) base = wall;
     }
-    // Fibres, so that one sees the tissue move only where it does.
-    base *= 0.96 + 0.04 * sin(at.z * 9.0 + sin(at.x * 1.3));
   }
   vec3 toEye = normalize(eye - at);
   if (dot(n, toEye) < 0.0) n = -n;

@@ -64,8 +64,6 @@ fn walls_at(slice: u32) -> vec2f {
       if (open) { base = frame.blood.rgb; }
       else if (at.z > walls.x - edge && at.z < walls.y + edge) { base = frame.wall.rgb; }
     }
-    // Fibres, so that one sees the tissue move only where it does.
-    base *= 0.96 + 0.04 * sin(at.z * 9.0 + sin(at.x * 1.3));
   }
   let to_eye = normalize(frame.eye.xyz - at);
   if (dot(n, to_eye) < 0.0) { n = -n; }

@@ -8,6 +8,7 @@ import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PatientEditor } from "./patient.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
+import { Practice } from "./practice.js";
 import { OwnForces } from "./own_forces.js";
 import { Scrub } from "./scrub.js";
 import { Section } from "./section.js";
@@ -27,13 +28,14 @@ const events = new EventList(byId("events"));
 const panel = new Panel();
 const body = new BodyView(palette);
 
-let scene = { layers: [], vessel: null, skin_tilt_rad: 0 };
-let tissue = new Tissue(scene);
+/** The server says it first. */
+let scene = null;
+let tissue = null;
 let linkStatus = null;
 /** What is drawn; the latest of everything. */
 const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, lateral: 0, vessel: "outside", state: "idle",
-  hand: 0, person: false, canDrag: false, seconds: 0,
+  hand: 0, person: false, canDrag: false, seconds: 0, ghost: NaN,
 };
 /** How often a recording that is played had jumped when this was drawn. */
 let jumps = 0;
@@ -46,7 +48,7 @@ const receive = {
     view.angle = scene.tilt_rad - scene.skin_tilt_rad;
     view.canDrag = scene.hand;
     forget();
-    hand.allow(scene.hand, scene.source.kind !== "recording", scene.travel_mm, scene.skin_tilt_rad);
+    hand.followScene(scene);
     panel.scene(scene);
     body.setScene(scene);
   },
@@ -56,10 +58,17 @@ const receive = {
   patient(message) {
     patient.follow(message);
   },
+  practice(message) {
+    practice.goal(message);
+  },
+  attempt(message) {
+    practice.ended(message);
+  },
   frame(message) {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
     ownForces.follow(linkStatus.compensation);
+    practice.follow(linkStatus.recording);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
       jumps = linkStatus.replay.jumps;
@@ -98,6 +107,7 @@ function forget() {
 function happen(event) {
   tissue.happen(event);
   body.happen(event);
+  practice.happen(event);
   events.add(event, scene.layers);
   if (event.limits) panel.limits(event.limits, performance.now());
   if (event.kind === "puncture") {
@@ -111,10 +121,11 @@ body.setHand(hand);
 const scrub = new Scrub(link);
 const ownForces = new OwnForces(link);
 const patient = new PatientEditor(link);
+const practice = new Practice(link, palette);
 
 /** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
 const stats = {
-  fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN,
+  fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, handMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN,
   drawn: section.drawn, vessel: "outside", flashback: false,
 };
 window.__stats = stats;
@@ -133,9 +144,12 @@ function draw(nowMs) {
   view.person = hand.person;
   const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
-  tissue.move(view.depth, view.angle, view.force, view.vessel, view.seconds);
-  if (!body.open) section.draw(view, tissue);
-  body.draw(view);
+  if (tissue) {
+    tissue.move(view.depth, view.angle, view.force, view.vessel, view.seconds);
+    view.ghost = practice.ghost(now);
+    if (!body.open) section.draw(view, tissue);
+    body.draw(view);
+  }
   timePlot.draw(trace, now);
   phasePlot.draw(trace, now);
   if (nowMs - lastPanel >= PANEL_MS) {
@@ -148,11 +162,11 @@ function draw(nowMs) {
   requestAnimationFrame(draw);
 }
 
-/** Largest computed force of the time shown, in N. */
+/** Largest force in the hand of the time shown, in N. */
 function largestForce(now) {
   let peak = -Infinity;
   for (let i = trace.firstSince(now - WINDOW_S); i < trace.end; i++) {
-    const force = trace.lawHigh[trace.slot(i)];
+    const force = trace.motorHigh[trace.slot(i)];
     if (force > peak) peak = force;
   }
   return peak;
@@ -181,8 +195,10 @@ function count(nowMs) {
   stats.lastMessageAgeMs = performance.now() - link.lastMessageAt;
   if (!view.known) return;
   stats.depthMm = view.depth;
+  stats.handMm = view.hand;
   stats.forceN = view.force;
   stats.motorN = view.motor;
+  stats.ghostMm = view.ghost;
   stats.vessel = tissue.place;
   stats.flashback = tissue.flashback;
   if (Number.isNaN(stats.firstFrameMs)) stats.firstFrameMs = performance.now();

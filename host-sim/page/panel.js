@@ -45,6 +45,12 @@ export function number(value, digits) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
+/** What a screen reader says of a slider: its value with the unit. */
+function sayValue(slider) {
+  const text = `${slider.value} ${slider.dataset.unit}`;
+  if (slider.getAttribute("aria-valuetext") !== text) slider.setAttribute("aria-valuetext", text);
+}
+
 const whole = new Intl.NumberFormat("en-GB");
 
 function stateWords(view, condition) {
@@ -54,6 +60,7 @@ function stateWords(view, condition) {
 
 export class Panel {
   constructor() {
+    this.sliders = document.querySelectorAll("input[type=range][data-unit]");
     this.lit = LIMITS.map(() => -Infinity);
     this.lamps = LIMITS.map(([, name]) => {
       const lamp = document.createElement("li");
@@ -91,6 +98,8 @@ export class Panel {
   show(view, link, condition, nowMs) {
     const known = view.known;
     write(byId("depth"), known ? number(view.depth, 2) : "–");
+    write(byId("under-skin"), known ? number(Math.max(0, view.depth * Math.sin(view.angle)), 2) : "–");
+    write(byId("motor-force"), known ? number(view.motor, 2) : "–");
     write(byId("force"), known ? number(view.force, 2) : "–");
     write(byId("speed"), known ? number(view.speed, 1) : "–");
     write(byId("torque"), known ? number(view.torque, 1) : "–");
@@ -108,6 +117,10 @@ export class Panel {
     });
     const [state, tone] = stateWords(view, condition);
     chip("state", state, tone);
+    // A screen reader is told what has changed, not each phase of an insertion.
+    const banner = byId("banner");
+    write(byId("announcement"), banner.hidden ? (tone === "good" ? "Running" : state) : banner.textContent);
+    for (const slider of this.sliders) sayValue(slider);
     const powered = condition === "live" && view.state !== "idle" && view.state !== "fault";
     byId("start").disabled = condition !== "paused" && (condition !== "live" || powered);
     byId("zero").disabled = condition !== "live" || powered;

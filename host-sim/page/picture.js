@@ -34,7 +34,7 @@ export class Picture {
       const tissue = layer.is_vessel ? VESSEL : layer.is_far_wall ? FAR_WALL : Math.max(0, TISSUES.indexOf(layer.name));
       numbers.push(tissue, layer.depth_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
     }
-    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle);
+    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle, scene.needle.diameter_mm);
     this.floats(this.core.input(), numbers.length).set(numbers);
     this.built = this.core.build(numbers.length) === 1;
     return this.built;

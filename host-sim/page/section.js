@@ -2,28 +2,20 @@
 // vessel stay where they are, and the needle turns about the entry point. The vessel runs along the section; the inset cuts across it.
 
 import { surface } from "./canvas.js";
+import { drawInset } from "./inset.js";
+import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, wholeLength } from "./needle.js";
 import { displace } from "./tissue.js";
 
-const NEEDLE = { length: 32, radius: 0.41, bevel: 2.1 }; // 21 gauge
-/** The grip that a person drags, mm behind the tip. */
-const GRIP_MM = 10;
-/** How much of the skin is shown, and where on it the needle enters. */
-const WIDE_MM = 33;
-const ENTRY_SHARE = 0.42;
-/** How much of the height lies above the skin. */
-const AIR_SHARE = 0.38;
-/** On a phone less is shown, larger. */
-const NARROW = { width: 560, mm: 23 };
-/** What the layers' names take of it, in CSS pixels. */
-const NAMES_WIDE = 84;
+/** On a phone the names are short and the inset is small. */
+const NARROW = 560;
+/** Free around what has to be seen, mm. */
+const MARGIN_MM = 0.8;
+/** At least so much of the tissue is shown beyond the entry point, mm. */
+const AHEAD_MM = 6;
+const LARGEST_SCALE = 46;
 const COLUMNS = 120;
 const FIBRES = 7;
 const FIBRE_DASH = [38, 13, 64, 21, 17, 11];
-const MM_PER_N = 4;
-const PLACES = {
-  outside: "Outside the vessel", touching: "Touching the vessel", in_lumen: "In the lumen", through: "Through the far wall",
-  beside: "Beside the vessel",
-};
 
 export class Section {
   /** `small`: among many others, with figures beside it: no ruler and no arrow. */
@@ -35,8 +27,11 @@ export class Section {
     this.scale = NaN;
     this.origin = { x: 0, y: 0 };
     this.point = { x: 0, y: 0 };
-    /** What a test reads: where the layers are drawn and how steep the needle, in CSS pixels and rad. */
-    this.drawn = { tops: [], entry: this.origin, scale: NaN, angle: NaN };
+    this.size = { width: 0, height: 0 };
+    /** While a person drags the needle: what a pixel means stays as it was when it was taken. */
+    this.held = false;
+    /** What a test reads: where the layers, the tip and the end of the hub are drawn and how steep the needle, in CSS pixels and rad. */
+    this.drawn = { tops: [], entry: this.origin, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
   }
 
   /** Millimetres along the needle for a movement of `dx`, `dy` CSS pixels. */
@@ -44,7 +39,7 @@ export class Section {
     return (dx * this.axis.x + dy * this.axis.y) / this.scale;
   }
 
-  /** One picture. `view` is { depth, force, motor, angle, hand, person, canDrag, seconds }, `tissue` a Tissue. */
+  /** One picture. `view` is { depth, force, motor, angle, hand, person, ghost, seconds }, `tissue` a Tissue. */
   draw(view, tissue) {
     const { context: g, width, height } = this.surface;
     this.look(view, tissue, width, height);
@@ -52,33 +47,72 @@ export class Section {
     g.fillRect(0, 0, width, height);
     this.layers(g, tissue, width, height);
     this.vessel(g, tissue, width);
-    if (!this.small) this.ruler(g, view, tissue);
+    if (!this.small) this.ruler(g, tissue);
     this.needle(g, view, tissue);
     this.angle(g, view);
-    if (!this.small) this.forceArrow(g, view);
     this.names(g, tissue, width, height);
-    this.scaleBar(g, height);
-    this.across(g, view, tissue, width);
-    this.drawn.scale = this.scale;
-    this.drawn.angle = this.axis.angle;
-    this.drawn.tops = tissue.layers.map((layer) => this.y(layer.depth_mm));
+    this.scaleBar(g, width, height);
+    if (tissue.vessel) this.inset(g, view, tissue, width);
+    this.note(view, tissue);
   }
 
-  /** Where the picture looks: the same place whatever the needle's angle, but that a tip far away makes it step back. */
+  /** Where the picture looks: tip and hub are in it, and the layers stay where they are while the needle goes in. */
   look(view, tissue, width, height) {
-    const ease = Number.isNaN(this.axis.angle) ? 1 : 1 - Math.exp(-view.seconds / 0.2);
-    this.axis.angle = ease === 1 ? view.angle : this.axis.angle + ease * (view.angle - this.axis.angle);
+    const resized = width !== this.size.width || height !== this.size.height;
+    Object.assign(this.size, { width, height });
+    const ease = resized ? 1 : 1 - Math.exp(-view.seconds / 0.2);
+    const come = (from, to) => (ease === 1 ? to : from + ease * (to - from));
+    this.axis.angle = come(this.axis.angle, view.angle);
     this.axis.x = Math.cos(this.axis.angle);
     this.axis.y = Math.sin(this.axis.angle);
-    const vessel = tissue.vessel?.far_mm ?? 0;
-    const deepest = Math.max(vessel, tissue.layers.at(-1)?.depth_mm ?? 0, 5);
-    const below = Math.max(deepest + Math.max(1.5, 0.15 * deepest), view.depth * this.axis.y + 1.5);
-    const beyond = Math.max(0, view.depth * this.axis.x + 1.5);
-    const wanted = Math.min(
-      width / (width < NARROW.width ? NARROW.mm : WIDE_MM), ((1 - AIR_SHARE) * height) / below, ((1 - ENTRY_SHARE) * width) / beyond, 46);
-    this.scale = ease === 1 ? wanted : this.scale + ease * (wanted - this.scale);
-    this.origin.x = ENTRY_SHARE * width;
-    this.origin.y = AIR_SHARE * height;
+    if (this.held && !resized) {
+      this.keepInSight(view.depth, tissue.needle, width, height);
+      return;
+    }
+    const wanted = this.wanted(view.depth, tissue, width, height);
+    this.scale = come(this.scale, wanted.scale);
+    this.origin.x = come(this.origin.x, wanted.x);
+    this.origin.y = come(this.origin.y, wanted.y);
+  }
+
+  /** Scale and entry point, in CSS pixels, that show needle, hub and every wall. */
+  wanted(depth, tissue, width, height) {
+    const { x, y } = this.axis;
+    const { needle } = tissue;
+    const deepest = Math.max(tissue.vessel?.far_mm ?? 0, tissue.layers.at(-1)?.depth_mm ?? 0, 5);
+    const outside = wholeLength(needle) - Math.min(depth, WAITING_MM);
+    const inside = Math.max(depth, Math.min(needle.length_mm, deepest / Math.max(y, 0.1)));
+    const hub = needle.hub_diameter_mm / 2;
+    const left = outside * x + hub * y + MARGIN_MM;
+    const right = Math.max(inside * x + MARGIN_MM, AHEAD_MM);
+    const up = outside * y + hub * x + MARGIN_MM;
+    const down = Math.max(deepest + Math.max(1.5, 0.15 * deepest), depth * y + MARGIN_MM);
+    const scale = Math.min(width / (left + right), height / (up + down), LARGEST_SCALE);
+    return {
+      scale,
+      x: left * scale + 0.5 * (width - (left + right) * scale),
+      y: up * scale + 0.4 * (height - (up + down) * scale),
+    };
+  }
+
+  /** While it is held the picture shifts rather than lose the tip or the hub. */
+  keepInSight(depth, needle, width, height) {
+    const edge = (MARGIN_MM + needle.hub_diameter_mm / 2) * this.scale;
+    const shift = (low, high, room) => Math.max(0, edge - low) - Math.max(0, high - (room - edge));
+    const end = depth - wholeLength(needle);
+    this.origin.x += shift(this.x(end * this.axis.x), this.x(depth * this.axis.x), width);
+    this.origin.y += shift(this.y(end * this.axis.y), this.y(depth * this.axis.y), height);
+  }
+
+  /** Says what was drawn where. */
+  note(view, tissue) {
+    const { drawn } = this;
+    const end = view.depth - wholeLength(tissue.needle);
+    drawn.scale = this.scale;
+    drawn.angle = this.axis.angle;
+    drawn.tops = tissue.layers.map((layer) => this.y(layer.depth_mm));
+    drawn.tip = { x: this.x(view.depth * this.axis.x), y: this.y(view.depth * this.axis.y) };
+    drawn.hub = { x: this.x(end * this.axis.x), y: this.y(end * this.axis.y) };
   }
 
   x(mm) { return this.origin.x + mm * this.scale; }
@@ -160,9 +194,9 @@ export class Section {
   }
 
   /** Depth along the needle, where it will go: a tick each mm, a number each five. */
-  ruler(g, view, tissue) {
+  ruler(g, tissue) {
     const far = tissue.vessel?.far_mm ?? tissue.layers.at(-1)?.depth_mm ?? 5;
-    const reach = Math.min(Math.ceil(far / Math.max(this.axis.y, 0.1) + 3), 60);
+    const reach = Math.min(Math.ceil(far / Math.max(this.axis.y, 0.1) + 3), tissue.needle.length_mm);
     g.save();
     this.alongNeedle(g, 0);
     g.strokeStyle = this.colours.ruler;
@@ -184,14 +218,9 @@ export class Section {
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "center";
     g.textBaseline = "top";
-    const { width } = this.surface;
-    // On a phone the layers' names need the right edge.
-    const end = width < NARROW.width ? width - NAMES_WIDE : width;
     // Where five millimetres are narrower than their label, every second one has it.
     const labelled = 5 * this.scale < 48 ? 10 : 5;
-    for (let mm = labelled; mm <= reach; mm += labelled) {
-      if (this.x(mm * this.axis.x) < end) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
-    }
+    for (let mm = labelled; mm <= reach; mm += labelled) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
     g.restore();
   }
 
@@ -211,78 +240,14 @@ export class Section {
     g.rotate(this.axis.angle);
   }
 
-  /** Tip at the origin, bevel up. */
   needle(g, view, tissue) {
-    const s = this.scale;
-    const radius = NEEDLE.radius * s;
-    const bevel = NEEDLE.bevel * s;
-    const back = -NEEDLE.length * s;
     g.save();
     this.alongNeedle(g, view.depth);
-    g.beginPath();
-    g.moveTo(back, -2 * radius);
-    g.lineTo(-bevel, -2 * radius);
-    g.lineTo(0, 0);
-    g.lineTo(back, 0);
-    g.closePath();
-    const steel = g.createLinearGradient(0, -2 * radius, 0, 0);
-    steel.addColorStop(0, this.colours.steel);
-    steel.addColorStop(0.35, this.colours["steel-light"]);
-    steel.addColorStop(1, this.colours["steel-dark"]);
-    g.fillStyle = steel;
-    g.fill();
-    g.strokeStyle = this.colours["steel-dark"];
-    g.lineWidth = 1;
-    g.stroke();
-    // The ground face and its opening; blood shows in it once the vessel is entered.
-    g.beginPath();
-    g.ellipse(-0.55 * bevel, -1.12 * radius, 0.34 * bevel, 0.34 * radius, Math.atan2(2 * radius, bevel), 0, 2 * Math.PI);
-    g.fillStyle = tissue.inLumen ? this.colours.lumen : this.colours["steel-dark"];
-    g.fill();
-    this.hub(g, tissue, radius);
-    if (view.person || view.canDrag) this.grip(g, view, radius);
+    if (Number.isFinite(view.ghost)) drawGhost(g, this.colours, this.scale, tissue.needle, view.ghost - view.depth);
+    if (view.person) drawWish(g, this.colours, this.scale, tissue.needle, view.hand - view.depth);
+    drawNeedle(g, this.colours, this.scale, tissue.needle, tissue);
+    if (!this.small) drawForce(g, this.colours, this.scale, tissue.needle, view.motor);
     g.restore();
-  }
-
-  /** The window behind the grip in which blood shows once the lumen was reached. */
-  hub(g, tissue, radius) {
-    const s = this.scale;
-    g.beginPath();
-    g.roundRect(-(GRIP_MM + 6.2) * s, -radius - 0.95 * s, 3.9 * s, 1.9 * s, 0.5 * s);
-    g.fillStyle = tissue.flashback ? this.colours.lumen : this.colours.sky;
-    g.fill();
-    g.strokeStyle = this.colours["steel-dark"];
-    g.lineWidth = 1.5;
-    g.stroke();
-  }
-
-  /** What a person takes hold of, and where the hand wants it to be. */
-  grip(g, view, radius) {
-    const at = -GRIP_MM * this.scale;
-    const half = 1.5 * this.scale;
-    const wide = 2 * radius + 12;
-    if (view.person) {
-      const wish = at + (view.hand - view.depth) * this.scale;
-      g.strokeStyle = this.colours.grip;
-      g.lineWidth = 2;
-      g.setLineDash([4, 3]);
-      g.beginPath();
-      g.roundRect(wish - half, -radius - wide / 2, 2 * half, wide, 6);
-      g.stroke();
-      g.setLineDash([]);
-    }
-    g.beginPath();
-    g.roundRect(at - half, -radius - wide / 2, 2 * half, wide, 6);
-    g.fillStyle = this.colours.grip;
-    g.fill();
-    g.strokeStyle = this.colours.panel;
-    g.lineWidth = 2;
-    g.beginPath();
-    for (let i = -2; i <= 2; i++) {
-      g.moveTo(at + i * 0.4 * half, -radius - 0.28 * wide);
-      g.lineTo(at + i * 0.4 * half, -radius + 0.28 * wide);
-    }
-    g.stroke();
   }
 
   angle(g, view) {
@@ -301,112 +266,40 @@ export class Section {
     g.fillText(`${((view.angle * 180) / Math.PI).toFixed(0)}°`, this.x(0) + far * Math.cos(middle), this.y(0) + far * Math.sin(middle));
   }
 
-  /** What the hand feels, beside the grip: against insertion up the needle, against withdrawal down it. */
-  forceArrow(g, view) {
-    if (Math.abs(view.motor) < 0.005) return;
-    const s = this.scale;
-    g.save();
-    this.alongNeedle(g, view.depth - GRIP_MM + 4);
-    const length = view.motor * MM_PER_N * s;
-    const y = -2.6 * s;
-    g.strokeStyle = this.colours.force;
-    g.fillStyle = this.colours.force;
-    g.lineWidth = 4;
-    g.beginPath();
-    g.moveTo(0, y - 5);
-    g.lineTo(0, y + 5);
-    g.stroke();
-    if (Math.abs(length) > 2) {
-      const head = Math.sign(length) * Math.min(10, Math.abs(length));
-      g.beginPath();
-      g.moveTo(0, y);
-      g.lineTo(-length + head, y);
-      g.stroke();
-      g.beginPath();
-      g.moveTo(-length, y);
-      g.lineTo(-length + head, y - 7);
-      g.lineTo(-length + head, y + 7);
-      g.fill();
-    }
-    g.font = `600 14px ${this.colours.font}`;
-    g.textAlign = "left";
-    g.textBaseline = "middle";
-    g.fillText(`${view.motor.toFixed(2)} N`, (length < 0 ? -length : 0) + 10, y);
-    g.restore();
-  }
-
-  /** Names of the layers: each in its own layer at the right. */
+  /** Names of the layers: each in its own layer at the left, where the needle never is, on a ground that it can be read on. */
   names(g, tissue, width, height) {
     g.font = `13px ${this.colours.font}`;
-    g.textAlign = "right";
+    g.textAlign = "left";
     g.textBaseline = "middle";
     let free = 0;
     for (const [i, layer] of tissue.layers.entries()) {
-      // In the lumen, which is dark by day and by night.
-      g.fillStyle = layer.is_vessel ? this.colours.ruler : this.colours["on-tissue"];
       const name = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
-      const label = width < NARROW.width ? name : `${name}, ${layer.depth_mm.toFixed(1)} mm deep`;
+      const deep = width < NARROW ? ` ${layer.depth_mm.toFixed(1)}` : `, ${layer.depth_mm.toFixed(1)} mm under the skin`;
+      const label = layer.depth_mm > 0 ? name + deep : name;
       const top = this.y(layer.depth_mm);
       const bottom = i + 1 < tissue.layers.length ? this.y(tissue.layers[i + 1].depth_mm) : height;
-      const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 9);
-      g.fillText(label, width - 12, y);
-      free = y + 9;
+      const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 10);
+      free = y + 10;
+      g.globalAlpha = 0.85;
+      g.fillStyle = this.colours.panel;
+      g.beginPath();
+      g.roundRect(8, y - 9, g.measureText(label).width + 12, 18, 4);
+      g.fill();
+      g.globalAlpha = 1;
+      g.fillStyle = this.colours.text;
+      g.fillText(label, 14, y + 0.5);
     }
   }
 
-  /** The vessel cut across, at the top right: an ellipse with its wall, the needle's tip in it or beside it, and that in words. */
-  across(g, view, tissue, width) {
-    const vessel = tissue.vessel;
-    if (!vessel) return;
-    const wide = width < NARROW.width ? 112 : 176;
+  inset(g, view, tissue, width) {
+    const narrow = width < NARROW;
+    const wide = narrow ? 112 : Math.min(240, 0.2 * width);
     const high = Math.min(0.92 * this.origin.y, 0.62 * wide);
-    const left = width - wide - 8;
-    const top = 8;
-    const s = Math.min((0.5 * wide) / vessel.width_mm, (0.42 * high) / vessel.height_mm);
-    const centre = { x: left + wide / 2, y: top + 0.44 * high };
-    const middle = vessel.axis_mm;
-    g.save();
-    g.beginPath();
-    g.roundRect(left, top, wide, high, 8);
-    g.clip();
-    g.fillStyle = this.colours.muscle;
-    g.fillRect(left, top, wide, high);
-    const tip = { x: centre.x - vessel.offset_mm * s, y: centre.y + (view.depth * this.axis.y - middle) * s };
-    g.beginPath();
-    g.ellipse(centre.x, centre.y, (vessel.width_mm / 2) * s, (vessel.height_mm / 2) * s, 0, 0, 2 * Math.PI);
-    g.fillStyle = this.colours.lumen;
-    g.fill();
-    g.strokeStyle = this.colours["vessel-wall"];
-    g.lineWidth = 3;
-    g.stroke();
-    g.beginPath();
-    g.moveTo(tip.x, top);
-    g.lineTo(tip.x, tip.y);
-    g.strokeStyle = this.colours["steel-light"];
-    g.lineWidth = 2 * NEEDLE.radius * s;
-    if (tip.y > top) g.stroke();
-    g.beginPath();
-    g.arc(tip.x, tip.y, 4, 0, 2 * Math.PI);
-    g.fillStyle = this.colours.grip;
-    g.fill();
-    g.fillStyle = this.colours.panel;
-    g.fillRect(left, top + high - 22, wide, 22);
-    g.fillStyle = this.colours.text;
-    g.font = `600 12px ${this.colours.font}`;
-    g.textAlign = "center";
-    g.textBaseline = "middle";
-    const words = PLACES[tissue.place] ?? "";
-    g.fillText(width < NARROW.width ? words.replace(" the vessel", "").replace("Through the far wall", "Through") : words, left + wide / 2, top + high - 10);
-    g.restore();
-    g.strokeStyle = this.colours.line;
-    g.lineWidth = 1;
-    g.beginPath();
-    g.roundRect(left, top, wide, high, 8);
-    g.stroke();
+    if (high > 40) drawInset(g, this.colours, { right: width - 8, wide, high }, tissue, view.depth * this.axis.y, narrow);
   }
 
-  scaleBar(g, height) {
-    const x = 12;
+  scaleBar(g, width, height) {
+    const x = width - 12 - 5 * this.scale;
     const y = height - 16;
     g.beginPath();
     g.moveTo(x, y - 4);
@@ -421,6 +314,6 @@ export class Section {
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "left";
     g.textBaseline = "bottom";
-    this.onTissue(g, "5 mm", x + 6, y - 4);
+    this.onTissue(g, "5 mm", x + 4, y - 4);
   }
 }

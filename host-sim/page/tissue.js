@@ -20,6 +20,7 @@ export class Tissue {
     this.layers = scene.layers.map((layer) => ({
       ...layer, of_vessel: layer.is_vessel || layer.is_far_wall, touched: false, given: false, dent: 0, along: 0,
     }));
+    this.needle = scene.needle;
     const vessel = scene.vessel;
     this.vessel = vessel && {
       ...vessel, near_mm: vessel.axis_mm - vessel.height_mm / 2, far_mm: vessel.axis_mm + vessel.height_mm / 2,
@@ -63,6 +64,12 @@ export class Tissue {
       layer.dent += relaxed * (drag - layer.dent);
       if (drag === 0 && Math.abs(layer.dent) < SMALLEST_DENT_MM) layer.dent = 0;
     }
+  }
+
+  /** What the vessel lies in: the layer above its near wall. */
+  get around() {
+    const vessel = this.layers.findIndex((layer) => layer.is_vessel);
+    return this.layers[vessel - 1]?.name ?? "other";
   }
 
   /** Whether the tip is in the vessel's lumen. */

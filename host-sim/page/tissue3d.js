@@ -1,10 +1,15 @@
 // The limb in three dimensions, cut along the needle's plane. What it draws comes from picture.js; it moves nothing. How triangles
 // reach the screen is limb_webgpu.js' and limb_webgl.js' business.
 
-import { DEEP_MM, LIMB_MM, along, look, multiply, perspective, shapes } from "./limb_shapes.js";
+import { DEEP_MM, LIMB_MM, along, look, multiply, needleShapes, perspective, shapes } from "./limb_shapes.js";
+import { WAITING_MM, wholeLength } from "./needle.js";
 import { ALONG_MM, IMAGE_WIDTH_MM, KINDS, LIMB_RADIUS_MM } from "./picture.js";
 
 const MOST_PIXELS_PER_POINT = 2;
+/** How much one sees from top to bottom, rad. */
+const FIELD = 0.6;
+/** Free around tip and hub, mm. */
+const MARGIN_MM = 3;
 
 export class Tissue3d {
   /** @param {HTMLCanvasElement} canvas
@@ -14,10 +19,16 @@ export class Tissue3d {
     this.canvas = canvas;
     this.colours = colours;
     this.renderer = renderer;
-    this.orbit = { yaw: 0.35, pitch: 0.42, distance: 44 };
+    /** Where one looks from, rad, and how much farther away than needle and hub need. */
+    this.orbit = { yaw: 0.35, pitch: 0.42, away: 1 };
     this.layers = [];
-    this.static = Object.fromEntries(Object.entries(shapes()).map(([name, shape]) => [name, renderer.shape(shape)]));
+    this.static = this.upload(shapes());
     this.turnable();
+  }
+
+  /** Shapes as meshes, by name. */
+  upload(shapes) {
+    return Object.fromEntries(Object.entries(shapes).map(([name, shape]) => [name, this.renderer.shape(shape)]));
   }
 
   /** Dragging turns the limb, the wheel comes nearer; arrow keys do the same. */
@@ -39,7 +50,7 @@ export class Tissue3d {
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => { last = null; });
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      this.orbit.distance = clamp(this.orbit.distance * Math.exp(event.deltaY * 0.001), 15, 160);
+      this.orbit.away = clamp(this.orbit.away * Math.exp(event.deltaY * 0.001), 0.25, 3);
     }, { passive: false });
     this.canvas.addEventListener("keydown", (event) => {
       const by = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
@@ -51,6 +62,10 @@ export class Tissue3d {
 
   /** Takes over what a newly built picture is made of. */
   build(picture, scene) {
+    this.measures = scene.needle;
+    this.needle = this.upload(needleShapes(scene.needle));
+    this.deepest = scene.layers.at(-1)?.depth_mm ?? 5;
+    this.vessel = scene.vessel;
     const surfaces = picture.surfaces();
     const meshes = this.renderer.surfaces(picture.points, picture.normals, surfaces.map((surface) => surface.triangles));
     this.layers = surfaces.map(({ kind, layer }, i) => ({ kind, mesh: meshes[i], name: scene.layers[layer]?.name }));
@@ -67,17 +82,9 @@ export class Tissue3d {
   /** One picture; `needle` is { depth, angle, flashback }, `probe` as ultrasound.js has it, or null. */
   draw(picture, needle, probe) {
     const { width, height } = this.fit();
-    const { yaw, pitch, distance } = this.orbit;
-    const target = [7, 0, 4];
-    // A narrow picture steps back, so that the vessel stays in it.
-    const far = distance * Math.max(1, 1.35 / (width / height));
-    const eye = [
-      target[0] - far * Math.sin(yaw) * Math.cos(pitch),
-      target[1] + far * Math.cos(yaw) * Math.cos(pitch),
-      target[2] - far * Math.sin(pitch),
-    ];
+    const { eye, target } = this.camera(needle, width / height);
     this.renderer.begin(picture.points, picture.normals, {
-      view: multiply(perspective(0.6, width / height, 1, 400), look(eye, target)),
+      view: multiply(perspective(FIELD, width / height, 1, 400), look(eye, target)),
       eye,
       along: ALONG_MM,
       lumen: picture.lumen,
@@ -91,6 +98,27 @@ export class Tissue3d {
     this.renderer.end();
   }
 
+  /** Where one looks from and at: tip, hub and the deepest wall are in the picture. */
+  camera({ depth, angle }, aspect) {
+    const { yaw, pitch, away } = this.orbit;
+    const [s, c] = [Math.sin(angle), Math.cos(angle)];
+    const end = Math.min(depth, WAITING_MM) - wholeLength(this.measures);
+    const tip = Math.max(depth, Math.min(this.measures.length_mm, this.deepest / Math.max(s, 0.1)));
+    const target = [((end + tip) / 2) * c, 0, ((end + tip) / 2) * s];
+    const back = [-Math.sin(yaw) * Math.cos(pitch), Math.cos(yaw) * Math.cos(pitch), -Math.sin(pitch)];
+    const right = [-Math.cos(yaw), -Math.sin(yaw), 0];
+    const up = [Math.sin(yaw) * Math.sin(pitch), -Math.cos(yaw) * Math.sin(pitch), -Math.cos(pitch)];
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const room = Math.tan(FIELD / 2);
+    const needed = [end, tip].map((along) => {
+      const from = [along * c - target[0], 0, along * s - target[2]];
+      const aside = Math.max((Math.abs(dot(from, right)) + MARGIN_MM) / aspect, Math.abs(dot(from, up)) + MARGIN_MM);
+      return aside / room + dot(from, back);
+    });
+    const far = away * Math.max(...needed);
+    return { target, eye: target.map((at, i) => at + far * back[i]) };
+  }
+
   opaque(needle) {
     this.section();
     const skin = rgb(this.colours.skin);
@@ -99,10 +127,22 @@ export class Tissue3d {
       if (surface.kind === KINDS.vesselBehind) this.renderer.mesh(surface.mesh, { colour: [...rgb(this.colours.lumen), 1], shine: 0.25 });
     }
     this.renderer.mesh(this.static.limbBehind, { colour: [...skin, 1] });
+    this.renderer.mesh(this.static.limbEnds, { colour: [...this.tissue(this.bands.at(-1)?.name), 1] });
+    if (this.vessel) this.vesselEnds();
     const steel = { colour: [...rgb(this.colours.steel), 1], shine: 0.7, model: along(needle) };
-    this.renderer.mesh(this.static.needle, steel);
+    this.renderer.mesh(this.needle.cannula, steel);
     const hub = needle.flashback ? this.colours.lumen : this.colours.grip;
-    this.renderer.mesh(this.static.hub, { ...steel, colour: [...rgb(hub), 1], shine: 0.3 });
+    this.renderer.mesh(this.needle.hub, { ...steel, colour: [...rgb(hub), 1], shine: 0.3 });
+  }
+
+  /** Blood closes the vessel where the block ends: one looks into it and not through it. */
+  vesselEnds() {
+    const { axis_mm: axis, height_mm: height, width_mm: width, offset_mm: offset } = this.vessel;
+    const [wide, high] = [width / 2 + Math.abs(offset) + 1, height + 2];
+    for (const x of ALONG_MM) {
+      const model = [0, -wide, 0, 0, 1, 0, 0, 0, 0, 0, high, 0, x, 0, axis - high / 2, 1];
+      this.renderer.mesh(this.static.square, { colour: [...rgb(this.colours.lumen), 1], normal: [1, 0, 0], model });
+    }
   }
 
   /** The layers cut along the needle's plane: simulated in the block, at rest beside and under it. */

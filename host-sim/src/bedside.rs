@@ -18,7 +18,15 @@ pub struct Bedside {
     /// Name or file of what the scripted hand does, where one does anything.
     procedure: Option<String>,
     setup: Setup,
-    asked: Option<Profile>,
+    asked: Option<Asked>,
+}
+
+/// A patient that the device has been asked to take.
+#[derive(Clone, Debug)]
+struct Asked {
+    profile: Profile,
+    /// What the scripted hand does in it, where it does anything else than before.
+    procedure: Option<String>,
 }
 
 impl Bedside {
@@ -48,19 +56,28 @@ impl Bedside {
                 Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)?
             }
         };
-        // The scripted hand must find its way in it.
-        self.procedure.iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
+        // A patient that is chosen brings its own procedure; the scripted hand must find its way in any.
+        let own = matches!(wish, PatientWish::Named(_)).then(|| profile.procedure.clone());
+        let procedure = own.filter(|_| self.procedure.is_some());
+        let wanted = procedure.as_ref().or(self.procedure.as_ref());
+        wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
-        self.asked = Some(profile);
+        self.asked = Some(Asked { profile, procedure });
         Ok(patient)
     }
 
     /// The device has taken what was asked; whether anything was.
     pub fn taken(&mut self) -> bool {
-        let Some(profile) = self.asked.take() else { return false };
+        let Some(Asked { profile, procedure }) = self.asked.take() else { return false };
+        if procedure.is_some() {
+            self.procedure = procedure;
+        }
         self.setup.profile_toml = profile.source.text.clone();
         self.setup.profile_origin = profile.source.origin.clone();
         self.profile = profile;
+        if let Some(procedure) = self.procedure() {
+            self.setup.procedure = Some(procedure.name);
+        }
         true
     }
 
@@ -78,6 +95,11 @@ impl Bedside {
     /// What the scripted hand does in the patient that counts.
     pub fn procedure(&self) -> Option<Procedure> {
         self.procedure.as_ref().and_then(|wanted| hand(wanted, &self.profile).ok())
+    }
+
+    /// The patient that counts.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
     }
 
     /// For the recording.
@@ -137,6 +159,13 @@ mod tests {
         bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
         assert!(bedside.taken());
         assert_eq!(bedside.scene().profile, "firm-skin");
+        bedside.ask(&PatientWish::Named("shoulder".into())).expect("built in");
+        assert!(bedside.taken());
+        assert_eq!(
+            bedside.setup().procedure.as_deref(),
+            Some("shoulder-straight"),
+            "it brings its procedure"
+        );
     }
 
     #[test]

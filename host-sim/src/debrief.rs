@@ -6,9 +6,9 @@ use crate::profile::Profile;
 use crate::recording::read::Recording;
 use crate::score::gesture::{Gesture, RATE_HZ};
 use crate::score::{Insertion, Judge, Span, each};
-use crate::session::{Scene, SceneVessel, Source};
+use crate::session::{Scene, SceneNeedle, SceneVessel, Source};
 use crate::sheet::chart::{Chart, Curve};
-use crate::sheet::section::{Band, Section, Tube, Way};
+use crate::sheet::section::{Band, Needle, Section, Tube, Way};
 use crate::sheet::{Cell, Sheet, decimal};
 use control_core::TICK_HZ;
 use link::frames::EventKind;
@@ -116,6 +116,18 @@ pub fn anatomy(scene: &Scene) -> (Vec<Band>, Option<Tube>) {
     (bands.collect(), scene.vessel.as_ref().map(tube))
 }
 
+/// The needle of the scene where an attempt was deepest.
+fn needle(attempt: &Attempt, scene: &Scene) -> Option<Needle> {
+    let places = attempt.gesture.places.iter();
+    let deepest = places.max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm))?;
+    let SceneNeedle { length_mm, diameter_mm, bevel_mm, .. } = scene.needle;
+    Some(Needle {
+        tip_mm: deepest.in_section(),
+        angle_rad: deepest.angle_rad,
+        cannula_mm: [length_mm, diameter_mm, bevel_mm],
+    })
+}
+
 fn tube(vessel: &SceneVessel) -> Tube {
     Tube { near_mm: vessel.axis_mm - vessel.height_mm / 2.0, high_mm: vessel.height_mm }
 }
@@ -129,7 +141,8 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
         points: one.gesture.places.iter().map(|p| p.in_section()).collect(),
         marks: one.punctures.clone(),
     });
-    let section = Section { title: "Way of the tip".into(), bands, vessel, ways: ways.collect() };
+    let needle = compared.last().and_then(|one| needle(one, scene));
+    let section = Section { title: "Way of the tip".into(), bands, vessel, ways: ways.collect(), needle };
     let curves = |points: &dyn Fn(&Attempt) -> Vec<(f64, f64)>| -> Vec<Curve> {
         let each = compared.iter().enumerate();
         each.map(|(index, one)| Curve {
@@ -151,7 +164,12 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
     let angle = curves(&|a| seconds(a.gesture.places.iter().map(|p| p.angle_rad.to_degrees()).collect()));
     let caption = |words: &str| words.to_owned();
     vec![
-        (section.svg(), caption("Circles: walls that gave way. The picture is to scale.")),
+        (
+            section.svg(),
+            caption(
+                "Circles: walls that gave way. The needle is drawn where the last attempt was deepest. The picture is to scale.",
+            ),
+        ),
         (
             chart(
                 "Force against depth",

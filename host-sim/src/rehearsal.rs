@@ -4,6 +4,7 @@
 use crate::device::virtual_device::VirtualDevice;
 use crate::driver::Driver;
 use crate::failure::Failure;
+use crate::outlets::Outlets;
 use crate::pace::Pace;
 use crate::procedure::Procedure;
 use crate::profile::Profile;
@@ -11,7 +12,7 @@ use crate::recording::messages::Setup;
 use crate::recording::read::Recording;
 use crate::recording::write::Recorder;
 use crate::session::{self, Source};
-use crate::station::{Outlets, Station};
+use crate::station::Station;
 use crate::tally::Tally;
 use control_core::TICK_HZ;
 use std::path::Path;

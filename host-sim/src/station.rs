@@ -6,14 +6,12 @@ use crate::device::virtual_device::VirtualDevice;
 use crate::device::{Port, Wire};
 use crate::driver::{Driver, Request};
 use crate::failure::Failure;
-use crate::live_gains::LiveGains;
+use crate::outlets::Outlets;
 use crate::pace::Pace;
-use crate::recording::messages::Hello;
-use crate::recording::write::Recorder;
-use crate::session::{Control, LinkStatus, PatientAnswer, PatientWish, Publisher, RecordingStatus};
+use crate::practice::Practice;
+use crate::session::{Control, PatientAnswer, PatientWish, Subscription};
 use crate::tally::Tally;
 use link::codec::MAX_FRAME;
-use link::frames::DeviceFrame;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -27,94 +25,6 @@ const PATIENCE: Duration = Duration::from_millis(2);
 const FIRST_ANSWER: Duration = Duration::from_secs(5);
 /// How much longer than asked for a run with gaps in it may take.
 const GRACE: Duration = Duration::from_secs(3);
-
-/// Everybody who wants what arrives.
-pub struct Outlets {
-    /// The pages.
-    pub publisher: Publisher,
-    /// The recording.
-    pub recorder: Option<Recorder>,
-    /// The totals.
-    pub tally: Tally,
-    gains: LiveGains,
-    failure: Option<Failure>,
-}
-
-impl Outlets {
-    /// Nothing has arrived yet.
-    pub fn new(publisher: Publisher, recorder: Option<Recorder>, tally: Tally) -> Self {
-        Self { publisher, recorder, tally, gains: LiveGains::default(), failure: None }
-    }
-
-    fn frame(&mut self, frame: &DeviceFrame) {
-        if self.tally.is_full() {
-            return;
-        }
-        if let Err(failure) = self.deliver(frame) {
-            // The rest of the run must not write on: the file ends where the disk did.
-            self.recorder = None;
-            self.failure = Some(failure);
-        }
-    }
-
-    fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Failure> {
-        match frame {
-            DeviceFrame::Hello(hello) => {
-                self.tally.hello(Hello::from(hello));
-                self.publisher.hello(hello);
-                self.recorder.as_mut().map_or(Ok(()), |r| r.hello(hello))
-            }
-            DeviceFrame::Samples(block) => {
-                let taken = self.tally.samples(&block.samples);
-                self.publisher.samples(block.first_tick, taken);
-                self.recorder.as_mut().map_or(Ok(()), |r| r.samples(block.first_tick, taken))
-            }
-            DeviceFrame::Pose(pose) => {
-                self.publisher.pose(*pose);
-                self.recorder.as_mut().map_or(Ok(()), |r| r.pose(pose))
-            }
-            DeviceFrame::Event(event) => {
-                self.tally.event(event);
-                self.publisher.event(*event);
-                self.recorder.as_mut().map_or(Ok(()), |r| r.event(event))
-            }
-            DeviceFrame::Timing(timing) => {
-                self.publisher.timing(*timing);
-                Ok(())
-            }
-            DeviceFrame::Device(record) => {
-                self.gains.learn(&record.device);
-                Ok(())
-            }
-            DeviceFrame::Ack(_) => Ok(()),
-        }
-    }
-
-    fn status(&self, driver: &Driver, now: Duration) {
-        let counts = driver.counts();
-        let recording =
-            self.recorder.as_ref().map(|r| RecordingStatus { file: r.file().to_owned(), bytes: r.bytes() });
-        let connected = driver.is_ready(now);
-        let notice = driver.notice().or((!connected).then_some(WAITING)).map(str::to_owned);
-        self.publisher.link(|status| {
-            *status = LinkStatus {
-                connected,
-                frames: counts.frames,
-                lost_frames: counts.lost_frames,
-                samples: counts.samples,
-                lost_samples: counts.lost_samples,
-                garbage: counts.garbage,
-                recording,
-                notice,
-                replay: None,
-                compensation: self.gains.share(),
-            };
-        });
-    }
-}
-
-/// What a page is told while there is no device.
-const WAITING: &str = "no answer from the device; waiting for it";
 
 /// A run in progress.
 pub struct Station<'a> {
@@ -131,6 +41,8 @@ pub struct Station<'a> {
     zeroes_first: bool,
     /// Where the patient may be changed.
     bedside: Option<Bedside>,
+    /// Where insertions are judged while somebody looks.
+    practice: Option<Practice>,
 }
 
 /// What a run came to.
@@ -155,6 +67,7 @@ impl<'a> Station<'a> {
             person_starts: false,
             zeroes_first: false,
             bedside: None,
+            practice: None,
         }
     }
 
@@ -174,6 +87,13 @@ impl<'a> Station<'a> {
     pub fn with_bedside(mut self, bedside: Bedside) -> Self {
         self.outlets.publisher.patient(&bedside.status(None));
         self.bedside = Some(bedside);
+        self
+    }
+
+    /// Insertions are judged while somebody looks.
+    pub fn with_practice(mut self, subscription: Subscription) -> Self {
+        let profile = self.bedside.as_ref().map(Bedside::profile);
+        self.practice = profile.map(|profile| Practice::new(subscription, profile, &self.outlets.publisher));
         self
     }
 
@@ -212,7 +132,7 @@ impl<'a> Station<'a> {
                 }
             }
             if device.ticks().is_multiple_of(1_000) {
-                self.outlets.status(&self.driver, now);
+                self.report(now);
                 progress(self.outlets.tally.samples);
             }
             if pace.wait(Duration::from_micros(device.ticks() * 100)).is_err() {
@@ -267,7 +187,7 @@ impl<'a> Station<'a> {
                 // Nobody would see it in a page.
                 return Err(Failure::failed(why));
             }
-            self.outlets.status(&self.driver, now);
+            self.report(now);
             progress(self.outlets.tally.samples);
         }
         if let Some(mut open) = wire {
@@ -322,8 +242,28 @@ impl<'a> Station<'a> {
         }
     }
 
+    /// Tells whoever looks how the link does and which insertions have ended.
+    fn report(&mut self, now: Duration) {
+        self.outlets.status(&self.driver, now);
+        if let Some(practice) = &mut self.practice {
+            practice.judge(&self.outlets.publisher);
+        }
+    }
+
     fn control(&mut self, control: Control, mut hand: impl FnMut(Control)) {
+        if let Some(practice) = &mut self.practice {
+            match control {
+                Control::Drag { .. } => practice.held(true),
+                Control::Script => practice.held(false),
+                _ => {}
+            }
+        }
         match control {
+            Control::Record { name } => {
+                let setup = self.bedside.as_ref().map(Bedside::setup);
+                self.outlets.record(&name, setup);
+            }
+            Control::EndRecording => self.outlets.end_recording(&self.driver),
             Control::Start => self.driver.request(Request::Start),
             Control::Stop => {
                 self.person_starts = true;
@@ -358,6 +298,9 @@ impl<'a> Station<'a> {
         let taken = answer.is_ok() && bedside.taken();
         if taken {
             self.outlets.publisher.scene(&bedside.scene());
+            if let Some(practice) = &mut self.practice {
+                practice.patient(bedside.profile(), &self.outlets.publisher);
+            }
             let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(bedside.setup()));
             if let Err(failure) = written {
                 self.outlets.recorder = None;

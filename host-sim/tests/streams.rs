@@ -2,7 +2,7 @@
 
 use control_core::units::{Millimetres, Milliradians};
 use fixed::types::I16F16;
-use host_sim::session::{self, Publisher, Scene, Source};
+use host_sim::session::{self, Publisher, Scene, SceneNeedle, Source};
 use host_sim::streams::{self, Kind, Spec, Streams, Token};
 use link::frames::Pose;
 use std::io::{Read, Write};
@@ -21,6 +21,7 @@ fn scene() -> Scene {
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,
+        needle: SceneNeedle::reaching(15.6),
         hand: true,
     }
 }

@@ -15,8 +15,6 @@ const DEEPEST_MM: f32 = 40.0;
 const THINNEST_MM: f32 = 0.3;
 /// Places along the insertion where the vessel's walls in the needle's plane are known.
 pub const SLICES: usize = 64;
-/// Outer radius of a 21-gauge needle, mm.
-const NEEDLE_RADIUS_MM: f32 = 0.41;
 /// Width of the ultrasound image, mm.
 const IMAGE_WIDTH_MM: f32 = 24.0;
 /// Its depth at the least and at the most, and how far it reaches below the innermost layer's top, mm.
@@ -87,12 +85,16 @@ impl Picture {
     /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
     /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
-    /// the skin in rad.
+    /// the skin in rad and the needle's diameter in mm.
     pub fn new(numbers: &[f32]) -> Result<Self, String> {
         let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
         let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();
-        let [width, offset, angle] =
-            rest.get(..3).and_then(|n| n.try_into().ok()).ok_or("too few numbers")?;
+        let [width, offset, angle, diameter_mm] =
+            rest.get(..4).and_then(|n| n.try_into().ok()).ok_or("too few numbers")?;
+        let diameter_mm: f32 = diameter_mm;
+        if !(0.1..=5.0).contains(&diameter_mm) {
+            return Err(format!("a needle {diameter_mm} mm thick"));
+        }
         let given: Vec<Given> = numbers[1..=PER_LAYER * count]
             .chunks_exact(PER_LAYER)
             .map(|n| Given {
@@ -125,7 +127,7 @@ impl Picture {
             shaft: Shaft {
                 tip_mm: [0.0; 3],
                 direction: [1.0, 0.0, 0.0],
-                radius_mm: NEEDLE_RADIUS_MM,
+                radius_mm: diameter_mm / 2.0,
                 inserted_mm: 0.0,
             },
         };
@@ -357,10 +359,10 @@ fn views(tissue: &Tissue, walls: &[Option<WallName>]) -> Vec<SurfaceView> {
 mod tests {
     use super::*;
 
-    /// The adult profile: skin, muscle, vein from 4.8 to 7.8 mm.
-    const ADULT: [f32; 20] = [
-        4.0, 0.0, 0.0, 3.0, 0.02, 2.0, 2.0, -1.0, 0.02, 7.0, 4.8, 1.41, 0.02, 8.0, 7.8, 1.41, 0.02, 4.46,
-        0.0, 0.52,
+    /// The adult profile: skin, fat, vein from 4.8 to 7.8 mm.
+    const ADULT: [f32; 21] = [
+        4.0, 0.0, 0.0, 3.0, 0.02, 1.0, 2.0, -1.0, 0.02, 7.0, 4.8, 1.41, 0.02, 8.0, 7.8, 1.41, 0.02, 4.46,
+        0.0, 0.52, 0.82,
     ];
 
     #[test]
@@ -368,7 +370,8 @@ mod tests {
         let depth_mm = |numbers: &[f32]| Picture::new(numbers).expect("it can be built").image_depth_mm();
         assert_eq!(depth_mm(&ADULT), 16.0);
         // Skin, muscle to 20 mm, bursa.
-        let deep = [3.0, 0.0, 0.0, 1.2, 0.0, 2.0, 6.0, -1.0, 0.0, 4.0, 20.0, -1.0, 0.0, f32::NAN, 0.0, 0.8];
+        let deep =
+            [3.0, 0.0, 0.0, 1.2, 0.0, 2.0, 6.0, -1.0, 0.0, 4.0, 20.0, -1.0, 0.0, f32::NAN, 0.0, 0.8, 0.82];
         assert_eq!(depth_mm(&deep), 24.0);
         let sections = |numbers: &[f32]| {
             let picture = Picture::new(numbers).expect("it can be built");
@@ -376,7 +379,7 @@ mod tests {
         };
         assert_eq!((sections(&ADULT), sections(&deep)), (2, 3), "every layer is drawn");
         // Deeper than any that is drawn.
-        let beyond = [1.0, 0.0, 90.0, 1.2, 0.0, f32::NAN, 0.0, 0.8];
+        let beyond = [1.0, 0.0, 90.0, 1.2, 0.0, f32::NAN, 0.0, 0.8, 0.82];
         assert!(Picture::new(&beyond).map_or(40.0, |picture| picture.image_depth_mm()) <= 40.0);
     }
 

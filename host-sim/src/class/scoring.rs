@@ -4,7 +4,7 @@
 use crate::profile::Profile;
 use crate::recording::export::Stretch;
 use crate::recording::messages::Hello;
-use crate::score::{Insertion, Judge, spans};
+use crate::score::{Insertion, Judge, Span, spans};
 use crate::session::Batch;
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
@@ -36,24 +36,31 @@ impl LiveScore {
 
     /// Takes what has arrived; the insertions that have ended with it.
     pub fn take(&mut self, batch: &Batch) -> Vec<Insertion> {
+        let mut ended = Vec::new();
+        self.take_each(batch, |_, insertion| ended.push(insertion));
+        ended
+    }
+
+    /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its figures.
+    pub fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
             let (samples, events) = (Vec::new(), Vec::new());
             self.stretch = Some(Stretch { hello, first_tick: 0, samples, events, setup: None });
         }
-        let Some(stretch) = &mut self.stretch else { return Vec::new() };
+        let Some(stretch) = &mut self.stretch else { return };
         for (tick, sample) in &batch.samples {
             self.zero_tick.get_or_insert(*tick);
             append(stretch, *tick, *sample);
         }
         let first = stretch.first_tick;
         stretch.events.extend(batch.events.iter().map(|h| h.event).filter(|event| event.tick >= first));
-        self.ended()
+        self.ended(see);
     }
 
-    /// The insertions whose samples are all here; they are forgotten.
-    fn ended(&mut self) -> Vec<Insertion> {
-        let (Some(stretch), Some(profile)) = (&mut self.stretch, &self.profile) else { return Vec::new() };
+    /// Shows the insertions whose samples are all here; they are forgotten.
+    fn ended(&mut self, mut see: impl FnMut(Span<'_>, Insertion)) {
+        let (Some(stretch), Some(profile)) = (&mut self.stretch, &self.profile) else { return };
         let end = stretch.end_tick();
         let leaves = |event: &&link::frames::Event| {
             matches!(event.kind, EventKind::Exit { layer: 0 }) && event.tick < end
@@ -63,13 +70,13 @@ impl LiveScore {
                 let first = end.saturating_sub(OUTSIDE as u64).max(stretch.first_tick);
                 begin_at(stretch, first);
             }
-            return Vec::new();
+            return;
         };
         let judge = Judge::new(profile, self.zero_tick.unwrap_or_default());
-        let insertions =
-            spans(stretch).into_iter().filter(|s| s.end <= left).map(|s| judge.insertion(s)).collect();
+        for span in spans(stretch).into_iter().filter(|span| span.end <= left) {
+            see(span, judge.insertion(span));
+        }
         begin_at(stretch, left + 1);
-        insertions
     }
 }
 

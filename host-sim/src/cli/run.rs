@@ -12,13 +12,14 @@ use host_sim::device::serial::SerialPort;
 use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::driver::Driver;
 use host_sim::failure::Failure;
+use host_sim::outlets::Outlets;
 use host_sim::pace::Pace;
 use host_sim::procedure::Procedure;
 use host_sim::profile::{Model, Profile};
 use host_sim::recording::messages::Setup;
 use host_sim::recording::write::Recorder;
 use host_sim::session::{self, Session, Source};
-use host_sim::station::{Outcome, Outlets, Station};
+use host_sim::station::{Outcome, Station};
 use host_sim::tally::Tally;
 use host_sim::visualizer;
 use std::path::PathBuf;
@@ -126,6 +127,7 @@ impl Run {
         // The port is taken before the file is made: a page that cannot be served must not cost a recording.
         let _streams = self.streams.serve(&session)?;
         let _class = self.class.join(&session, device)?;
+        let looks = (!self.headless).then(|| session.subscribe());
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
             program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
@@ -146,11 +148,15 @@ impl Run {
         let driver = Driver::new(profile.config.patient.clone());
         let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
         let station = Station::new(driver, outlets, &stop).with_bedside(bedside);
+        let station = match looks {
+            Some(subscription) => station.with_practice(subscription),
+            None => station,
+        };
         let station = if is_virtual || self.headless {
             if self.zero { station.zeroing_first() } else { station }
         } else {
             // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
-            say!("the torque is off: press Start in the page");
+            note!("the torque is off: press Start in the page");
             station.wait_for_a_person()
         };
         let mut bar = Progress::new("running");

@@ -7,7 +7,7 @@ mod person;
 
 use crate::failure::Failure;
 use crate::library::{self, Text};
-use crate::session::{Scene, SceneLayer, SceneVessel, Source, tissue_name};
+use crate::session::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan, plan};
@@ -108,6 +108,7 @@ impl Profile {
             puncture_force_n: layer.wall.map(|wall| force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
             friction_n_per_mm: layer.friction.0.to_num(),
         });
+        let deepest_mm = self.config.patient.layers.last().map_or(0.0, |layer| layer.depth.0.to_num::<f64>());
         Scene {
             hand: source == Source::Virtual,
             source,
@@ -120,6 +121,7 @@ impl Profile {
             tilt_rad: self.tilt_rad(),
             skin_tilt_rad: self.skin_tilt_rad(),
             vessel: self.vessel(),
+            needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
         }
     }
 

@@ -17,6 +17,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// Recordings of one name.
+const MOST_OF_A_NAME: u32 = 9_999;
 /// Ticks from one flush to the next: 0.25 s.
 const FLUSH_TICKS: u64 = TICK_HZ as u64 / 4;
 const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ as u64;
@@ -43,6 +45,25 @@ impl Recorder {
             Failure::input(format_args!("{shown}: cannot be created ({cause}); choose another --record file"))
         })?;
         Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup)
+    }
+
+    /// Begins a recording called `name` in the current folder. An older one is never replaced: after `monday` come `monday-2` and so on.
+    pub fn create_new(name: &str, setup: &Setup) -> Result<Self, Failure> {
+        for number in 1..=MOST_OF_A_NAME {
+            let shown = if number == 1 { format!("{name}.mcap") } else { format!("{name}-{number}.mcap") };
+            match File::create_new(&shown) {
+                Ok(file) => return Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup),
+                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(cause) => {
+                    return Err(Failure::failed(format_args!(
+                        "{shown}: cannot be created ({cause}); start the program in a folder that can be written"
+                    )));
+                }
+            }
+        }
+        Err(Failure::failed(format_args!(
+            "there are {MOST_OF_A_NAME} recordings called {name}; choose another name"
+        )))
     }
 }
 

@@ -41,8 +41,8 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     numbers(&mut sheet, &rows(&cone, &injection, &with_cone, &as_printed));
     sheet.heading("Fig. 5 and the hold of eq. 2");
     sheet.figures(&[
-        (profile_chart(&cone, &injection), "Fig. 5: elasticity of the skin, friction in the muscle, elasticity of the vessel. Way in and way out; the paper's axes have no numbers.".into()),
-        (hold_chart(&with_cone, &as_printed), "A needle held still in the muscle. Eq. 2 as printed lets go of it within a tenth of a second; a friction cone holds it, as seed 002 asks (its need 4).".into()),
+        (profile_chart(&cone, &injection), "Fig. 5: elasticity of the skin, friction in the tissue between (the paper's muscle), elasticity of the vessel. Way in and way out; the paper's axes have no numbers.".into()),
+        (hold_chart(&with_cone, &as_printed), "A needle held still between skin and vessel. Eq. 2 as printed lets go of it within a tenth of a second; a friction cone holds it, as seed 002 asks (its need 4).".into()),
     ]);
     sheet.heading("What the paper leaves open");
     for words in [
@@ -156,7 +156,7 @@ fn hold_chart(cone: &Trace, printed: &Trace) -> String {
         dashed: false,
     };
     Chart {
-        title: "Into the muscle, then held still".into(),
+        title: "Between skin and vessel, held still".into(),
         x_label: "time, s".into(),
         y_label: "force, N".into(),
         curves: vec![curve("friction cone", 0, cone), curve("eq. 2 as printed", 1, printed)],

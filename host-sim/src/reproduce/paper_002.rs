@@ -170,7 +170,7 @@ fn section(profile: &Profile, traces: &[Trace]) -> String {
         points: trace.way(0..trace.len()),
         marks: Vec::new(),
     };
-    Section { title: "Trajectories".into(), bands, vessel, ways: ways.map(way).collect() }.svg()
+    Section { title: "Trajectories".into(), bands, vessel, ways: ways.map(way).collect(), needle: None }.svg()
 }
 
 fn over_time(trace: &Trace, title: &str) -> String {

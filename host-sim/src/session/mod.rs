@@ -4,7 +4,7 @@
 mod scene;
 mod told;
 
-pub use scene::{Scene, SceneLayer, SceneVessel, Source, state_name, tissue_name, vessel_name};
+pub use scene::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, state_name, tissue_name, vessel_name};
 pub use told::{
     Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, RecordingStatus,
     ReplayStatus,
@@ -12,6 +12,7 @@ pub use told::{
 
 use control_core::controller::Sample;
 use link::frames::{Event, Hello, Pose, Timing};
+use serde_json::Value;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak, mpsc};
 
@@ -56,12 +57,16 @@ struct HubState {
     link: LinkStatus,
     jumps: u64,
     patient: Option<PatientStatus>,
+    practice: Option<Value>,
+    attempts: Vec<Value>,
 }
 
 #[derive(Default)]
 struct Buffer {
     scene: Option<Scene>,
     patient: Option<PatientStatus>,
+    practice: Option<Value>,
+    attempts: Vec<Value>,
     hello: Option<Hello>,
     samples: VecDeque<(u64, Sample)>,
     poses: VecDeque<Pose>,
@@ -83,8 +88,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Appends, dropping the oldest beyond `limit`; how many were dropped.
+/// Appends, dropping the oldest beyond `limit`; returns how many were dropped. A jump may have left more than `limit` waiting, which
+/// then stays that long until it is read.
 fn append<T: Clone>(queue: &mut VecDeque<T>, new: &[T], limit: usize) -> u64 {
+    let limit = limit.max(queue.len());
     queue.extend(new.iter().cloned());
     let excess = queue.len().saturating_sub(limit);
     queue.drain(..excess);
@@ -103,6 +110,8 @@ impl Session {
         let buffer = Arc::new(Mutex::new(Buffer {
             scene: Some(lock(&self.hub.scene).clone()),
             patient: state.patient.clone(),
+            practice: state.practice.clone(),
+            attempts: state.attempts.clone(),
             hello: state.hello.clone(),
             timing: state.timing,
             events: state.events.clone(),
@@ -139,6 +148,8 @@ impl Subscription {
         Batch {
             scene: taken.scene,
             patient: taken.patient,
+            practice: taken.practice,
+            attempts: taken.attempts,
             hello: taken.hello,
             samples: taken.samples.into(),
             poses: taken.poses.into(),
@@ -231,6 +242,18 @@ impl Publisher {
         self.each(|buffer| buffer.patient = Some(patient.clone()));
     }
 
+    /// What is practised: the goal that insertions are judged by, as JSON.
+    pub fn practice(&self, practice: &Value) {
+        lock(&self.hub.state).practice = Some(practice.clone());
+        self.each(|buffer| buffer.practice = Some(practice.clone()));
+    }
+
+    /// An insertion that has ended, with its verdict, as JSON. A new looker is told of all of them.
+    pub fn attempt(&self, attempt: &Value) {
+        lock(&self.hub.state).attempts.push(attempt.clone());
+        self.each(|buffer| buffer.attempts.push(attempt.clone()));
+    }
+
     /// Times of the stages.
     pub fn timing(&self, timing: Timing) {
         lock(&self.hub.state).timing = Some(timing);
@@ -269,6 +292,7 @@ mod tests {
             tilt_rad: 0.0,
             skin_tilt_rad: 0.0,
             vessel: None,
+            needle: SceneNeedle::reaching(15.6),
             hand: true,
         }
     }
@@ -288,6 +312,20 @@ mod tests {
         assert_eq!((late.samples.len(), late.skipped_samples), (20_000, 12_000));
         assert_eq!(late.samples.first().map(|s| s.0), Some(12_000));
         assert_eq!(slow.drain().samples.len(), 0);
+    }
+
+    #[test]
+    fn what_comes_after_a_jump_drops_none_of_it() {
+        let (session, publisher) = open(scene());
+        let mut looker = session.subscribe();
+        let poses: Vec<_> = (0..10_000).map(|ms| Pose { tick: ms * 10, ..Pose::default() }).collect();
+        let samples: Vec<_> = (0..100_000).map(|tick| (tick, Sample::default())).collect();
+        publisher.jump(&samples, &poses, &[]);
+        publisher.pose(Pose { tick: 100_000, ..Pose::default() });
+        publisher.samples(100_000, &[Sample::default()]);
+        let batch = looker.drain();
+        assert!(batch.poses.len() >= 10_000 && batch.samples.len() >= 100_000);
+        assert!(batch.poses[0].tick <= 10, "the ten seconds before are there");
     }
 
     #[test]

@@ -27,6 +27,8 @@ pub struct Scene {
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
+    /// The needle, the same for every picture.
+    pub needle: SceneNeedle,
     /// Whether [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] do anything: only with the virtual device.
     pub hand: bool,
 }
@@ -60,6 +62,36 @@ pub struct SceneVessel {
     pub width_mm: f64,
     /// How far the needle's plane passes beside the axis in mm.
     pub offset_mm: f64,
+}
+
+/// A hypodermic needle of 21 gauge. Its hub sits at the end of the cannula, so that the needle goes in until the hub meets the skin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SceneNeedle {
+    /// Length of the cannula from the tip to the hub in mm.
+    pub length_mm: f64,
+    /// Outer diameter of the cannula in mm.
+    pub diameter_mm: f64,
+    /// Length of the ground face at the tip in mm.
+    pub bevel_mm: f64,
+    /// Length of the hub behind the cannula in mm.
+    pub hub_length_mm: f64,
+    /// Diameter of the hub in mm.
+    pub hub_diameter_mm: f64,
+}
+
+/// Lengths in which such needles are sold (1, 1¼, 1½, 2 and 3⅛ inches), in mm.
+const LENGTHS_MM: [f64; 5] = [25.0, 32.0, 38.0, 50.0, 80.0];
+/// How much of the cannula stays outside at the deepest wall in mm.
+const OUTSIDE_MM: f64 = 8.0;
+
+impl SceneNeedle {
+    /// The shortest needle that reaches `depth_mm` along itself with some of it left outside; the longest where none does.
+    pub fn reaching(depth_mm: f64) -> Self {
+        let reaches = |length: &f64| *length >= depth_mm + OUTSIDE_MM;
+        let length_mm = LENGTHS_MM.into_iter().find(reaches).unwrap_or(LENGTHS_MM[LENGTHS_MM.len() - 1]);
+        // ISO 9626: 21 gauge has an outer diameter of 0.80 to 0.83 mm.
+        Self { length_mm, diameter_mm: 0.82, bevel_mm: 2.1, hub_length_mm: 7.0, hub_diameter_mm: 3.4 }
+    }
 }
 
 /// One layer of tissue.
@@ -122,5 +154,18 @@ pub fn state_name(code: u8) -> &'static str {
         Some(State::Excitation) => "excitation",
         Some(State::Fault) => "fault",
         None => "unknown",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_needle_is_long_enough_for_the_deepest_wall() {
+        // An adult's far wall at 30°, a shoulder's cartilage at 45°, and deeper than any needle.
+        for (depth_mm, length_mm) in [(15.6, 25.0), (41.0, 50.0), (0.0, 25.0), (300.0, 80.0)] {
+            assert!((SceneNeedle::reaching(depth_mm).length_mm - length_mm).abs() < 1e-9, "{depth_mm}");
+        }
     }
 }

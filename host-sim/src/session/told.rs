@@ -101,6 +101,10 @@ pub struct Batch {
     pub scene: Option<Scene>,
     /// The patient, where anything about it has changed.
     pub patient: Option<PatientStatus>,
+    /// The goal that insertions are judged by, where it has changed.
+    pub practice: Option<serde_json::Value>,
+    /// Insertions that have ended, each with its verdict (a subscriber's first batch repeats all).
+    pub attempts: Vec<serde_json::Value>,
     /// The latest hello, where there was one (a subscriber's first batch repeats it).
     pub hello: Option<Hello>,
     /// Samples with their tick, 10 kHz.
@@ -156,6 +160,13 @@ pub enum Control {
         /// Share of the stored gains, 0 to 1.
         share: f64,
     },
+    /// What happens is recorded from now on, in a new file of this name.
+    Record {
+        /// Name without folder and ending.
+        name: String,
+    },
+    /// The recording ends.
+    EndRecording,
     /// A recording goes on from here, or stays here where it is paused.
     Seek {
         /// Time into the recording, s.

@@ -43,6 +43,17 @@ pub struct Way {
     pub marks: Vec<((f64, f64), String)>,
 }
 
+/// A needle, bevel up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Needle {
+    /// Its tip, along the skin and below it, mm.
+    pub tip_mm: (f64, f64),
+    /// Its angle to the skin, rad.
+    pub angle_rad: f64,
+    /// Length, diameter and ground face of its cannula, mm.
+    pub cannula_mm: [f64; 3],
+}
+
 /// What is drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
@@ -54,6 +65,8 @@ pub struct Section {
     pub vessel: Option<Tube>,
     /// The last on top.
     pub ways: Vec<Way>,
+    /// Where there is one, as far as the picture reaches.
+    pub needle: Option<Needle>,
 }
 
 /// What is in view, mm.
@@ -95,6 +108,9 @@ impl Section {
             );
         }
         self.draw_tissue(&mut out, &view);
+        if let Some(needle) = &self.needle {
+            draw_needle(&mut out, needle, &view);
+        }
         for way in &self.ways {
             draw_way(&mut out, way, &view);
         }
@@ -172,6 +188,23 @@ impl Section {
     }
 }
 
+fn draw_needle(out: &mut String, needle: &Needle, view: &View) {
+    let [length, diameter, bevel] = needle.cannula_mm;
+    let (sin, cos) = needle.angle_rad.sin_cos();
+    // Not over the words above the picture.
+    let length = length.min((needle.tip_mm.1 - view.top - diameter) / sin.max(1e-3)).max(bevel);
+    let corners = [(0.0, 0.0), (bevel, diameter), (length, diameter), (length, 0.0)];
+    let points = corners.map(|(back, up)| {
+        let (x, y) = (needle.tip_mm.0 - back * cos + up * sin, needle.tip_mm.1 - back * sin - up * cos);
+        format!("{:.1},{:.1}", view.x(x), view.y(y))
+    });
+    let _ = write!(
+        out,
+        "<polygon points=\"{}\" style=\"fill:var(--muted);fill-opacity:.55;stroke:var(--muted)\"/>",
+        points.join(" ")
+    );
+}
+
 fn draw_way(out: &mut String, way: &Way, view: &View) {
     let _ = write!(out, "<path class=\"s s{}\" d=\"", way.colour);
     let mut pen = 'M';
@@ -211,12 +244,16 @@ mod tests {
             bands: vec![band("skin", 0.0), band("fat", 2.0)],
             vessel: Some(Tube { near_mm: 4.8, high_mm: 3.0 }),
             ways: vec![way],
+            needle: Some(Needle { tip_mm: (8.0, 6.0), angle_rad: 0.5, cannula_mm: [25.0, 0.8, 2.1] }),
         };
         let view = section.view();
         // 8 mm along and 6 mm down are as long as each other's scale says.
         assert!(((view.x(8.0) - view.x(0.0)) / 8.0 - (view.y(6.0) - view.y(0.0)) / 6.0).abs() < 1e-9);
         assert!(view.x(0.0) >= 0.0 && view.x(8.0) <= WIDE && view.bottom > 7.8);
         let svg = section.svg();
+        // Its tip is where the way ends.
+        let tip = format!("<polygon points=\"{:.1},{:.1} ", view.x(8.0), view.y(6.0));
+        assert!(svg.contains(&tip), "{svg}");
         assert!(svg.contains("4.8 mm") && svg.contains("var(--lumen") && !svg.contains("NaN"));
         assert!(Section::default().svg().ends_with("</svg>"), "nothing at all is a drawing too");
     }

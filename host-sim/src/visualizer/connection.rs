@@ -49,8 +49,11 @@ async fn stream_to(sink: &mut SplitSink<WebSocket, Message>, shared: &Shared) {
         let mut batch = subscription.drain();
         let scene = batch.scene.take().map(ToPage::Scene);
         let patient = batch.patient.take().map(ToPage::Patient);
+        let practice = batch.practice.take().map(ToPage::Practice);
+        let attempts: Vec<ToPage> = batch.attempts.drain(..).map(ToPage::Attempt).collect();
         let (device, mut frame) = condenser.take(batch);
-        for news in scene.into_iter().chain(patient).chain(device.map(ToPage::Device)) {
+        let news = scene.into_iter().chain(patient).chain(practice).chain(attempts);
+        for news in news.chain(device.map(ToPage::Device)) {
             if !send(sink, &news).await {
                 return;
             }
@@ -105,6 +108,8 @@ fn carry_out(message: FromPage, shared: &Shared) {
         FromPage::Choose { patient } => Control::Patient(PatientWish::Named(patient)),
         FromPage::Edit { profile } => Control::Patient(PatientWish::Edited(profile)),
         FromPage::Compensate { share } => Control::Compensate { share },
+        FromPage::Record { name } => Control::Record { name },
+        FromPage::EndRecording => Control::EndRecording,
         FromPage::Seek { at_s } => Control::Seek { at_s },
     };
     shared.session.control(control);

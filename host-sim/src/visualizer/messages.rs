@@ -15,6 +15,10 @@ pub enum ToPage {
     Scene(Scene),
     /// The patient, where it may be changed; again with the answer to each wish.
     Patient(PatientStatus),
+    /// What is practised, where insertions are judged: `goal` in words; again with another patient.
+    Practice(serde_json::Value),
+    /// An insertion that has ended, with its verdict: the fields of [`crate::practice::Attempt`].
+    Attempt(serde_json::Value),
     /// Who the device is; again whenever it starts anew.
     Device(Device),
     /// What has happened since the last frame.
@@ -196,6 +200,13 @@ pub enum FromPage {
         /// Share of what the device has stored, 0 to 1.
         share: f64,
     },
+    /// Record from now on. An older file is never replaced: `monday` becomes `monday-2` where there is one.
+    Record {
+        /// Name of the file without folder and ending: 1 to 60 letters, digits, blanks or `._-`.
+        name: String,
+    },
+    /// End the recording.
+    EndRecording,
     /// A recording is to go on from here.
     Seek {
         /// Time into the recording in s, 0 or more.
@@ -217,12 +228,24 @@ impl FromPage {
             Self::Compensate { share } if !(0.0..=1.0).contains(&share) => {
                 Err(format!("share {share} is not within 0 to 1"))
             }
+            Self::Record { name } if !is_file_name(&name) => Err(
+                "a recording's name has 1 to 60 letters, digits, blanks or ._- and begins with a letter or a digit"
+                    .into(),
+            ),
             Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
                 Err(format!("time {at_s} s is not within 0 to 1e9 s"))
             }
             message => Ok(message),
         }
     }
+}
+
+/// Returns true for a plain name that leads to no other folder.
+fn is_file_name(name: &str) -> bool {
+    let is_plain = |c: char| c.is_alphanumeric() || " ._-".contains(c);
+    (1..=60).contains(&name.chars().count())
+        && name.chars().all(is_plain)
+        && name.starts_with(|c: char| c.is_alphanumeric())
 }
 
 #[cfg(test)]
@@ -245,6 +268,8 @@ mod tests {
             r#"{"do":"drag","depth_mm":null}"#,
             r#"{"do":"tilt","rad":2}"#,
             r#"{"do":"seek","at_s":-1}"#,
+            r#"{"do":"record","name":"../monday"}"#,
+            r#"{"do":"record","name":""}"#,
             r#"{"do":"compensate","share":1.01}"#,
         ] {
             let error = FromPage::parse(bad).unwrap_err();

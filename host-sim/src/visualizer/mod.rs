@@ -30,6 +30,7 @@ pub(crate) fn test_scene() -> crate::session::Scene {
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,
+        needle: crate::session::SceneNeedle::reaching(15.6),
         hand: true,
     }
 }

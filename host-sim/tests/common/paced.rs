@@ -2,11 +2,12 @@
 
 use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::driver::Driver;
+use host_sim::outlets::Outlets;
 use host_sim::pace::Pace;
 use host_sim::procedure::Procedure;
 use host_sim::profile::Profile;
 use host_sim::session::{self, Publisher, Session, Source};
-use host_sim::station::{Outcome, Outlets, Station};
+use host_sim::station::{Outcome, Station};
 use host_sim::tally::Tally;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};

@@ -25,11 +25,17 @@ impl Page {
         for domain in ["Page", "Runtime", "Log", "Network"] {
             devtools.call(&format!("{domain}.enable"), json!({}))?;
         }
+        let mut page = Self { devtools, complaints: Vec::new() };
+        page.resize(width, height, phone)?;
+        page.devtools.call("Page.navigate", json!({ "url": url }))?;
+        Ok(page)
+    }
+
+    /// Shows the page in a view of another size, in CSS pixels.
+    pub fn resize(&mut self, width: u32, height: u32, phone: bool) -> Result<(), Failure> {
         let view = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone });
-        devtools.call("Emulation.setDeviceMetricsOverride", view)?;
-        devtools.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": phone }))?;
-        devtools.call("Page.navigate", json!({ "url": url }))?;
-        Ok(Self { devtools, complaints: Vec::new() })
+        self.devtools.call("Emulation.setDeviceMetricsOverride", view)?;
+        self.devtools.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": phone })).map(drop)
     }
 
     /// Light or dark, as the person's system would ask for.

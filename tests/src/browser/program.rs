@@ -60,8 +60,13 @@ impl Program {
 
     /// Starts it and reads the address that it prints.
     pub fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Failure> {
+        Self::start_in(path, Path::new("."), arguments)
+    }
+
+    /// The same in another folder.
+    pub fn start_in(path: &Path, folder: &Path, arguments: &[&str]) -> Result<Self, Failure> {
         let mut command = Command::new(path);
-        command.args(arguments);
+        command.args(arguments).current_dir(folder);
         let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
         let mut process = spawned.map_err(|e| format!("cannot start {}: {e}", path.display()))?;
         let stdout = BufReader::new(process.stdout.take().ok_or("no standard output")?);

@@ -218,7 +218,7 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Failure> {
     )?;
     let mut near = page.middle("section")?;
     page.mouse("mousePressed", near)?;
-    // Back to where the skin is hardly pressed, then steps of 60 pixels to and fro.
+    // Back to where the skin is hardly pressed, then steps of 2 mm to and fro: the skin gives way at 3 mm.
     for _ in 0..200 {
         if page.number("__stats.depthMm")? <= 0.5 {
             break;
@@ -227,7 +227,8 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Failure> {
         page.mouse("mouseMoved", near)?;
         std::thread::sleep(Duration::from_millis(15));
     }
-    let deep = (near.0 + 60.0 * TILT_RAD.cos(), near.1 + 60.0 * TILT_RAD.sin());
+    let step_px = 2.0 * page.number("__stats.drawn.scale")?;
+    let deep = (near.0 + step_px * TILT_RAD.cos(), near.1 + step_px * TILT_RAD.sin());
     for step in 0..LATENCY_STEPS {
         // Not in step with the screen.
         page.wait("the needle drawn back", SOON, "__stats.depthMm < 0.9")?;
@@ -306,8 +307,7 @@ fn zero_and_turn(page: &mut Page) -> Result<(), Failure> {
     page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
 }
 
-/// The needle turns and the layers stay where they are; steeper, the same way along the needle goes through the far wall, and is
-/// told as that.
+/// The needle turns; steeper, the same way along the needle goes through the far wall, and is told as that.
 fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     let turn = |degrees: u32| {
         format!(
@@ -318,23 +318,10 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     let drawn = |degrees: f64| {
         format!("__stats.depthMm < -3 && Math.abs(__stats.drawn.angle - {}) < 0.004", degrees.to_radians())
     };
-    // Where the lines between layers and the place of entry are drawn; the picture's scale may still settle by a fraction of a pixel.
-    let layers = "(() => { const d = __stats.drawn; return [...d.tops, d.entry.x, d.entry.y].join(','); })()";
-    let numbers =
-        |text: &str| text.split(',').map(|one| one.parse().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
     page.evaluate(&turn(30))?;
     page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))?;
-    std::thread::sleep(Duration::from_millis(500));
-    let flat = page.text(layers)?;
-    page.photograph(&scratch.join("turned-30.png"))?;
     page.evaluate(&turn(60))?;
     page.wait("the needle outside at 60°", A_FEW_INSERTIONS, &drawn(60.0))?;
-    std::thread::sleep(Duration::from_millis(500));
-    let steep = page.text(layers)?;
-    page.photograph(&scratch.join("turned-60.png"))?;
-    let (before, after) = (numbers(&flat), numbers(&steep));
-    let stay = before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 0.5);
-    check("layers that stay where they are", stay, (&flat, &steep))?;
     page.wait("blood in the hub", A_FEW_INSERTIONS, "__stats.vessel === 'in_lumen' && __stats.flashback")?;
     page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
     page.photograph(&scratch.join("through.png"))?;

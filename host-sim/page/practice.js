@@ -1,0 +1,137 @@
+// Practice: records, shows the verdict after each withdrawal, the attempts with what was better or worse than the best so far, and the
+// learning curve. The server judges; see host-sim/src/practice.rs.
+
+import { LearningCurve } from "./learning_curve.js";
+import { number } from "./panel.js";
+
+const byId = (id) => document.getElementById(id);
+/** Columns of the list: their heading, the figure, its digits, and whether less is better. */
+const COLUMNS = [
+  ["Time, s", (figures) => figures.time_s, 1],
+  ["Force, N", (figures) => figures.peak_force_n, 2],
+  ["Angle off, °", (figures) => figures.angle_rms_error_deg, 1],
+  ["Spared hits", (figures) => figures.spared_hits, 0],
+];
+/** A figure that differs from the best one by less than this share is as good. */
+const SAME = 0.05;
+
+export class Practice {
+  /**
+   * @param {import("./link.js").Link} link where wishes go
+   * @param {Record<string, string>} colours of style.css, by name
+   */
+  constructor(link, colours) {
+    this.link = link;
+    this.attempts = [];
+    this.patient = null;
+    this.touchedAt = NaN;
+    this.curve = new LearningCurve(byId("curve"), colours);
+    this.record = byId("record");
+    this.name = byId("record-name");
+    this.record.addEventListener("click", () => this.askForRecording());
+    byId("view-events").addEventListener("click", () => this.show(false));
+    byId("view-practice").addEventListener("click", () => this.show(true));
+    byId("attempts-head").append(...["", "Goal", ...COLUMNS.map(([name]) => name)].map((name) => Object.assign(document.createElement("th"), { textContent: name, scope: "col" })));
+  }
+
+  /** Goes to the practice or back to the events. */
+  show(open) {
+    byId("practice").hidden = !open;
+    byId("events").hidden = open;
+    byId("view-events").setAttribute("aria-pressed", String(!open));
+    byId("view-practice").setAttribute("aria-pressed", String(open));
+  }
+
+  /** The server judges: what insertions are for. */
+  goal(message) {
+    byId("list-views").hidden = false;
+    byId("events-title").hidden = true;
+    this.patient = message.patient;
+    byId("goal").textContent = `${message.goal}.`;
+  }
+
+  /** An insertion has ended. After a reconnection all are told again. */
+  ended(attempt) {
+    if (attempt.number === 1) this.attempts.length = 0;
+    this.attempts.push(attempt);
+    if (attempt.by_person) this.say(attempt);
+    this.list();
+    this.curve.draw(this.attempts.filter((one) => one.by_person));
+  }
+
+  say(attempt) {
+    const verdict = byId("verdict");
+    const { figures } = attempt;
+    const measured = `${number(figures.time_s, 1)} s, ${number(figures.peak_force_n, 2)} N`;
+    verdict.dataset.tone = attempt.reached ? "good" : "bad";
+    const what = attempt.reached ? "Goal reached" : `Not reached: ${attempt.missing.join("; ")}`;
+    verdict.textContent = `Attempt ${attempt.number}. ${what}. ${measured}.`;
+  }
+
+  /** The best insertion into this patient: reached, and the quickest; a person's where there is one, else the scripted hand's. */
+  get best() {
+    const reached = this.attempts.filter((one) => one.reached && one.patient === this.patient);
+    const own = reached.filter((one) => one.by_person);
+    return (own.length ? own : reached).reduce((best, one) => (best && best.figures.time_s <= one.figures.time_s ? best : one), null);
+  }
+
+  /** Newest first; figures are marked as better or worse than those of the best. */
+  list() {
+    const { best } = this;
+    const rows = this.attempts.slice(-100).reverse().map((attempt) => {
+      const row = document.createElement("tr");
+      row.dataset.best = String(attempt === best);
+      const cell = (text, tone = "") => {
+        const cell = row.insertCell();
+        cell.textContent = text;
+        if (tone) cell.dataset.tone = tone;
+      };
+      cell(`${attempt.number}${attempt.by_person ? "" : " demo"}${attempt === best ? " ★" : ""}`);
+      cell(attempt.reached ? "reached" : "missed", attempt.reached ? "good" : "bad");
+      for (const [, figure, digits] of COLUMNS) {
+        const value = figure(attempt.figures);
+        const wanted = best && best !== attempt && best.patient === attempt.patient ? figure(best.figures) : null;
+        cell(...compared(value, wanted, digits));
+      }
+      return row;
+    });
+    byId("attempts").replaceChildren(...rows);
+  }
+
+  /** Follows the events of the device: when the needle has touched the skin. */
+  happen(event) {
+    if (event.kind === "contact" && event.layer === 0) this.touchedAt = event.t_s;
+    if (event.kind === "exit" && event.layer === 0) this.touchedAt = NaN;
+  }
+
+  /** Where the tip of the best insertion was so long after its first touch, mm; NaN where there is none to be shown. */
+  ghost(now) {
+    const path = this.best?.path;
+    const since = now - this.touchedAt;
+    if (!path?.length || !(since >= 0) || since > path.at(-1)[0]) return NaN;
+    const after = path.findIndex(([t]) => t >= since);
+    const [[t0, d0], [t1, d1]] = [path[Math.max(0, after - 1)], path[after]];
+    return t1 > t0 ? d0 + ((d1 - d0) * (since - t0)) / (t1 - t0) : d1;
+  }
+
+  /** Follows the server: the recording in progress, or null. */
+  follow(recording) {
+    const text = recording ? "End recording" : "Record";
+    if (this.record.textContent !== text) this.record.textContent = text;
+    this.name.disabled = Boolean(recording);
+    this.recording = recording;
+  }
+
+  askForRecording() {
+    if (this.recording) this.link.send({ do: "end_recording" });
+    else if (this.name.reportValidity()) this.link.send({ do: "record", name: this.name.value.trim() });
+  }
+}
+
+/** A figure, and whether it is better or worse than the wanted one: less is. */
+function compared(value, wanted, digits) {
+  if (value === null) return ["–"];
+  const text = number(value, digits);
+  if (wanted === null || Math.abs(value - wanted) <= SAME * Math.abs(wanted)) return [text];
+  return value < wanted ? [`${text} better`, "good"] : [`${text} worse`, "bad"];
+}
