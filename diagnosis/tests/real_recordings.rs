@@ -73,6 +73,7 @@ fn emps_ripple_of_2_5_mm_is_found_where_friction_is_known_or_did_not_run() {
 }
 
 #[test]
+#[ignore = "nightly: 25 s"]
 fn anticogging_names_cogging_or_did_not_run() {
     let Some(dir) = shared("anticogging") else { return };
     let outcome =
@@ -99,6 +100,7 @@ fn anticogging_names_cogging_or_did_not_run() {
 }
 
 #[test]
+#[ignore = "nightly: 20 s"]
 fn a_belt_that_stretches_loses_no_counts_or_did_not_run() {
     let Some(dir) = shared("machines/cart-B") else { return };
     let all = |kind: &str| -> Vec<String> {

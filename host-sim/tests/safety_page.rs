@@ -1,4 +1,4 @@
-//! docs/safety.md names tests: each is where it says.
+//! docs/safety.md names tests and CONTRIBUTING.md files: each is where it says.
 
 use std::path::Path;
 
@@ -47,4 +47,17 @@ fn every_test_that_the_page_names_is_there() {
         }
     }
     assert!(seen > 45, "only {seen} tests were seen: the reader of the page is blind");
+}
+
+#[test]
+fn every_file_that_contributing_names_is_there() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");
+    let page = std::fs::read_to_string(top.join("CONTRIBUTING.md")).expect("the page");
+    let (_, table) = page.split_once("## Where to look").expect("its table");
+    let rows: Vec<&str> = table.split("\n## ").next().unwrap_or_default().lines().skip(4).collect();
+    let files: Vec<&str> = rows.iter().flat_map(|row| quoted(row)).collect();
+    assert!(files.len() >= 10, "only {files:?}");
+    for file in files {
+        assert!(top.join(file).is_file(), "CONTRIBUTING.md names {file}, which is not there");
+    }
 }
