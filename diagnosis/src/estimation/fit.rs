@@ -1,8 +1,8 @@
 //! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise, robust_loss};
-use crate::estimation::input::Total;
+use crate::estimation::filter::{Gains, Noise, SIDE_BY_SIDE, robust_loss};
+use crate::estimation::input::{Input, Total};
 use crate::estimation::model::{Column, Model, total};
 use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::dot;
@@ -37,8 +37,9 @@ impl Prepared {
         let reference: Vec<f64> = columns.iter().map(|c| c.prior.mean).collect();
         let at_reference = total(track, &columns, &reference);
         let residual = gains.innovations(&observed, &at_reference);
+        let inputs: Vec<&Input> = columns.iter().map(|c| &c.input).collect();
         let responses: Vec<Vec<f64>> =
-            columns.par_iter().map(|c| gains.response(&observed, &c.input)).collect();
+            inputs.par_chunks(SIDE_BY_SIDE).flat_map_iter(|some| gains.responses(&observed, some)).collect();
         let segments = grams(track, &responses, &residual);
         let bounds = track.blocks.segments.clone();
         let weight = vec![1.0; segments.len()];

@@ -100,7 +100,7 @@ impl<'a> Waves<'a> {
             .map(|((track, one), drive)| {
                 let inputs = wave_inputs(track, order * TAU / self.turn, drive.as_ref());
                 let observed = track.observed();
-                inputs.iter().map(|input| one.gains.response(&observed, input)).collect()
+                one.gains.responses(&observed, &inputs.iter().collect::<Vec<_>>())
             })
             .collect()
     }

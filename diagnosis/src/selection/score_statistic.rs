@@ -105,7 +105,7 @@ pub(crate) fn score(
         let after = effective.as_ref().map(|all| &all[r]);
         let inputs = added_inputs(model, track, effect, after);
         let observed = track.observed();
-        inputs.iter().map(|input| one.gains.response(&observed, input)).collect()
+        one.gains.responses(&observed, &inputs.iter().collect::<Vec<_>>())
     };
     let terms: Terms = tracks.par_iter().zip(&fit.prepared).enumerate().map(response).collect();
     let sums = project(fit, residuals, &terms, effect.name.definition().has_own_phase());

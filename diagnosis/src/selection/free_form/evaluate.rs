@@ -4,7 +4,7 @@ use super::basis::{self, Basis, Inputs, Point, Warps};
 use super::compare::{Densities, Density};
 use super::shape::{Coefficients, Shape};
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise};
+use crate::estimation::filter::{Gains, Noise, SIDE_BY_SIDE};
 use crate::estimation::fit::{Prepared, layout};
 use crate::estimation::input::Input;
 use crate::estimation::model::Model;
@@ -142,7 +142,9 @@ impl<'a> Evaluator<'a> {
                     .map(|((track, points), gains)| {
                         let columns = basis.columns(track, points, nominal.known_gain());
                         let observed = track.observed();
-                        columns.par_iter().map(|input| gains.response(&observed, input)).collect()
+                        let inputs: Vec<&Input> = columns.iter().collect();
+                        let some = inputs.par_chunks(SIDE_BY_SIDE);
+                        some.flat_map_iter(|some| gains.responses(&observed, some)).collect()
                     })
                     .collect();
                 let own = responses
