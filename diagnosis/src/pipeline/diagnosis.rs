@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub(crate) enum Diagnosis {
     /// The recordings cannot tell, and nothing was named.
     CannotTell {
-        rig: Rig,
+        rig: Box<Rig>,
         reason: Reason,
         /// Rows a second of the slowest recording, where the recordings were looked at.
         rate_hz: Option<f64>,

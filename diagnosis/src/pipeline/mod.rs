@@ -28,7 +28,7 @@ pub(crate) fn run(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress:
     let mistake = plausibility::mistakes(&all, rig).or_else(|| sufficiency::too_little(fit, holdout, rig));
     if let Some(sentence) = mistake {
         let reason = Reason::Recordings(sentence);
-        return Diagnosis::CannotTell { rig: rig.clone(), reason, rate_hz: None };
+        return Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None };
     }
     let prepared = prepare::prepare(rig, fit, holdout, progress);
     let found = search::search(&prepared, progress);
@@ -36,6 +36,6 @@ pub(crate) fn run(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress:
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
     match assess::assess(&prepared, found) {
         Ok(assessment) => decide::decide(&prepared, &assessment, holdout, rate_hz),
-        Err(reason) => Diagnosis::CannotTell { rig: prepared.nominal.rig.clone(), reason, rate_hz },
+        Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     }
 }
