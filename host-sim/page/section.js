@@ -65,14 +65,13 @@ export class Section {
     this.axis.angle = come(this.axis.angle, view.angle);
     this.axis.x = Math.cos(this.axis.angle);
     this.axis.y = Math.sin(this.axis.angle);
-    if (this.held && !resized) {
-      this.keepInSight(view.depth, tissue.needle, width, height);
-      return;
+    if (!this.held || resized) {
+      const wanted = this.wanted(view.depth, tissue, width, height);
+      this.scale = come(this.scale, wanted.scale);
+      this.origin.x = come(this.origin.x, wanted.x);
+      this.origin.y = come(this.origin.y, wanted.y);
     }
-    const wanted = this.wanted(view.depth, tissue, width, height);
-    this.scale = come(this.scale, wanted.scale);
-    this.origin.x = come(this.origin.x, wanted.x);
-    this.origin.y = come(this.origin.y, wanted.y);
+    this.keepInSight(view.depth, tissue.needle, width, height);
   }
 
   /** Scale and entry point, in CSS pixels, that show needle, hub and every wall. */
@@ -95,9 +94,9 @@ export class Section {
     };
   }
 
-  /** While it is held the picture shifts rather than lose the tip or the hub. */
+  /** Held, or quicker than the picture follows: it shifts rather than lose the tip or the hub. */
   keepInSight(depth, needle, width, height) {
-    const edge = (MARGIN_MM + needle.hub_diameter_mm / 2) * this.scale;
+    const edge = MARGIN_MM * this.scale;
     const shift = (low, high, room) => Math.max(0, edge - low) - Math.max(0, high - (room - edge));
     const end = depth - wholeLength(needle);
     this.origin.x += shift(this.x(end * this.axis.x), this.x(depth * this.axis.x), width);
