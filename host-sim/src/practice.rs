@@ -22,8 +22,8 @@ const PATH_HZ: f64 = 25.0;
 enum Goal {
     /// Into the vein and not through it.
     Vein,
-    /// Through the wall of this layer, and nothing touched that is to be spared.
-    Layer(u8, Tissue),
+    /// Into this layer, through its wall where it has one, and nothing touched that is to be spared.
+    Layer { number: u8, tissue: Tissue, has_wall: bool },
     /// Into the skin: the patient has nothing else.
     Skin,
 }
@@ -35,17 +35,19 @@ impl Goal {
         if number(Tissue::Vessel).is_some() {
             return Goal::Vein;
         }
-        // Otherwise the deepest layer with a wall that nobody asks to spare.
+        // Otherwise the deepest layer that nobody asks to spare.
         let is_spared = |index: usize| profile.spared.contains(&(index as u8));
-        let target =
-            (1..layers.len()).rev().find(|index| layers[*index].wall.is_some() && !is_spared(*index));
-        target.map_or(Goal::Skin, |index| Goal::Layer(index as u8, layers[index].tissue))
+        let target = (1..layers.len()).rev().find(|index| !is_spared(*index));
+        target.map_or(Goal::Skin, |index| {
+            let layer = &layers[index];
+            Goal::Layer { number: index as u8, tissue: layer.tissue, has_wall: layer.wall.is_some() }
+        })
     }
 
     fn in_words(self) -> String {
         match self {
             Goal::Vein => format!("Enter the vein, rest in it for {IN_LUMEN_S} s, and do not go through it"),
-            Goal::Layer(_, tissue) => {
+            Goal::Layer { tissue, .. } => {
                 format!(
                     "Reach the {} and touch nothing that is to be spared",
                     crate::session::tissue_name(tissue)
@@ -58,14 +60,17 @@ impl Goal {
     /// Returns what an insertion lacks, in words; nothing where it has reached the goal.
     fn missing(self, span: &Span<'_>, figures: &Insertion) -> Vec<String> {
         let mut missing = Vec::new();
-        let gave_way = |wanted: u8| span.events().any(|e| e.kind == EventKind::Puncture { layer: wanted });
+        let entered = |layer: u8, has_wall: bool| {
+            let wanted = if has_wall { EventKind::Puncture { layer } } else { EventKind::Contact { layer } };
+            span.events().any(|event| event.kind == wanted)
+        };
         match self {
             Goal::Vein if figures.through_far_wall => missing.push("it went through the far wall".into()),
             Goal::Vein if !figures.vessel => missing.push("the vein was not entered".into()),
             Goal::Vein if figures.in_lumen_s < IN_LUMEN_S => {
                 missing.push(format!("it rested in the vein for {:.1} s only", figures.in_lumen_s));
             }
-            Goal::Layer(layer, tissue) if !gave_way(layer) => {
+            Goal::Layer { number, tissue, has_wall } if !entered(number, has_wall) => {
                 missing.push(format!("the {} was not reached", crate::session::tissue_name(tissue)));
             }
             Goal::Skin if figures.punctures == 0 => missing.push("the skin was not pierced".into()),
@@ -189,6 +194,7 @@ mod tests {
         let goal = |name: &str| Goal::of(&Profile::find(name).expect("it is built in"));
         assert_eq!(goal("adult"), Goal::Vein);
         assert_eq!(goal("dorsal-hand"), Goal::Vein);
-        assert!(matches!(goal("shoulder"), Goal::Layer(_, Tissue::Bursa)), "{:?}", goal("shoulder"));
+        let shoulder = goal("shoulder");
+        assert!(matches!(shoulder, Goal::Layer { tissue: Tissue::Bursa, .. }), "{shoulder:?}");
     }
 }

@@ -305,7 +305,7 @@ mod tests {
     fn mistakes_are_refused_by_name() {
         let good = BUILT_IN[0].1;
         for (wrong, hint) in [
-            (good.replace("past = \"vessel\"", "past = \"fat\""), "does not have"),
+            (good.replace("past = \"vessel\"", "past = \"bursa\""), "does not have"),
             (good.replace("seconds = 2.0", "seconds = 0.0"), "insert"),
             (good.replace("seconds = 2.0", "seconds = nan"), "insert"),
             (good.replace("to_mm = -6.0", "to_mm = -7.0"), "rounds repeat"),

@@ -117,7 +117,7 @@ fn what_is_misspelt_missing_or_empty_is_named_with_what_to_do() {
                        [encoder]\ncounts_per_unit = 100.0\n";
     std::fs::write(&rig, text_of_rig).expect("written");
     let arguments = ["simulate", "--rig", text(&rig), "--recording", "a.csv", "--out", "o"];
-    refused(&run(&arguments), 2, &["inertai is no key", "do you mean [model] inertia"]);
+    refused(&run(&arguments), 2, &["inertai is not a key", "do you mean [model] inertia"]);
     // Before the scripted hand touches the skin.
     let outside = dir.join("outside.mcap");
     let said =

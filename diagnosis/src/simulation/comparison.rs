@@ -14,7 +14,7 @@ pub struct Simulated {
     pub model: String,
     /// From the first row under the recorded command.
     pub free: Trajectory,
-    /// Position at every row, started from the measured state every [`AFRESH_S`], rad or m; none where the recording is shorter
+    /// Position at every row, started from the measured state every `AFRESH_S`, rad or m; none where the recording is shorter
     /// than two of these.
     pub afresh: Option<Vec<f64>>,
     /// Under the recorded reference, where there is one and the loop was recognised.

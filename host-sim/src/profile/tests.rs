@@ -64,7 +64,7 @@ fn friction_may_have_a_static_and_a_dynamic_level() {
 #[test]
 fn mistakes_are_named_with_their_line() {
     for (wrong, hint) in [
-        (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = \"deep\""), "line 23"),
+        (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = \"deep\""), "line 24"),
         (BUILT_IN[0].1.replace("friction_n", "frction_n"), "frction_n_per_mm"),
         (BUILT_IN[0].1.replace("format = 1", "format = 9"), "format is 9"),
         (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = nan"), "depth_mm"),
