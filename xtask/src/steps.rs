@@ -91,10 +91,13 @@ fn libraries() -> Result<(), Failure> {
 
 /// The tests that say why they run at night.
 fn slow() -> Result<(), Failure> {
-    if has_nextest() {
-        return shell::run(tests().args(["--run-ignored", "only", "-E", "not package(tests)"]));
+    for board in &boards::ALL {
+        firmware::build(board)?;
     }
-    shell::run(tests().args(["--exclude", "tests", "--", "--ignored"]))
+    let mut tests = tests();
+    tests.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
+    let ignored: &[&str] = if has_nextest() { &["--run-ignored", "only"] } else { &["--", "--ignored"] };
+    shell::run(tests.args(ignored))
 }
 
 /// The image of every board, and the same warnings for it as for everything else.
