@@ -8,7 +8,7 @@ use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
 use crate::test::Step;
 use crate::{board_test, firmware, mutants, site, wasm};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The emulator asks for a newer Rust than it needs.
@@ -30,7 +30,7 @@ pub(crate) const STEPS: [Step; 12] = [
     step("wasm", "the page's WebAssembly is built from its sources", 2.0, page_wasm),
     step("site", "the device in a browser gives the same bits as host-sim's", 35.0, same_bits),
     step("browser", "the page in a real browser", 50.0, browser),
-    step("clients", "streams and exported rigs as other people's programs read them", 30.0, clients),
+    step("clients", "streams, rigs and laws as other people's programs and Python see them", 45.0, clients),
     step("fuzz", "the frame parser, on damaged frames", 12.0, fuzz),
     step("prove", "the small proof of the diagnosis", 65.0, prove),
 ];
@@ -146,14 +146,17 @@ fn browser() -> Result<(), Failure> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 4] = ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0"];
+const CLIENTS: [&str; 6] =
+    ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0", "numpy==2.4.6", "scipy==1.17.1"];
 
 fn clients() -> Result<(), Failure> {
     let python = setup::python(&CLIENTS)?;
     setup::mono()?;
     let program = built(&["--bin", "host-sim"], "host-sim")?;
-    for script in ["streams.py", "recording.py", "documented.py", "mujoco_rig.py"] {
-        shell::run(Command::new(&python).arg(shell::top().join("tests/clients").join(script)).arg(&program))?;
+    let scripts = ["streams.py", "recording.py", "documented.py", "mujoco_rig.py"];
+    let scripts = scripts.iter().map(|name| Path::new("tests/clients").join(name));
+    for script in scripts.chain([PathBuf::from("tests/independent/run.py")]) {
+        shell::run(Command::new(&python).arg(shell::top().join(script)).arg(&program))?;
     }
     Ok(())
 }
