@@ -17,7 +17,7 @@ pub enum ToPage {
     Patient(PatientStatus),
     /// What is practised, where insertions are judged: `goal` in words; again with another patient.
     Practice(serde_json::Value),
-    /// An insertion that has ended, with its verdict: the fields of [`crate::practice::Attempt`].
+    /// An insertion that has ended, with its verdict: the fields of `practice::Attempt`.
     Attempt(serde_json::Value),
     /// Who the device is; again whenever it starts anew.
     Device(Device),
