@@ -74,6 +74,12 @@ impl<D12: MotorDac, D8: MotorDac, E: OutputPin> Drive<D12, D8, E> {
         }
     }
 
+    /// Puts a code out of the twelve-bit converter while the amplifier stays off, for the board's own test.
+    pub fn put_while_off(&mut self, code: DacCode) {
+        self.off();
+        self.twelve.put(code);
+    }
+
     /// Amplifier off, then zero torque.
     pub fn off(&mut self) {
         let _ = self.enable.set_low();
@@ -159,6 +165,18 @@ mod tests {
         assert_eq!(writes.take(), off);
         drive.apply(DacWidth::Bits12, &output(false, 2060));
         assert_eq!(writes.take(), off);
+        assert!(!drive.is_enabled());
+    }
+
+    #[test]
+    fn a_code_put_while_off_leaves_the_amplifier_off() {
+        let writes = RefCell::new(vec![]);
+        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
+        drive.apply(DacWidth::Bits12, &output(true, 2050));
+        writes.take();
+        drive.put_while_off(DacCode(1));
+        let off = [Write::Enable(false), Write::Twelve(2048), Write::Eight(128)];
+        assert_eq!(writes.take(), [off.as_slice(), &[Write::Twelve(1)]].concat());
         assert!(!drive.is_enabled());
     }
 

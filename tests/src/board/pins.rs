@@ -78,7 +78,7 @@ pub const NUCLEO_F429ZI: Pins = Pins {
     image: "nucleo-f429zi",
     clock: Clock::Elsewhere,
     enable: PartPin::new('F', 13),
-    tracks: [PartPin::new('A', 5), PartPin::new('B', 3)],
+    tracks: [PartPin::new('A', 15), PartPin::new('B', 3)],
     drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],
     strap: None,
     inclinometer: 10,

@@ -4,7 +4,7 @@
 //!
 //! | pin | does | remark |
 //! | --- | --- | --- |
-//! | PA5, PB3 | encoder A, B (TIM2, 32 bit) | CN7 10 and 15; PB3 is the debugger's SWO, which nobody uses |
+//! | PA15, PB3 | encoder A, B (TIM2, 32 bit) | CN7 9 and 15; 3.3 V only; PB3 is the debugger's SWO, which nobody uses |
 //! | PA4 | motor set value, 12 bit (DAC 1) | CN7 17 |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | CN10 18, 4, 24, 6, 26, 10, 28, 30 |
 //! | PF13 | amplifier enable, high is on | CN10 2; needs an external pull-down of 10 kΩ; read back |
@@ -68,9 +68,9 @@ impl Wiring for NucleoF429zi {
             (device.ADC2, gpioc.pc2.into_analog()),
             rcc,
         );
-        // PB3 is the debugger's JTDO out of reset (RM0090 8.3.2); from here on it is the timer's.
+        // PA15 and PB3 are the debugger's JTDI and JTDO out of reset (RM0090 8.3.2); from here on they are the timer's.
         let encoder =
-            chip::encoder(device.TIM2, gpioa.pa5.into_pull_up_input(), gpiob.pb3.into_pull_up_input(), rcc);
+            chip::encoder(device.TIM2, gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input(), rcc);
         gpiog.pg6.into_push_pull_output().set_low();
         gpiob.pb0.into_push_pull_output().set_high();
 
