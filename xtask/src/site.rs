@@ -3,8 +3,8 @@
 //! both lie in the page as text.
 
 use crate::setup;
-use crate::shell::{self, Failure, cargo};
-use crate::wasm;
+use crate::shell::{self, Failure};
+use crate::{steps, wasm};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
@@ -59,10 +59,9 @@ pub(crate) fn run() -> Result<(), Failure> {
 pub(crate) fn check() -> Result<(), Failure> {
     setup::node()?;
     let device = wasm::build_crate("site-wasm")?;
+    let program = steps::built(&["--example", "device_digest"], "examples/device_digest")?;
     for (profile, ticks) in COMPARED {
-        let mut native = cargo();
-        native.args(["run", "--release", "--ignore-rust-version", "--quiet", "-p", "host-sim"]);
-        let native = shell::output(native.args(["--example", "device_digest", "--", profile, ticks]))?;
+        let native = shell::output(Command::new(&program).args([profile, ticks]))?;
         let mut node = Command::new("node");
         let browser = shell::output(
             node.current_dir(shell::top()).arg("site-wasm/digest.mjs").arg(&device).args([profile, ticks]),

@@ -241,7 +241,7 @@ fn tests() -> Command {
 }
 
 /// Builds a program of the one build; where it lies below the build's folder.
-fn built(which: &[&str], below: &str) -> Result<PathBuf, Failure> {
+pub(crate) fn built(which: &[&str], below: &str) -> Result<PathBuf, Failure> {
     shell::run(cargo().args(["build", "--quiet"]).args(BUILD).args(which))?;
     Ok(shell::target().join("release").join(below))
 }
