@@ -161,7 +161,7 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let nowhere = Meeting { address: mute.local_addr().expect("bound"), ..meeting("mute", None) };
     let (session, publisher) = paced::open();
     let _membership = class::join(session, Device::default(), &nowhere, &"a".parse().expect("a name"));
-    let run = paced::run(publisher, 3, true);
+    let run = paced::run(publisher, paced::End::After(3), true);
     check("a mute server", &run);
 
     // An instructor's program that is stopped in the middle of it all: its sockets stay open and nobody reads.
@@ -179,7 +179,7 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
         rustix::process::kill_process(pid, rustix::process::Signal::STOP)
     });
     // Longer than Zenoh waits for a silent end (10 s): then it is another mute server.
-    let run = paced::run(publisher, 16, true);
+    let run = paced::run(publisher, paced::End::After(16), true);
     stop.join().expect("it ends").expect("it was running");
     check("a stalled instructor", &run);
     let begin = Instant::now();

@@ -169,7 +169,7 @@ fn neither_the_page_nor_a_device_notices_hostile_programs() {
             }
             pages
         });
-        let run = paced::run(publisher, ATTACK_S, true);
+        let run = paced::run(publisher, paced::End::After(ATTACK_S), true);
         stop.store(true, Ordering::Relaxed);
         (run, noisy.join().expect("it ends"), looking.join().expect("it ends"))
     });

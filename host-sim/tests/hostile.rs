@@ -9,10 +9,11 @@ use host_sim::visualizer;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const CONNECTIONS: usize = 1_000;
-const ATTACK_S: u64 = 6;
+/// An attack lasts so long, or longer where a slow machine needs it to reach every listener.
+const ATTACK: Duration = Duration::from_secs(6);
 
 /// Each client is a file handle, and so is the server's end, in this one process.
 #[cfg(unix)]
@@ -64,32 +65,32 @@ fn endless_body() -> Vec<u8> {
     bytes
 }
 
-/// Everything at once, again and again; connections are held until the next round.
-fn attack(listeners: &[(SocketAddr, &str)], stop: &AtomicBool) -> usize {
-    let mut connected = 0;
-    while !stop.load(Ordering::Relaxed) {
-        for (address, path) in listeners {
-            let mut held: Vec<TcpStream> = (0..CONNECTIONS).filter_map(|_| connect(*address)).collect();
-            connected += held.len();
-            let port = address.port();
-            let words = [
-                // Half a request, and nothing after it.
-                b"GET / HT".to_vec(),
-                [upgrade(path, port), endless_frame()].concat(),
-                // Never reads what it asked for.
-                upgrade(path, port),
-                endless_body(),
-                vec![b'A'; 1 << 18],
-            ];
-            for (stream, said) in held.iter_mut().zip(words.iter().cycle()) {
-                pour(stream, said);
-                if stop.load(Ordering::Relaxed) {
-                    return connected;
-                }
-            }
+/// Everything at once, again and again; connections are held until the next round. Every listener has its round, however long
+/// that takes, and what each round connected is counted.
+fn attack(listeners: &[(SocketAddr, &str)]) -> Vec<usize> {
+    let begin = Instant::now();
+    let mut rounds = Vec::new();
+    for (address, path) in listeners.iter().cycle() {
+        if rounds.len() >= listeners.len() && begin.elapsed() >= ATTACK {
+            break;
+        }
+        let mut held: Vec<TcpStream> = (0..CONNECTIONS).filter_map(|_| connect(*address)).collect();
+        rounds.push(held.len());
+        let port = address.port();
+        let words = [
+            // Half a request, and nothing after it.
+            b"GET / HT".to_vec(),
+            [upgrade(path, port), endless_frame()].concat(),
+            // Never reads what it asked for.
+            upgrade(path, port),
+            endless_body(),
+            vec![b'A'; 1 << 18],
+        ];
+        for (stream, said) in held.iter_mut().zip(words.iter().cycle()) {
+            pour(stream, said);
         }
     }
-    connected
+    rounds
 }
 
 /// Whether something is sent to a well-behaved client.
@@ -118,22 +119,25 @@ fn the_control_path_does_not_notice_hostile_clients() {
     let page_address = SocketAddr::from(([127, 0, 0, 1], page.port()));
     let listeners = [(openigtlink, "/"), (websocket, "/pose"), (page_address, "/live")];
 
-    let stop = AtomicBool::new(false);
-    let (run, connected) = std::thread::scope(|scope| {
-        let attacker = scope.spawn(|| attack(&listeners, &stop));
-        let run = paced::run(publisher, ATTACK_S, false);
-        stop.store(true, Ordering::Relaxed);
+    let over = AtomicBool::new(false);
+    let (run, rounds) = std::thread::scope(|scope| {
+        let attacker = scope.spawn(|| {
+            let rounds = attack(&listeners);
+            over.store(true, Ordering::Relaxed);
+            rounds
+        });
+        let run = paced::run(publisher, paced::End::When(&over), false);
         (run, attacker.join().expect("it ends"))
     });
     println!(
-        "{connected} connections; late by {:?} half of the time, {:?} at the most",
+        "{rounds:?} connections; late by {:?} half of the time, {:?} at the most",
         run.median(),
         run.worst()
     );
-    assert!(connected >= CONNECTIONS * listeners.len(), "only {connected} connections were made");
+    assert!(rounds.iter().all(|&connected| connected == CONNECTIONS), "a listener refused: {rounds:?}");
     assert!(run.median() < Duration::from_millis(20), "late by {:?} half of the time", run.median());
     assert!(run.worst() < paced::HEARTBEAT_LIMIT, "late by {:?}", run.worst());
-    assert_eq!(run.outcome.tally.samples, ATTACK_S * 10_000, "no sample is lost");
+    assert!(run.outcome.tally.samples >= 1_000 * run.late.len() as u64 - 100, "no sample is lost");
     assert_eq!(run.outcome.link.lost_samples, 0);
     assert_eq!(run.outcome.tally.peak_force_n, 0.0, "nobody started the torque");
 

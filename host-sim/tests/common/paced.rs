@@ -42,14 +42,27 @@ impl Paced {
     }
 }
 
-/// Runs the scripted venepuncture for so long; `started` says whether the torque is on or waits for a person.
-pub(crate) fn run(publisher: Publisher, seconds: u64, started: bool) -> Paced {
+/// When a run ends.
+#[allow(dead_code, reason = "each test program uses the way that it needs")]
+pub(crate) enum End<'a> {
+    /// After so many seconds.
+    After(u64),
+    /// When somebody says so, however long that takes on a slow machine.
+    When(&'a AtomicBool),
+}
+
+/// Runs the scripted venepuncture; `started` says whether the torque is on or waits for a person.
+pub(crate) fn run(publisher: Publisher, end: End, started: bool) -> Paced {
     let profile = Profile::find("adult").expect("it is built in");
     let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
     let device = VirtualDevice::new(&profile, procedure);
-    let outlets = Outlets::new(publisher, None, Tally::new(Some(seconds * 10_000)));
-    let stop = AtomicBool::new(false);
-    let station = Station::new(Driver::new(profile.config.patient.clone()), outlets, &stop);
+    let never = AtomicBool::new(false);
+    let (samples, stop) = match end {
+        End::After(seconds) => (Some(seconds * 10_000), &never),
+        End::When(stop) => (None, stop),
+    };
+    let outlets = Outlets::new(publisher, None, Tally::new(samples));
+    let station = Station::new(Driver::new(profile.config.patient.clone()), outlets, stop);
     let station = if started { station } else { station.wait_for_a_person() };
     let (begin, mut looks, mut late) = (Instant::now(), 0_u32, Vec::new());
     let look = |_| {
