@@ -122,7 +122,7 @@ enum Turning {
 }
 
 /// Where the tip is among the layers. It comes through layers and walls in their order, so that two numbers say which it has
-/// touched and which have given way; it meets or leaves one layer a tick at the most.
+/// touched and which have given way; it meets or leaves at most one layer a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Insertion {
     angle: Angle,

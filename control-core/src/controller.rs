@@ -99,7 +99,7 @@ pub enum Order {
     /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
     /// [`crate::compensation::check::check`].
     Compensate(Gains),
-    /// The rotor's angle, from which waves are counted, is nought at this many counts past the zero; `None`: it is not known.
+    /// The rotor's angle, from which waves are counted, is zero at this many counts past the zero; `None`: it is not known.
     Index(Option<Counts>),
 }
 

@@ -14,7 +14,7 @@ use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Sines of a multisine at the most.
+/// The most sines of a multisine.
 pub const MAX_LINES: usize = 12;
 
 /// The largest torque that a device gives before it has been commissioned: 2 mN·m.
@@ -44,7 +44,7 @@ pub struct Servo {
     pub damping: Damping,
 }
 
-/// The signals, each for the effects that it tells apart.
+/// The signals, each for the effects that it distinguishes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Signal {
     /// Constant speeds, each there and back, each `ratio` times the one before; begins again after the last. Tells

@@ -10,7 +10,7 @@ use fixed::types::{I2F30, I8F24, I16F16, U14F18};
 pub const WINDOW_TICKS: u32 = 128;
 /// Edges that [`SpeedMethod::EdgeTiming`] remembers.
 const EDGES: usize = 8;
-/// Edges are stored at this distance at the least, so that the memory spans the window at any speed.
+/// Edges are stored at least this far apart, so that the memory spans the window at any speed.
 const EDGE_SPACING_TICKS: u32 = WINDOW_TICKS / EDGES as u32;
 /// No edge for this long is rest: 0.1 s.
 const REST_TICKS: u32 = TICK_HZ / 10;
@@ -62,7 +62,7 @@ impl Scale {
 /// Slower than this the needle rests. 1 mm/s.
 pub(crate) const REST_SPEED: I16F16 = I16F16::from_bits(1 << 16);
 
-/// Whether the needle is being drawn out: fast enough, and by two counts at the least. The speed alone says less, for one count in a
+/// Whether the needle is being drawn out: fast enough, and by at least two counts. The speed alone says less, for one count in a
 /// window is faster than [`REST_SPEED`] already, and a needle at rest between two counts shows now one and now the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Withdrawal {

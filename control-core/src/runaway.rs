@@ -65,8 +65,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Of counts of this length in mm, a roller of this radius in mm, and a needle that moves so many counts in a tick at the
-    /// most.
+    /// For counts of this length in mm, a roller of this radius in mm, and a needle that moves at most so many counts in a tick.
     pub(crate) fn new(mm_per_count: I2F30, roller_radius: I16F16, max_counts_per_tick: u16) -> Self {
         /// Ticks of a span.
         const SPAN: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
@@ -109,7 +108,7 @@ pub(crate) struct Watch {
     next: usize,
     /// Counts that the last span has more than the one before it.
     gained: i32,
-    /// The same against the motor; nought where a wall has just given way.
+    /// The same against the motor; zero where a wall has just given way.
     gained_against: i32,
     /// The torque under which it was gained.
     gained_under: U16F16,
@@ -137,7 +136,7 @@ impl Watch {
         Self { counts: [count; LOOKS], ..Self::default() }
     }
 
-    /// A step of the needle that is none: back to where the one before came from. Called in every tick.
+    /// True if `step` of the needle undoes the one before. Called in every tick.
     pub(crate) fn is_back(&mut self, step: i32) -> bool {
         let is_back = step == self.last_step.wrapping_neg();
         if is_back {

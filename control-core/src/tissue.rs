@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What is left of an indentation when a wall gives way, where nobody knows better: 0.3, an assumption.
 pub const SPRING_BACK: I16F16 = I16F16::from_bits(19_661);
 
-/// Layers of a tissue at the most.
+/// The most layers of a tissue.
 pub const MAX_LAYERS: usize = 6;
 
 /// A vessel among the layers, the one whose near wall is of [`Tissue::Vessel`]: a tube with its axis level with the skin and

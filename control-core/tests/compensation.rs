@@ -269,7 +269,7 @@ fn weight_needs_no_angle_and_waves_wait_for_it() {
     assert_eq!(up, -held, "needle up: the other way");
 
     let mut wave = Compensation { gains: gains(0.8), ..Compensation::NONE };
-    // All of it at a rotor's angle of nought.
+    // The whole of it at a rotor's angle of zero.
     wave.angle[0] = Wave { order: 3, amplitude: q(1.0), phase: 16_384 };
     let mut controller = running(wave);
     assert_eq!(code_after(&mut controller, 4_000, 0, 0), 0, "the rotor's angle is not known");

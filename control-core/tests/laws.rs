@@ -234,7 +234,7 @@ fn friction_that_sticks_gives_nothing_of_its_own() {
         });
         hold(&mut c, at, f64::from(drawn & 63) * 1e-3 + 1e-4);
     }
-    assert!(least > -0.03 && energy > 10.0, "{least} mJ at the least, {energy} mJ in the end");
+    assert!(least > -0.03 && energy > 10.0, "the energy fell to {least} mJ and ended at {energy} mJ");
 }
 
 #[test]

@@ -110,7 +110,7 @@ mod tests {
             parts.watchdog.feed_for_test();
         }
         for (state, cycles) in longest.iter().enumerate() {
-            defmt::println!("state {}: {} cycles at the most", state, cycles);
+            defmt::println!("state {}: at most {} cycles", state, cycles);
         }
         assert!(longest[State::Elastic as usize] > 100, "it was pressed");
         assert!(longest.iter().all(|&cycles| cycles < timing::OUTPUT_CYCLES), "later than the latch");

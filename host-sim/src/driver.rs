@@ -41,7 +41,7 @@ pub enum Request {
     ReportDevice,
     /// Other gains of the compensation.
     Compensate(Gains),
-    /// At how many counts past the zero the rotor's angle is nought.
+    /// The counts past the zero at which the rotor's angle is zero.
     Index(i32),
 }
 

@@ -4,7 +4,7 @@ use crate::profile::Profile;
 use crate::session::{Scene, SceneLayer, Source};
 use std::fmt::Write as _;
 
-/// Lines of a picture at the least and at the most.
+/// The smallest and the largest number of lines in a picture.
 const LINES: (f64, f64) = (8.0, 26.0);
 /// How much a line stands for, mm, unless that makes too few lines or too many.
 const MM_PER_LINE: f64 = 0.5;

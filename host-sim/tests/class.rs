@@ -190,7 +190,7 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
 }
 
 fn check(what: &str, run: &paced::Paced) {
-    println!("{what}: late by {:?} half of the time, {:?} at the most", run.median(), run.worst());
+    println!("{what}: late by {:?} in the median, by at most {:?}", run.median(), run.worst());
     assert!(run.median() < Duration::from_millis(20), "{what}: {:?}", run.median());
     assert!(run.worst() < paced::HEARTBEAT_LIMIT, "{what}: {:?}", run.worst());
     assert_eq!(run.outcome.link.lost_samples, 0, "{what}");

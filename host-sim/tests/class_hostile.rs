@@ -177,8 +177,8 @@ fn neither_the_page_nor_a_device_notices_hostile_programs() {
     let (nonsense, flooded) = (nonsense.into_inner(), flooded.into_inner());
     let slowest = pages.iter().flatten().max().copied().unwrap_or_default();
     println!(
-        "{connections} noisy connections, {nonsense} messages of nonsense, {flooded} of a flood: late by {:?} half of the time, \
-         {:?} at the most; {} pages, the slowest after {slowest:?}; {memory} MiB at the most",
+        "{connections} noisy connections, {nonsense} messages of nonsense, {flooded} of a flood: late by {:?} in the median, \
+         by at most {:?}; {} pages, the slowest after {slowest:?}; at most {memory} MiB",
         run.median(),
         run.worst(),
         pages.len()

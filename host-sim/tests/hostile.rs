@@ -130,7 +130,7 @@ fn the_control_path_does_not_notice_hostile_clients() {
         (run, attacker.join().expect("it ends"))
     });
     println!(
-        "{rounds:?} connections; late by {:?} half of the time, {:?} at the most",
+        "{rounds:?} connections; late by {:?} in the median, by at most {:?}",
         run.median(),
         run.worst()
     );

@@ -35,7 +35,7 @@ pub fn hash<F: Serialize>(value: &F) -> u32 {
     postcard::to_slice(value, &mut plain).map_or(0, |bytes| CRC.checksum(bytes))
 }
 
-/// What lies between two zero bytes and is no frame.
+/// The bytes between two zero bytes that are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Garbage;
 

@@ -1,7 +1,7 @@
-//! What makes a device commissioned, and what keeps it so. No command says that it is: the device plays gentle pulses, sees in
+//! The rules by which a device becomes commissioned and stays so. No command makes it so: the device plays gentle pulses, sees in
 //! its own counts that the motor drives them the way it is asked to (`Proof`), and only then takes
-//! [`crate::Command::Commission`]. From then on a command may lower its ceilings and raise none
-//! ([`control_core::ceilings`]). A record that the device has told carries its seal ([`Record`]) and is taken back.
+//! [`crate::Command::Commission`]. From then on a command may lower its ceilings and not raise them
+//! ([`control_core::ceilings`]). A record that the device has sent carries its seal ([`Record`]) and is taken back.
 
 use crate::codec;
 use crate::frames::Rejection;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// The least way of the roller that shows anything, in counts.
 const LEAST_COUNTS: u32 = 20;
-/// Of the torque's work: the most against the least, and the most against what is left at the end.
+/// The factor by which the most work must exceed the size of the least, and the work that remains at the end.
 const CLEARLY: i64 = 4;
 
 /// The device's part of the configuration under the seal of the device that told it.
@@ -27,18 +27,18 @@ pub struct Record {
 }
 
 impl Record {
-    /// What the device with this number tells.
+    /// Returns the record that the device with this number sends.
     pub fn of(device: &Device, serial: [u8; 12]) -> Self {
         Self { device: *device, seal: codec::hash(&(device, serial)) }
     }
 
-    /// Whether the device with this number has told it.
+    /// True if the device with this number has sent it.
     pub fn is_of(&self, serial: [u8; 12]) -> bool {
         *self == Self::of(&self.device, serial)
     }
 }
 
-/// Whether a command may make `after` of `before`.
+/// Checks that a command may replace `before` by `after`.
 pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), Rejection> {
     if !after.commissioned {
         return Ok(());
@@ -49,7 +49,7 @@ pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), Rejectio
     ceilings::changed(before, after).map_or(Ok(()), |field| Err(Rejection::Commissioned(field)))
 }
 
-/// What the device has seen of itself while it played.
+/// The evidence that the device has gathered about itself while it played.
 ///
 /// From rest, the work that the torque has done is the roller's energy and what friction took: never negative where the motor
 /// drives the way that the encoder counts, never positive where it does not.
@@ -121,7 +121,7 @@ impl Proof {
         };
     }
 
-    /// Whether motor and encoder go together.
+    /// True if motor and encoder go together.
     pub(crate) fn is_shown(self) -> bool {
         self == Self::Shown
     }

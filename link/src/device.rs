@@ -27,19 +27,19 @@ const POSE_TICKS: u64 = (TICK_HZ / POSE_HZ as u32) as u64;
 /// Ticks from one timing frame to the next.
 const TIMING_TICKS: u64 = TICK_HZ as u64;
 
-/// Who the device is.
+/// The device's number, firmware and ceilings.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
     /// The microcontroller's unique number.
     pub serial: [u8; 12],
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// What the firmware lets no command raise.
+    /// The ceilings that no command raises.
     pub ceilings: Ceilings,
 }
 
 impl Identity {
-    /// Of every virtual device.
+    /// The identity of every virtual device.
     pub const VIRTUAL: Self = Self { serial: [0; 12], firmware: [0, 1, 0], ceilings: Ceilings::VIRTUAL };
 }
 
@@ -102,7 +102,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
-    /// Of a device whose depth is right from the start, as a virtual one's is.
+    /// Returns the device with its depth known from the start, as a virtual one's is.
     pub fn knowing_depth(self) -> Self {
         Self { zeroed: true, ..self }
     }
@@ -133,12 +133,12 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.forget_waiting();
     }
 
-    /// Whether a PC has said hello and is listening.
+    /// True if a PC has said hello and is listening.
     pub fn in_session(&self) -> bool {
         self.in_session
     }
 
-    /// What keeps the device from being started, from now on.
+    /// Sets the conditions that keep the device from being started, from now on.
     pub fn set_interlocks(&mut self, interlocks: Interlocks) {
         self.interlocks = interlocks;
     }
@@ -232,7 +232,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         core::mem::take(&mut self.timing_due).then_some(DeviceFrame::Timing(self.timing))
     }
 
-    /// Who it is and in which scale it speaks under the configuration in force.
+    /// Returns the answer to a hello: the device's identity and the scale in which it speaks under the configuration in force.
     pub fn hello(&self) -> Hello {
         let plan = &self.plan;
         let device = plan.device();

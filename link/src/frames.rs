@@ -1,4 +1,4 @@
-//! What is said. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
+//! The messages of both sides. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
 use crate::commissioning::Record;
 use control_core::compensation::Gains;
@@ -27,18 +27,18 @@ pub const STAGES: usize = 8;
 pub struct Numbered {
     /// Wraps.
     pub sequence: u32,
-    /// What is said.
+    /// The message.
     pub frame: DeviceFrame,
 }
 
 /// Device to PC.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum DeviceFrame {
-    /// Who speaks and in which scale; the answer to a hello and to a new configuration.
+    /// The device's identity and the scale in which it speaks; the answer to a hello and to a new configuration.
     Hello(Hello),
     /// Samples at 10 kHz.
     Samples(SampleBlock),
-    /// Where the needle is, at 1 kHz.
+    /// The needle's pose, at 1 kHz.
     Pose(Pose),
     /// Something happened.
     Event(Event),
@@ -50,7 +50,7 @@ pub enum DeviceFrame {
     Device(Record),
 }
 
-/// Who speaks and in which scale.
+/// The device's identity and the scale in which it speaks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
     /// [`PROTOCOL_VERSION`] of the device.
@@ -88,10 +88,10 @@ pub struct SampleBlock {
     pub samples: Vec<Sample, BLOCK_SAMPLES>,
 }
 
-/// Where the needle is.
+/// The needle's pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// When.
+    /// Its tick.
     pub tick: u64,
     /// Depth of the tip past the zero, along the needle.
     pub depth: Millimetres,
@@ -103,7 +103,7 @@ pub struct Pose {
     pub tilt: Milliradians,
     /// [`control_core::event::State`] as a number.
     pub state: u8,
-    /// What holds torque back.
+    /// The limits that hold torque back.
     pub limits: Limits,
     /// The angle to the skin that the layers are met at, smoothed.
     pub angle: Milliradians,
@@ -116,13 +116,13 @@ pub struct Pose {
 /// Something happened.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// When.
+    /// Its tick.
     pub tick: u64,
-    /// What.
+    /// Its kind.
     pub kind: EventKind,
 }
 
-/// What can happen. Layers count from 0, the outermost.
+/// The kinds of events. Layers count from 0, the outermost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "each field is the layer or the cause that the variant names")]
 pub enum EventKind {
@@ -152,7 +152,7 @@ pub enum EventKind {
     Barrier,
 }
 
-/// Why a configuration was not saved.
+/// The reason why a configuration was not saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SaveFailure {
     /// The flash did not take what it was given, or did not keep it.
@@ -228,7 +228,7 @@ pub struct Ack {
     pub result: Result<(), Rejection>,
 }
 
-/// Why a command was not carried out.
+/// The reason why a command was not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Rejection {
     /// The configuration or the excitation may not run.
@@ -243,7 +243,7 @@ pub enum Rejection {
     NoSession,
     /// Something keeps the device from being started.
     Interlocked(Interlock),
-    /// What commissioning found of this device, or a ceiling that it has, would be another one or higher.
+    /// A value that commissioning found, or a ceiling, would change or rise.
     Commissioned(Field),
     /// The device has not seen by pulses of its own that its motor and its encoder go together.
     NotShown,
@@ -276,11 +276,11 @@ impl core::fmt::Display for Rejection {
 pub struct HostFrame {
     /// Another one for each command; a repeated id is answered again and not carried out again.
     pub id: u32,
-    /// What to do.
+    /// The command.
     pub command: Command,
 }
 
-/// What the PC may ask. Each is acknowledged and safe to repeat.
+/// The commands of the PC. Each is acknowledged and safe to repeat.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "nothing allocates here")]
 pub enum Command {
@@ -311,12 +311,12 @@ pub enum Command {
     /// The gains of the compensation from now on, torque on or off, until the device is configured or restarted; taken whole or
     /// refused with the reason.
     Compensate(Gains),
-    /// The rotor's angle is nought at this many counts past the zero, until the device is restarted; `None`: it is not known.
+    /// The rotor's angle is zero at this many counts past the zero, until the device is restarted; `None`: it is not known.
     /// Only while torque is off.
     Index(Option<i32>),
     /// [`Command::ConfigureDevice`] with what this device has told of itself before: taken as it is where the seal is its own.
     RestoreDevice(Record),
-    /// What the device is configured with was found by commissioning it: taken where its own pulses have shown that the motor
+    /// Marks the device's configuration as found by commissioning: accepted if its own pulses have shown that the motor
     /// and the encoder go together, and only while torque is off. Nothing else commissions a device.
     Commission,
 }

@@ -3,7 +3,7 @@
 use crate::codec::{self, Decoder, MAX_FRAME, TooLong};
 use crate::frames::{Command, DeviceFrame, HostFrame, Numbered};
 
-/// What has arrived and what has not.
+/// The counts of frames that arrived and that did not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Frames that arrived whole.
@@ -42,7 +42,7 @@ impl Reception {
         }
     }
 
-    /// What has arrived and what has not, so far.
+    /// Returns the counts of frames that arrived and that did not, so far.
     pub fn counts(&self) -> Counts {
         self.counts
     }

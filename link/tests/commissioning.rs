@@ -24,7 +24,7 @@ struct Bench {
     tick: u64,
     angle: f64,
     speed: f64,
-    /// What the motor makes of a torque, and the encoder of an angle.
+    /// The sign by which the motor turns a torque, and the encoder an angle.
     signs: (f64, f64),
     record: Option<Record>,
 }
@@ -67,7 +67,7 @@ impl Bench {
         }
     }
 
-    /// What it tells of itself.
+    /// Returns the record that it sends.
     fn record(&mut self) -> Record {
         assert_eq!(self.ask(Command::ReportDevice), Ok(()));
         self.run(1);

@@ -233,7 +233,7 @@ fn what_fits_the_longest_frame_is_encoded_and_a_byte_more_is_not() {
 /// A needle straight into the skin: lengths along it are depths.
 const STRAIGHT: Milliradians = Milliradians(1_571);
 
-/// What happened while the needle went to `counts` one after the other, a count a tick.
+/// Returns the events while the needle went to `counts` one after the other, one a tick.
 fn events(device: &mut Device, counts: &[i32]) -> Vec<EventKind> {
     let mut at = 0;
     let mut kinds = vec![];

@@ -1,4 +1,4 @@
-//! What the page computes in the browser: tissue and ultrasound, behind functions of plain numbers.
+//! The page's own computing in the browser: tissue and ultrasound, behind functions of plain numbers.
 //!
 //! The page writes numbers to [`input`], calls [`build`], then [`step`] for each picture and [`image`] for each ultrasound
 //! image; what it draws it reads from the memory that the pointers show, anew after every call that may allocate.
@@ -34,7 +34,7 @@ fn address<T>(slice: &[T]) -> usize {
     slice.as_ptr() as usize
 }
 
-/// Where the page writes the anatomy: 256 numbers.
+/// Returns the address at which the page writes the anatomy: 256 numbers.
 #[unsafe(no_mangle)]
 pub extern "C" fn input() -> usize {
     INPUT_NUMBERS.with_borrow(|numbers| address(numbers))
@@ -71,7 +71,7 @@ pub extern "C" fn wall_state(layer: u32) -> u32 {
     with(|picture| picture.wall_state(layer as usize) as u32)
 }
 
-/// How many particles there are.
+/// Returns the number of particles.
 #[unsafe(no_mangle)]
 pub extern "C" fn particles() -> u32 {
     with(|picture| picture.points().len() as u32)
@@ -89,13 +89,13 @@ pub extern "C" fn normals() -> usize {
     with(|picture| address(picture.normals()))
 }
 
-/// How many surfaces there are to draw.
+/// Returns the number of surfaces to draw.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfaces() -> u32 {
     with(|picture| picture.surfaces().len() as u32)
 }
 
-/// What a surface is: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3 vessel behind, 4 vessel before.
+/// Returns the kind of a surface: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3 vessel behind, 4 vessel before.
 #[unsafe(no_mangle)]
 pub extern "C" fn surface_kind(number: u32) -> u32 {
     surface(number, |surface| surface.kind as u32)
@@ -113,13 +113,13 @@ pub extern "C" fn surface_triangles(number: u32) -> usize {
     surface(number, |surface| address(&surface.triangles))
 }
 
-/// How many triangles it has.
+/// Returns the number of its triangles.
 #[unsafe(no_mangle)]
 pub extern "C" fn surface_triangle_count(number: u32) -> u32 {
     surface(number, |surface| surface.triangles.len() as u32)
 }
 
-/// Where the needle's plane cuts the vessel: [`picture::SLICES`] pairs of numbers, upper and lower wall in mm.
+/// Returns the address of the vessel's section by the needle's plane: [`picture::SLICES`] pairs of numbers, upper and lower wall in mm.
 #[unsafe(no_mangle)]
 pub extern "C" fn lumen() -> usize {
     with(|picture| address(picture.lumen()))
@@ -131,7 +131,7 @@ pub extern "C" fn probe(along_mm: f32, across_mm: f32, azimuth: f32, lean: f32) 
     with(|picture| picture.hold_probe(along_mm, across_mm, azimuth, lean));
 }
 
-/// How deep the ultrasound image reaches, mm: as deep as the anatomy asks for.
+/// Returns the depth of the ultrasound image, mm: as deep as the anatomy asks for.
 #[unsafe(no_mangle)]
 pub extern "C" fn image_depth() -> f32 {
     with(|picture| picture.image_depth_mm())

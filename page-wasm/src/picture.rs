@@ -17,11 +17,11 @@ const THINNEST_MM: f32 = 0.3;
 pub const SLICES: usize = 64;
 /// Width of the ultrasound image, mm.
 const IMAGE_WIDTH_MM: f32 = 24.0;
-/// Its depth at the least and at the most, and how far it reaches below the innermost layer's top, mm.
+/// Its smallest and largest depth, and how far it reaches below the innermost layer's top, mm.
 const IMAGE_DEPTH_MM: [f32; 2] = [16.0, 40.0];
 const IMAGE_BELOW_MM: f32 = 4.0;
 
-/// What the page is to draw a surface as.
+/// The way in which the page draws a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Skin behind the needle's plane.
@@ -53,7 +53,7 @@ pub struct Picture {
     surfaces: Vec<SurfaceView>,
     /// The wall of each layer of the scene, where the picture has one.
     walls: Vec<Option<WallName>>,
-    /// What lies under each layer's top, outermost first.
+    /// The tissue under each layer's top, outermost first.
     media: Vec<Medium>,
     along_mm: [f32; 2],
     limb_radius_mm: f32,
@@ -68,7 +68,7 @@ pub struct Picture {
 struct Given {
     kind: u32,
     depth_mm: f32,
-    /// How far its wall is pushed in, mm; negative where it has none.
+    /// The travel by which its wall is pushed in, mm; negative where it has no wall.
     travel_mm: f32,
     is_vessel: bool,
     is_far: bool,
@@ -135,7 +135,7 @@ impl Picture {
         Ok(picture)
     }
 
-    /// How deep the ultrasound image reaches, mm.
+    /// Returns the depth of the ultrasound image, mm.
     pub fn image_depth_mm(&self) -> f32 {
         self.probe.depth_mm
     }
@@ -157,7 +157,7 @@ impl Picture {
         self.shaft = Shaft { tip_mm: needle.tip, direction: needle.direction, inserted_mm, ..self.shaft };
     }
 
-    /// How the wall of a layer of the scene stands to the needle.
+    /// Returns the state of the wall of a layer of the scene: away from the needle, touched or pierced.
     pub fn wall_state(&self, layer: usize) -> PunctureState {
         let Some(Some(wall)) = self.walls.get(layer) else { return PunctureState::Away };
         let state = self.tissue.states().find(|(name, ..)| name == wall);
@@ -174,7 +174,7 @@ impl Picture {
         self.tissue.normals()
     }
 
-    /// What is drawn.
+    /// Returns the surfaces to draw.
     pub fn surfaces(&self) -> &[SurfaceView] {
         &self.surfaces
     }
@@ -217,7 +217,7 @@ impl Picture {
         self.imager.image()
     }
 
-    /// What the crate's function `seen` lists.
+    /// Returns the number `what` of those that the crate's function `seen` lists.
     pub fn seen(&self, what: u32) -> f32 {
         let now = self.imager.visible();
         match what {

@@ -31,7 +31,7 @@ pub mod device {
     pub mod virtual_device;
 }
 
-/// What is said to the page, and how 10 kHz become pictures.
+/// The messages to the page, and the reduction of samples at 10 kHz to pictures.
 #[path = "../../host-sim/src/visualizer"]
 pub mod visualizer {
     pub mod condense;
@@ -62,13 +62,13 @@ fn say(text: String) -> u32 {
     count
 }
 
-/// Where the page writes a text: 4,096 bytes.
+/// Returns the address at which the page writes a text: 4,096 bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn input() -> usize {
     HEARD.with_borrow(|heard| heard.as_ptr() as usize)
 }
 
-/// Where the last text for the page is.
+/// Returns the address of the last text for the page.
 #[unsafe(no_mangle)]
 pub extern "C" fn said() -> usize {
     SAID.with_borrow(|said| said.as_ptr() as usize)

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 /// Ticks between two exchanges with the device, as host-sim's station has them.
 const LOCKSTEP_TICKS: u64 = 10;
-/// What the scripted hand does.
+/// The procedure that the scripted hand follows.
 const PROCEDURE: &str = "venepuncture";
 
 /// A device, and everything up to the page.
@@ -135,7 +135,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What there is to tell the page, one JSON text a line.
+    /// Returns the messages for the page, one JSON text a line.
     pub fn tell(&mut self) -> String {
         let mut lines = String::new();
         let mut say = |message: &ToPage| {

@@ -113,7 +113,7 @@ async function checkPoses(told) {
   for (const { tip_mm, depth_mm } of poses) assert(Math.abs(Math.hypot(...tip_mm) - Math.abs(depth_mm)) < 1e-6);
   for (const { parentFrameId, childFrameId, translation: { x, y, z }, rotation: { x: i, y: j, z: k, w } } of transforms) {
     assert.deepStrictEqual([parentFrameId, childFrameId], ["skin", "needle"]);
-    assert(Math.abs(Math.hypot(i, j, k, w) - 1) < 1e-9, "a rotation that is none");
+    assert(Math.abs(Math.hypot(i, j, k, w) - 1) < 1e-9, "not a rotation");
     const isAt = (tip) => Math.hypot(tip[0] - 1000 * x, tip[1] - 1000 * y, tip[2] - 1000 * z) < 1e-6;
     assert(poses.some((pose) => isAt(pose.tip_mm)), "/tf is at no pose's tip");
   }

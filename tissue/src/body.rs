@@ -11,7 +11,7 @@ use crate::vector::{Vector, add, cross, scale, sub};
 /// Compliance of the ties between layers, mm/µN: stiffer than any layer.
 const TIE: f32 = 1e-6;
 
-/// What a surface shows.
+/// The part of the body that a surface shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The skin on the far side of the needle's plane (y < 0), as one sees it with the insertion to the right.
@@ -31,7 +31,7 @@ pub enum Part {
 /// Triangles of particles, facing outwards.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// What it shows.
+    /// The part that it shows.
     pub part: Part,
     /// Its triangles, by the numbers of particles.
     pub triangles: Vec<[u32; 3]>,
@@ -92,7 +92,7 @@ impl Tissue {
         })
     }
 
-    /// Who decides when a wall gives way.
+    /// Sets by what it is decided that a wall gives way.
     pub fn set_punctures(&mut self, punctures: Punctures) {
         self.insertion.set_punctures(punctures);
     }
@@ -130,7 +130,7 @@ impl Tissue {
         &self.rest
     }
 
-    /// What is drawn.
+    /// Returns the surfaces to draw.
     pub fn surfaces(&self) -> &[Surface] {
         &self.surfaces
     }
@@ -155,7 +155,7 @@ impl Tissue {
         &self.normals
     }
 
-    /// Where the tissue that was at `rest` is now; `None` outside the block.
+    /// Returns the present position of the tissue that was at `rest`; `None` outside the block.
     pub fn moved(&self, rest: Vector) -> Option<Vector> {
         self.lattices
             .iter()
@@ -163,7 +163,7 @@ impl Tissue {
             .map(|anchor| anchor.place(self.solver.points()))
     }
 
-    /// What moves: for those who measure.
+    /// Returns the solver, for measurements.
     pub fn solver(&self) -> &Solver {
         &self.solver
     }

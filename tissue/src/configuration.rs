@@ -1,4 +1,4 @@
-//! What the tissue is made of: layers, a vessel, and the values that make them soft.
+//! The tissue's composition: layers, a vessel, and the values that make them soft.
 
 use std::fmt;
 
@@ -8,11 +8,11 @@ pub const MOST_PARTICLES: usize = 20_000;
 /// One layer of tissue: a slab of tetrahedra.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Where it begins below the skin, mm.
+    /// The depth of its top below the skin, mm.
     pub top_mm: f32,
-    /// How thick it is, mm.
+    /// Its thickness, mm.
     pub thickness_mm: f32,
     /// Distance between particles along the skin, mm: L₀ of seed 000's Table 1.
     pub spacing_mm: f32,
@@ -22,16 +22,16 @@ pub struct Layer {
     pub stiffness_kpa: f32,
     /// Volume at rest as a share of the volume as built: V₀ of Table 1.
     pub volume_ratio: f32,
-    /// How hard it is to compress, kPa.
+    /// Its bulk modulus, kPa.
     pub bulk_kpa: f32,
     /// Angle between the planes of its upper surface at rest, in degrees, 180 being flat: θ₀ of Table 1. `None` keeps the angle
     /// as built.
     pub bending_deg: Option<f32>,
     /// Bending stiffness of its upper surface, µN·mm/rad.
     pub bending_stiffness: f32,
-    /// How far its upper surface is pushed in before it gives way, mm; 0 where nothing has to give way.
+    /// The travel by which its upper surface is pushed in before it gives way, mm; 0 if it does not resist.
     pub gives_mm: f32,
-    /// How far tissue that the needle has pierced is dragged along its axis before it slips, mm.
+    /// The travel over which tissue that the needle has pierced is dragged along its axis before it slips, mm.
     pub drag_mm: f32,
 }
 
@@ -44,7 +44,7 @@ pub struct Vessel {
     pub vertical_mm: f32,
     /// Diameter along the skin, mm.
     pub horizontal_mm: f32,
-    /// Where its axis passes: x in mm from the entry, y in mm across.
+    /// A point on its axis: x in mm from the entry, y in mm across.
     pub centre_mm: [f32; 2],
     /// Angle of its axis to the x axis, in degrees; 90 is a vessel cut across by the needle's plane.
     pub axis_deg: f32,
@@ -54,11 +54,11 @@ pub struct Vessel {
     pub volume_ratio: f32,
     /// Bending stiffness of the wall, µN·mm/rad.
     pub bending_stiffness: f32,
-    /// How far the near wall is pushed in before it gives way, mm.
+    /// The travel by which the near wall is pushed in before it gives way, mm.
     pub near_gives_mm: f32,
     /// The same for the far wall.
     pub far_gives_mm: f32,
-    /// How far the pierced wall is dragged along, mm.
+    /// The travel over which the pierced wall is dragged along, mm.
     pub drag_mm: f32,
 }
 
@@ -86,7 +86,7 @@ pub struct Configuration {
     pub damping: f32,
 }
 
-/// Why a configuration cannot be drawn: what, where and what to do.
+/// The reason why a configuration cannot be drawn: what, where and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal(pub(crate) String);
 

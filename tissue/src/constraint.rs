@@ -28,7 +28,7 @@ pub trait Constraint {
     fn particles(&self) -> impl Iterator<Item = u32>;
     /// One projection. `inverse_dt2` is 1/dt² in 1/s²; `lambda` is the multiplier so far in this substep.
     fn project(&self, points: &mut [Point], lambda: &mut f32, inverse_dt2: f32);
-    /// How far it is from being kept (its own unit) and its compliance: the energy is C²/(2α).
+    /// Returns its violation (in its own unit) and its compliance α: the energy is C²/(2α).
     fn violation(&self, points: &[Point]) -> (f32, f32);
 }
 
@@ -230,7 +230,7 @@ impl Anchor {
         anchor
     }
 
-    /// Where it is.
+    /// Returns its position.
     pub fn place(&self, points: &[Point]) -> Vector {
         let mut sum = [0.0; 3];
         for (corner, weight) in self.corners.iter().zip(self.weights) {
@@ -272,7 +272,7 @@ impl Anchor {
 pub struct Tie {
     /// The particle.
     pub particle: u32,
-    /// Where it belongs in the other layer.
+    /// The place in the other layer that it belongs to.
     pub anchor: Anchor,
     /// From that place to the particle at rest, mm.
     pub offset: Vector,

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 /// kPa in µN/mm².
 pub(crate) const KPA: f32 = 1e3;
 
-/// Where the particles of a layer are, and where they were at rest.
+/// The positions of a layer's particles, now and at rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
     first: u32,
@@ -29,7 +29,7 @@ const TETRAHEDRA: [[[usize; 4]; 5]; 2] = [
     [[1, 0, 5, 3], [2, 3, 6, 0], [4, 5, 0, 6], [7, 6, 3, 5], [0, 3, 6, 5]],
 ];
 
-/// How far the skin lies below its highest line, `y` mm beside it.
+/// Returns the drop of the skin below its highest line, `y` mm beside it, in mm.
 pub(crate) fn sag(limb_radius: Option<f32>, y: f32) -> f32 {
     limb_radius.map_or(0.0, |radius| radius - (radius * radius - y * y).max(0.0).sqrt())
 }
@@ -74,7 +74,7 @@ impl Lattice {
         self.first + ((k * self.ny + j) * self.nx + i) as u32
     }
 
-    /// Where it was at rest.
+    /// Returns its position at rest.
     fn rest(&self, i: usize, j: usize, k: usize) -> Vector {
         let share = |number: usize, of: usize| number as f32 / (of - 1) as f32;
         let y = self.half_width * (2.0 * share(j, self.ny) - 1.0);

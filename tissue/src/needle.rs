@@ -18,15 +18,15 @@ const SHAFT_MM: f32 = 1.2;
 const MOST_HOLDS: usize = 48;
 /// A wall that others say still holds gives way this much later than its own depth, mm: the page was opened late.
 const LATE_MM: f32 = 2.0;
-/// How far back along the needle a wall is looked for, mm.
+/// The length back along the needle over which a wall is looked for, mm.
 const NEEDLE_MM: f32 = 80.0;
 
 /// A rigid needle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needle {
-    /// Where its tip is, mm.
+    /// The position of its tip, mm.
     pub tip: Vector,
-    /// Where it points to, of length 1.
+    /// Its direction, of length 1.
     pub direction: Vector,
 }
 
@@ -49,7 +49,7 @@ impl Needle {
     }
 }
 
-/// How a wall and the needle stand to each other.
+/// The state of a wall towards the needle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PunctureState {
     /// The tip has not met it.
@@ -61,7 +61,7 @@ pub enum PunctureState {
     Inserted,
 }
 
-/// Who decides when a wall gives way.
+/// The rule by which a wall gives way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Punctures {
     /// The picture, by how far the wall is pushed in.
@@ -71,7 +71,7 @@ pub enum Punctures {
     Told,
 }
 
-/// Which wall.
+/// The name of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WallName {
     /// The upper surface of a layer, outermost 0.
@@ -86,11 +86,11 @@ pub enum WallName {
 #[derive(Clone, Copy, Debug)]
 struct Hold {
     anchor: Anchor,
-    /// Where it was at rest, mm.
+    /// Its position at rest, mm.
     home: Vector,
-    /// How far along the needle it is dragged, mm.
+    /// The travel by which it is dragged along the needle, mm.
     drag: f32,
-    /// How far it can be, mm.
+    /// The largest such travel, mm.
     most: f32,
 }
 
@@ -101,7 +101,7 @@ impl Hold {
         Self { anchor, home, drag: pushed.clamp(-drag_limit, drag_limit), most }
     }
 
-    /// Where on the needle's axis it belongs, and how far aside that is.
+    /// Returns the point on the needle's axis that it belongs to, and its distance from that point across the axis.
     fn target(&self, needle: &Needle) -> (Vector, f32) {
         let along = dot(sub(self.home, needle.tip), needle.direction);
         let on_axis = add(needle.tip, scale(needle.direction, along));
@@ -138,7 +138,7 @@ pub(crate) struct Wall {
     state: PunctureState,
     /// The device has said that it gave way.
     given: bool,
-    /// Where it is touched, and where that place was at first.
+    /// The place at which it is touched, and where that place was at first.
     touch: Option<(Anchor, Vector)>,
     hold: Option<Hold>,
     indentation: f32,
@@ -166,7 +166,7 @@ impl Wall {
         self.indentation = 0.0;
     }
 
-    /// Where the needle's axis, up to its tip, goes through it first: from inside where `from_inside`.
+    /// Returns the first place at which the needle's axis, up to its tip, passes through it: from inside if `from_inside`.
     fn crossing(&self, points: &[Point], needle: &Needle) -> Option<Anchor> {
         let from_inside = self.name == WallName::Far;
         let mut first: Option<(f32, Anchor)> = None;
@@ -188,7 +188,7 @@ impl Wall {
     }
 }
 
-/// Where a needle's axis meets a triangle: mm past the tip, weights of the corners, whether it goes in there (against the
+/// Returns where a needle's axis meets a triangle: mm past the tip, weights of the corners, whether it goes in there (against the
 /// triangle's normal). Möller and Trumbore 1997.
 fn meet(p: [Vector; 3], needle: &Needle) -> Option<(f32, [f32; 3], bool)> {
     let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
@@ -276,7 +276,7 @@ impl Insertion {
         self.aim(&needle);
     }
 
-    /// Whether what lies before a wall has been passed.
+    /// True if everything before a wall has been passed.
     fn is_open(&self, name: WallName) -> bool {
         let before = match name {
             WallName::Layer(0) => return true,

@@ -63,7 +63,7 @@ impl<C: Constraint + Copy> Group<C> {
     }
 }
 
-/// What is simulated, before it moves.
+/// The particles and constraints to simulate, before they move.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     /// Places in mm and inverse masses in 1/g.
@@ -78,7 +78,7 @@ pub struct Parts {
     pub ties: Vec<Tie>,
 }
 
-/// How a step is divided and how much motion it takes away.
+/// The division of a step, and its damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
     /// Substeps of a step.
@@ -94,7 +94,7 @@ pub struct Pace {
 pub struct Solver {
     points: Vec<Point>,
     before: Vec<Point>,
-    /// Where each particle was built.
+    /// The position at which each particle was built.
     built: Vec<Point>,
     speeds: Vec<[f32; 4]>,
     distances: Group<Distance>,
@@ -207,7 +207,7 @@ impl Solver {
             + self.ties.energy(&self.points)
     }
 
-    /// How many distances, volumes, bending angles and ties there are.
+    /// Returns the numbers of distances, volumes, bending angles and ties.
     pub fn counts(&self) -> [usize; 4] {
         [
             self.distances.constraints.len(),

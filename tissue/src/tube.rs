@@ -13,7 +13,7 @@ const WALL_MM: f32 = 0.5;
 /// Distance between rings, mm.
 const BETWEEN_MM: f32 = 1.3;
 
-/// Where the particles of a vessel are.
+/// The positions of a vessel's particles.
 #[derive(Clone, Debug)]
 pub(crate) struct Tube {
     first: u32,

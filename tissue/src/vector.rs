@@ -45,7 +45,7 @@ pub fn direction(a: Vector) -> Option<Vector> {
     (length.is_finite() && length > 1e-9).then(|| scale(a, 1.0 / length))
 }
 
-/// Whether every component is a finite number.
+/// True if every component is finite.
 pub fn is_finite(a: Vector) -> bool {
     a.iter().all(|component| component.is_finite())
 }

@@ -31,7 +31,7 @@ fn drive(tissue: &mut Tissue, from: f32, to: f32) {
     }
 }
 
-/// Where the skin's entry point is along the needle, mm past its rest.
+/// Returns the position of the skin's entry point along the needle, mm past its rest.
 fn skin_along(tissue: &Tissue) -> f32 {
     let direction = at(1.0).direction;
     let place = tissue.moved([0.0, 0.0, 0.0]).expect("it lies in the block");
@@ -192,7 +192,7 @@ fn what_cannot_be_built_is_refused_by_layer_and_value() {
     assert!(Tissue::new(&configuration).is_err(), "too many particles");
 }
 
-/// A needle that nobody holds still: jumps, turns, numbers that are none.
+/// A needle that nobody holds still: jumps, turns, numbers that are not finite.
 fn violent() -> impl Strategy<Value = Vec<(f32, f32, f32, f32)>> {
     let number =
         |range: std::ops::Range<f32>| prop_oneof![8 => range, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)];

@@ -19,7 +19,7 @@ const PLANES: [(f32, f32); 3] = [(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)];
 const MUSCLE_SPECKLE_DB: f32 = -38.0;
 /// A rough interface sends a share of its echo everywhere; the rest only where it faces the probe.
 const ROUGH: f32 = 0.15;
-/// How sharply the smooth part depends on facing: a power of the cosine.
+/// The power of the cosine by which the smooth part depends on the angle of incidence.
 const SMOOTH_POWER: i32 = 12;
 /// The echo of an interface gathers coherently over the pulse.
 const INTERFACE_GAIN: f32 = 0.5;
@@ -37,10 +37,10 @@ const COHERENCE_MM: f32 = 0.6;
 /// Turn of the probe over which the speckle changes, rad.
 const COHERENCE_RAD: f32 = 0.05;
 
-/// What is looked at.
+/// The scene to image.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
-    /// What lies above the first interface; gel is as good as skin.
+    /// The medium above the first interface; gel counts as skin.
     pub first: Medium,
     /// Interfaces.
     pub meshes: &'a [Mesh<'a>],
@@ -48,14 +48,14 @@ pub struct Scene<'a> {
     pub shaft: Option<Shaft>,
 }
 
-/// How the machine is set.
+/// The settings of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Gain, dB.
     pub gain_db: f32,
     /// Amplification with depth, dB/cm of depth; makes up for attenuation there and back.
     pub tgc_db_per_cm: f32,
-    /// What is shown between black and white, 60–100 dB.
+    /// The dynamic range between black and white, 60–100 dB.
     pub range_db: f32,
 }
 
@@ -139,7 +139,7 @@ impl Imager {
         self.power.iter().map(|power| 10.0 * power.max(1e-30).log10())
     }
 
-    /// How much of the needle the last image shows.
+    /// Returns how much of the needle the last image shows.
     pub fn visible(&self) -> InPlane {
         self.visible
     }
@@ -303,7 +303,7 @@ struct Piece {
     to: usize,
     /// Pressure that has reached its beginning and comes back, as a share of what was sent.
     pressure: f32,
-    /// What a sample leaves of it, there and back.
+    /// The share of the amplitude that remains after a sample, there and back.
     decay: f32,
     /// Energy of the scatterers.
     speckle: f32,
@@ -365,7 +365,7 @@ fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut tak
     }
 }
 
-/// Where the beam of a line meets the needle: depth, share of the beam's pressure there, distance behind the tip.
+/// Returns where the beam of a line meets the needle: depth, share of the beam's pressure there, distance behind the tip.
 fn meet(
     probe: &Probe,
     lateral: f32,
@@ -396,7 +396,7 @@ fn pulse_sigma_mm(probe: &Probe) -> f32 {
     1.54 / probe.mhz / 2.354_82
 }
 
-/// What a single echo loses when it is spread over the pulse, made up for.
+/// Returns the gain that makes up for what a single echo loses when it is spread over the pulse.
 fn pulse_gain(probe: &Probe) -> f32 {
     (pulse_sigma_mm(probe) / (probe.depth_mm / SAMPLES as f32)).max(1.0).sqrt()
 }
@@ -438,7 +438,7 @@ fn decibels(power: f32) -> f32 {
     3.010_3 * log2
 }
 
-/// Where the column of scatterers begins that lies at a place of the body.
+/// Returns where the column of scatterers begins that lies at a place of the body.
 fn column_start(column: i64, cell: i64, turned: i64) -> usize {
     let mut mixed = (column as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (cell as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)

@@ -1,4 +1,4 @@
-//! What sound meets: impedance, attenuation, speed and scatterers of a tissue.
+//! The properties of a tissue that sound meets: impedance, attenuation, speed and scatterers.
 
 /// A tissue, or steel.
 #[derive(Clone, Copy, Debug, PartialEq)]

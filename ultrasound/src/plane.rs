@@ -10,18 +10,18 @@ pub struct Mesh<'a> {
     pub points: &'a [[f32; 4]],
     /// Triangles by the numbers of their corners.
     pub triangles: &'a [[u32; 3]],
-    /// What is behind it: under the surface of a layer, inside a vessel.
+    /// The medium behind it: under the surface of a layer, inside a vessel.
     pub behind: Medium,
     /// A closed surface: the second crossing leads out of it again. What is drawn between is a wall as thick as this, mm.
     pub wall_mm: Option<f32>,
 }
 
-/// Where a line of the image crosses an interface.
+/// The crossing of a line of the image and an interface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
     /// Along the line, mm.
     pub(crate) depth: f32,
-    /// Which mesh.
+    /// The number of its mesh.
     pub(crate) mesh: usize,
     /// Cosine of the angle between line and normal within the image.
     pub(crate) facing: f32,

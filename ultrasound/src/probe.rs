@@ -1,4 +1,4 @@
-//! Where the probe is held, how thick its beam is, and the needle as it sees it.
+//! The probe's pose, the thickness of its beam, and the needle as it sees it.
 
 /// A place or a direction.
 pub type Vector = [f32; 3];
@@ -18,7 +18,7 @@ pub struct Probe {
     pub centre_mm: Vector,
     /// Its long side against the x axis, rad: 0 sees the needle's plane, π/2 cuts across.
     pub azimuth: f32,
-    /// How far its beam leans out of the vertical, sideways, rad.
+    /// The angle by which its beam leans sideways out of the vertical, rad.
     pub lean: f32,
     /// Width of the image, mm.
     pub width_mm: f32,
@@ -125,16 +125,16 @@ impl Probe {
 pub struct Shaft {
     /// Its tip, mm.
     pub tip_mm: Vector,
-    /// Where it points to, of length 1.
+    /// Its direction, of length 1.
     pub direction: Vector,
     /// Its outer radius, mm.
     pub radius_mm: f32,
-    /// How much of it is in the body, mm.
+    /// The length of it that is in the body, mm.
     pub inserted_mm: f32,
 }
 
 impl Shaft {
-    /// Whether there is anything of it to be seen.
+    /// True if there is anything of it to be seen.
     pub(crate) fn is_there(&self) -> bool {
         let numbers = self.tip_mm.iter().chain(&self.direction).chain([&self.radius_mm, &self.inserted_mm]);
         numbers.into_iter().all(|number| number.is_finite()) && self.inserted_mm > 0.0 && self.radius_mm > 0.0

@@ -1,4 +1,4 @@
-//! How well the needle is kept in the image's plane.
+//! A score of how well the needle is kept in the image's plane.
 
 use crate::probe::{Probe, Shaft};
 
@@ -7,19 +7,19 @@ const PLACES: usize = 32;
 /// A place counts as seen where the beam has this share of its pressure.
 const SEEN: f32 = 0.5;
 
-/// How much of the needle the beam sees.
+/// The part of the needle that the beam sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InPlane {
     /// Share of the inserted length that is seen, 0 to 1.
     pub share: f32,
-    /// Whether the tip is.
+    /// True if the tip is seen.
     pub tip: bool,
-    /// How far the tip lies beside the plane, mm.
+    /// The distance of the tip from the plane, mm.
     pub tip_beside_mm: f32,
 }
 
 impl InPlane {
-    /// Of this needle under this probe; nothing where the needle is outside.
+    /// For this needle under this probe; zero where the needle is outside.
     pub fn of(probe: &Probe, shaft: &Shaft) -> Self {
         if !shaft.is_there() {
             return Self::default();
@@ -45,7 +45,7 @@ impl InPlane {
 pub struct InPlaneScore {
     /// Time that the needle was in the body, s.
     pub inserted_s: f32,
-    /// Of that, the time that its tip was seen, s.
+    /// The time that the tip was seen, s.
     pub tip_seen_s: f32,
     /// Integral of the share of the needle that was seen, s.
     pub share_s: f32,

@@ -144,7 +144,7 @@ fn needle(beside: f32) -> Shaft {
     }
 }
 
-/// How much brighter than without it the needle's surroundings are, dB.
+/// Returns how much brighter the needle makes its surroundings, dB.
 fn contrast(shaft: Shaft) -> f32 {
     let probe = Probe::default();
     let bright = |shaft: Option<Shaft>| {

@@ -27,10 +27,10 @@ const ANY_RUST: &str = "--ignore-rust-version";
 /// A minute of the device, as fast as it goes.
 const STREAM_SECONDS: &str = "60";
 
-/// What a line of the board's own table begins with.
+/// The beginning of a line of the board's own table.
 const BOARD_LINE: &str = "| ";
 
-/// What was measured, by name.
+/// The measured values, by name.
 type Values = BTreeMap<String, String>;
 
 /// Measures, prints the table, writes `target/bench.json`. Where `names` has any, only what gives these rows is run.
@@ -121,7 +121,7 @@ fn test_modules() -> Result<Vec<TestModule>, Failure> {
     Ok(modules)
 }
 
-/// Whether the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
+/// True if the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
 fn measures(TestModule { text, .. }: &TestModule, wants: impl Fn(&str) -> bool) -> bool {
     (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
         || ROWS.iter().filter(|row| wants(row.name)).any(|row| {
@@ -217,7 +217,7 @@ fn image() -> Result<Values, Failure> {
 
 /// Other people's solvers on the same tasks, in Python, and the rows that they stand beside.
 const PEERS: [(&str, &str); 2] = [("soft_body.py", "xpbd_"), ("bmode.py", "ultrasound_")];
-/// What they need.
+/// The Python packages that the peers need.
 const PEERS_PACKAGES: [&str; 2] = ["numpy==2.4.6", "mujoco==4.0.0"];
 
 /// Runs one of them: it prints the row that it stands beside.

@@ -36,7 +36,7 @@ fn command(subcommand: &str, board: &Board, last: &[&str]) -> Command {
     cargo
 }
 
-/// Why they cannot run here.
+/// Returns the reason why they cannot run here; `None` if they can.
 fn missing() -> Option<String> {
     if !shell::is_on_path("probe-rs") {
         return Some(

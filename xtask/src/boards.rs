@@ -13,7 +13,7 @@ pub(crate) struct Board {
     pub(crate) chip: &'static str,
     /// Main RAM.
     pub(crate) ram: Range<u32>,
-    /// Whether `flash --dfu` knows its jumpers.
+    /// True if `flash --dfu` knows its jumpers.
     pub(crate) has_dfu: bool,
 }
 
@@ -39,7 +39,7 @@ pub(crate) const ALL: [Board; 2] = [
 pub(crate) const DEFAULT: &Board = &ALL[0];
 
 impl Board {
-    /// Whether it is [`DEFAULT`].
+    /// True if it is [`DEFAULT`].
     pub(crate) fn is_default(&self) -> bool {
         self.name == DEFAULT.name
     }

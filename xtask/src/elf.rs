@@ -12,9 +12,9 @@ pub(crate) struct Elf {
 
 /// A piece of the image that is loaded.
 pub(crate) struct Segment {
-    /// Where it lies in flash.
+    /// Its address in flash.
     pub(crate) load_address: u32,
-    /// Where it lies at run time.
+    /// Its address at run time.
     pub(crate) address: u32,
     /// Bytes in the file.
     pub(crate) file_size: u32,
@@ -69,7 +69,7 @@ impl Elf {
         bytes.try_into().map(|bytes| u16::from_le_bytes(bytes).into()).map_err(|_| self.broken())
     }
 
-    /// What is loaded.
+    /// Returns the segments that are loaded.
     pub(crate) fn segments(&self) -> Result<Vec<Segment>, Failure> {
         let (table, size, count) = (self.word(28)?, self.half(42)?, self.half(44)?);
         let mut segments = vec![];
@@ -88,7 +88,7 @@ impl Elf {
         Ok(segments)
     }
 
-    /// What `segment` brings.
+    /// Returns the bytes of `segment`.
     pub(crate) fn contents(&self, segment: &Segment) -> Result<&[u8], Failure> {
         self.slice(segment.offset, segment.file_size)
     }

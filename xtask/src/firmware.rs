@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 /// More is refused: 192 KiB, the project's own bound.
 const LARGEST_FLASH: u32 = 192 * 1024;
 
-/// Where the image lies once it is built: the default board's where cargo leaves it.
+/// Returns the path of the built image: the default board's is where cargo leaves it.
 pub(crate) fn path(board: &Board) -> PathBuf {
     let name = if board.is_default() { "firmware" } else { board.name };
     shell::target().join(TARGET).join("firmware").join(name)
 }
 
-/// What has cargo build something of the firmware for the board.
+/// The arguments by which cargo builds something of the firmware for the board.
 pub(crate) fn arguments(board: &Board) -> [&str; 9] {
     [
         "-p",

@@ -18,6 +18,7 @@ mod stack;
 mod steps;
 mod test;
 mod wasm;
+mod words;
 
 use boards::Board;
 use shell::Failure;
@@ -27,7 +28,7 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt clippy firmware unit doc board wasm site browser clients fuzz prove
+                                fmt words clippy firmware unit doc board wasm site browser clients fuzz prove
   cargo xtask test --quick      the inner loop: format, warnings, the tests inside the crates; three minutes
   cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class soak mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use

@@ -22,10 +22,10 @@ const CRATES: [(&str, &[&str]); 3] = [
 ];
 /// A mutant that runs longer hangs.
 const LIMIT_S: &str = "30";
-/// Of the mutants that build, in per cent.
+/// The share of the mutants that build that the tests must notice, in per cent.
 const CAUGHT_AT_LEAST: usize = 90;
 
-/// What became of the mutants of a crate.
+/// The counts of a crate's mutants by their fate.
 #[derive(Default)]
 struct Tally {
     caught: usize,

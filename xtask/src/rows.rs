@@ -1,6 +1,6 @@
 //! The rows of the performance table: their names, units and what is wanted of them.
 
-/// Which way is better.
+/// The direction in which a value is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Better {
     /// Less is.
@@ -15,7 +15,7 @@ pub(crate) struct Row {
     /// Its name in `target/bench.json`.
     pub(crate) name: &'static str,
     pub(crate) unit: &'static str,
-    /// What is wanted, where a number is.
+    /// The goal, where there is one.
     pub(crate) wanted: Option<f64>,
     pub(crate) better: Better,
 }

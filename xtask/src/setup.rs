@@ -1,11 +1,11 @@
-//! What a machine needs beyond Rust: named, then installed where that is allowed, else the one command that does it.
+//! The programs that a machine needs beyond Rust: named, then installed where that is allowed, else the one command that does it.
 
 use crate::shell::{self, Failure};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Whether we may install packages of the system.
+/// True if packages of the system may be installed.
 fn is_root() -> bool {
     // The effective user is the second number; no number, no root.
     fs::read_to_string("/proc/self/status")
@@ -115,7 +115,7 @@ pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Failure> {
     Ok(modules)
 }
 
-/// What runs WebAssembly without a browser.
+/// Makes sure of Node.js, which runs WebAssembly without a browser.
 pub(crate) fn node() -> Result<(), Failure> {
     if shell::is_on_path("node") {
         Ok(())
@@ -124,7 +124,7 @@ pub(crate) fn node() -> Result<(), Failure> {
     }
 }
 
-/// What compiles and runs C#: Debian has Mono, and no registry that CI reaches has .NET.
+/// Makes sure of Mono, which compiles and runs C#: Debian has it, and no registry that CI reaches has .NET.
 pub(crate) fn mono() -> Result<(), Failure> {
     if ["mcs", "mono"].into_iter().all(shell::is_on_path) {
         return Ok(());
@@ -134,7 +134,7 @@ pub(crate) fn mono() -> Result<(), Failure> {
     install(&packages, "the test of the documented C# client")
 }
 
-/// How the image for the board is built on this machine.
+/// The way in which this machine builds the image for the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Toolchain {
     /// The toolchain at hand has the target.
@@ -212,7 +212,7 @@ pub(crate) fn cargo_with(toolchain: Toolchain, subcommand: &str, library: &str) 
     }
 }
 
-/// Whether the compiler at hand has the core library of `target`.
+/// True if the compiler at hand has the core library of `target`.
 pub(crate) fn has_target(target: &str) -> bool {
     let mut rustc = Command::new("rustc");
     rustc.current_dir(shell::top()).args(["--print", "target-libdir", "--target", target]);

@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Why a chore failed: one sentence, and the exit status.
+/// A chore's failure: its reason in one sentence, and the exit status.
 #[derive(Debug)]
 pub(crate) struct Failure {
     what: String,
@@ -40,7 +40,7 @@ pub(crate) fn top() -> PathBuf {
     top.canonicalize().unwrap_or(top)
 }
 
-/// Where cargo builds.
+/// Returns the folder in which cargo builds.
 pub(crate) fn target() -> PathBuf {
     top().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
@@ -59,7 +59,7 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// Whether a program of this name can be started.
+/// True if a program of this name can be started.
 pub(crate) fn is_on_path(program: &str) -> bool {
     env::var_os("PATH").is_some_and(|path| {
         env::split_paths(&path)

@@ -11,12 +11,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Of no use without devices to look at.
+/// The instructor's page, which is of no use without devices to look at.
 const CLASS_PAGE: &str = "class.js";
 /// The page, and what takes the place of some of its modules.
 const PAGE: &str = "host-sim/page";
 const IN_PLACE: &str = "site-wasm/page";
-/// Where the page starts its modules, and what stands there in the site.
+/// The line by which the page starts its modules, and its replacement in the site.
 const STARTS: &str = r#"<script type="module" src="main.js"></script>"#;
 /// Profiles and ticks whose bits are compared: an insertion and withdrawal each.
 const COMPARED: [(&str, &str); 2] = [("adult", "80000"), ("firm-skin", "80000")];
@@ -55,7 +55,7 @@ pub(crate) fn run() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether the device in the browser gives the same bits as host-sim's.
+/// Checks that the device in the browser gives the same bits as host-sim's.
 pub(crate) fn check() -> Result<(), Failure> {
     setup::node()?;
     let device = wasm::build_crate("site-wasm")?;

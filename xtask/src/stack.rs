@@ -13,12 +13,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use thumb::{Body, Code};
 
-/// What the core puts on the stack for an interrupt, floating-point registers and alignment included.
+/// The bytes that the core puts on the stack for an interrupt, floating-point registers and alignment included.
 const EXCEPTION_FRAME: u32 = 108;
 /// Entries of the vector table before the interrupts: stack pointer, reset, faults, SysTick.
 const EXCEPTIONS: usize = 16;
 
-/// What the analysis found.
+/// The result of the analysis.
 pub(crate) struct Stack {
     /// Bytes that the stack has.
     pub(crate) room: u32,
@@ -119,7 +119,7 @@ pub(crate) fn analyse(elf: &Elf) -> Result<Stack, Failure> {
     })
 }
 
-/// Who calls whom, circles drawn together.
+/// The graph of calls, each circle of it drawn together.
 struct Graph {
     /// The circle, mostly of one, that each function belongs to.
     circle_of: BTreeMap<u32, usize>,

@@ -7,7 +7,7 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
 use crate::test::Step;
-use crate::{board_test, firmware, mutants, site, wasm};
+use crate::{board_test, firmware, mutants, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -15,13 +15,14 @@ use std::process::Command;
 const ANY_RUST: &str = "--ignore-rust-version";
 /// The one build: what is built, and how.
 const BUILD: [&str; 3] = ["--release", "--workspace", ANY_RUST];
-/// How long damaged frames are parsed, in s.
+/// The time for which damaged frames are parsed, in s.
 const FUZZ_SECONDS: &str = "10";
 const LONG_FUZZ_SECONDS: &str = "600";
 
 /// In the order that finds the most for the least time.
-pub(crate) const STEPS: [Step; 12] = [
+pub(crate) const STEPS: [Step; 13] = [
     step("fmt", "the sources are formatted", 5.0, fmt),
+    step("words", "comments and documents are in plain English", 1.0, words::check),
     step("clippy", "no warning from the compiler or clippy", 130.0, clippy),
     step("firmware", "the boards' flash images build, without warnings, and fit", 120.0, image),
     step("unit", "the crates' tests, and the build that all later steps share", 600.0, unit),
@@ -36,13 +37,14 @@ pub(crate) const STEPS: [Step; 12] = [
 ];
 
 /// The inner loop.
-pub(crate) const QUICK: [Step; 3] = [
+pub(crate) const QUICK: [Step; 4] = [
     step("fmt", "the sources are formatted", 5.0, fmt),
-    step("clippy", "no warning from the compiler or clippy", 95.0, clippy),
+    step("words", "comments and documents are in plain English", 1.0, words::check),
+    step("clippy", "no warning from the compiler or clippy", 94.0, clippy),
     step("libraries", "the tests inside the crates", 80.0, libraries),
 ];
 
-/// What takes longer than the tests may.
+/// The checks that take longer than the tests may.
 pub(crate) const NIGHTLY: [Step; 7] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
     step("parquet", "import reads Parquet, which the default build leaves out", 300.0, parquet),

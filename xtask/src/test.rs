@@ -6,7 +6,7 @@ use crate::shell::Failure;
 use crate::steps::{NIGHTLY, QUICK, STEPS};
 use std::time::Instant;
 
-/// What a whole run writes into an empty target folder, and room to spare; a linker on a full disk dies of a bus error.
+/// The space that a whole run writes into an empty target folder, and room to spare; a linker on a full disk dies of a bus error.
 const NEEDED_MIB: u64 = 7 * 1024;
 /// As much where most is built already.
 const NEEDED_BY_A_STEP_MIB: u64 = 1024;
@@ -17,12 +17,12 @@ const QUICK_OPTION: &str = "--quick";
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) shows: &'static str,
-    /// How long it may take on two idle cores, in s. A slower machine is told and does not fail.
+    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
     pub(crate) bound_s: f64,
     pub(crate) run: fn() -> Result<(), Failure>,
 }
 
-/// What no command here runs, and why.
+/// The checks that no command here runs, and why.
 const NEVER_HERE: [(&str, &str); 1] = [(
     "hardware",
     "flashing and running on a real board needs one and a person beside it: `cargo xtask board-test`",
@@ -69,7 +69,7 @@ fn choose<'a>(all: &'a [Step], names: &[&String], what: &str) -> Result<Vec<&'a 
     Ok(all.iter().filter(|step| names.is_empty() || names.iter().any(|name| *name == step.name)).collect())
 }
 
-/// What became of the steps.
+/// The results of the steps.
 #[derive(Default)]
 struct Summary {
     lines: Vec<String>,

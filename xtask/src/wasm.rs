@@ -10,7 +10,7 @@ use std::process::Command;
 
 /// The browser's target.
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
-/// What is built from: their folders' sources and manifests.
+/// The crates that it is built from: the sources and manifests in their folders.
 const CRATES: [&str; 3] = ["tissue", "ultrasound", "page-wasm"];
 /// The product and its note.
 const PRODUCT: &str = "host-sim/page/picture.wasm";
@@ -38,8 +38,9 @@ pub(crate) fn run() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether the product is the sources': by its note everywhere, byte for byte where the same compiler is at hand. What was
-/// checked, in words.
+/// Checks that the product is built from the sources: by its note everywhere, byte for byte where the same compiler is at hand.
+///
+/// Returns what was checked.
 pub(crate) fn check() -> Result<&'static str, Failure> {
     let top = shell::top();
     let product = read(&top.join(PRODUCT))?;

@@ -7,7 +7,7 @@ use crate::refusal::{Field, Refusal, within};
 use crate::stability;
 use fixed::types::{I2F30, I16F16, I32F32, U16F16};
 
-/// Of what was found at the most: 243/256. Rounding, wear and a rotor's angle that is off by 2° stay below the rest.
+/// The largest share of what was found that is fed forward: 243/256. Rounding, wear and a rotor's angle that is off by 2° stay below the rest.
 const LARGEST_GAIN: u8 = 243;
 /// A compensation may take this share of the torque ceiling; the rest is the law's.
 const TORQUE_SHARE: i32 = 4;
@@ -67,7 +67,7 @@ fn check_torque(device: &Device, gains: Gains) -> Result<(), Refusal> {
     if torque > limit { Err(Refusal::CompensationTooStrong { torque, limit }) } else { Ok(()) }
 }
 
-/// What the parts ask for together at the most, beside viscous friction, mN·m.
+/// The largest torque that the parts together ask for, viscous friction apart, mN·m.
 fn largest(device: &Device, gains: Gains) -> I16F16 {
     let found = &device.compensation;
     let dry = found.inwards.dry.0.max(found.outwards.dry.0);

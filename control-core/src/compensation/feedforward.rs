@@ -53,7 +53,7 @@ pub(crate) struct Feedforward {
     /// The gains that were asked for, and those in force: of angle, friction, weight, drive.
     wanted: [I16F16; 4],
     gains: [I16F16; 4],
-    /// The absolute count at which the rotor's angle is nought, once it is known.
+    /// The absolute count at which the rotor's angle is zero, once it is known.
     index: Option<i32>,
     /// Weight and offset, mN·m in the direction of insertion, to give.
     steady: I16F16,
@@ -93,7 +93,7 @@ impl Feedforward {
         self.set_gains(after.compensation.gains);
     }
 
-    /// The rotor's angle is nought at this absolute count; `None`: it is not known.
+    /// The absolute count at which the rotor's angle is zero; `None` if it is not known.
     pub(crate) fn set_index(&mut self, index: Option<i32>) {
         self.index = index;
         (self.waves, self.ripple) = (I16F16::ZERO, I16F16::ZERO);

@@ -12,9 +12,9 @@ use crate::units::{Damping, MillimetresPerSecond, MillinewtonMetres};
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
-/// Waves by the rotor's angle at the most: cogging and an off-centre mass.
+/// The most waves by the rotor's angle: cogging and an off-centre mass.
 pub const MAX_WAVES: usize = 8;
-/// Waves of the ripple at the most.
+/// The most waves of the ripple.
 pub const MAX_RIPPLES: usize = 4;
 /// Raised whenever a value here comes to mean something else.
 pub const VERSION: u8 = 1;

@@ -14,7 +14,7 @@ use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Knots of a force table at the most: of depth, of speed, of angle.
+/// The most knots of a force table: of depth, of speed, of angle.
 pub const MAX_DEPTHS: usize = 16;
 /// See [`MAX_DEPTHS`].
 pub const MAX_SPEEDS: usize = 3;
@@ -223,7 +223,7 @@ fn check(table: &ForceTable, ground: &Ground) -> Result<(), Refusal> {
         let mut from = low;
         let mut count = 0;
         for knot in knots {
-            // A thousandth apart at the least: the slopes between them are computed.
+            // At least a hundredth apart: the slopes between them are computed.
             let least = if count == 0 { low } else { from.saturating_add(milli(10)) };
             within(field, knot, least, high)?;
             (from, count) = (knot, count + 1);

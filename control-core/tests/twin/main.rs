@@ -79,7 +79,7 @@ fn friction(stiffest: f64, strongest: f64) -> impl Strategy<Value = FrictionLaw>
 /// A wall that is likely to be valid: its slope and force are shares of what is allowed.
 fn wall(stiffest: f64, strongest: f64) -> impl Strategy<Value = Option<Wall>> {
     let parts = (0.1..0.5_f64, 0.05..0.8_f64, 0.2..5.0_f64, 0.0..1.0_f64, 0.05..0.4_f64);
-    // How far before contact the rising parabola turns, and what stays of the relief for good; mostly neither.
+    // How far before contact the rising parabola turns, and how much of the relief stays permanently; mostly neither.
     let shapes = (prop_oneof![Just(0.0), 0.0..1.0_f64], prop_oneof![Just(0.0), 0.0..1.0_f64]);
     let wall = (parts, shapes).prop_map(move |((slope, force, beyond, relief, unload), (before, stays))| {
         let (slope, force) = (slope * stiffest, force * strongest);
@@ -162,7 +162,7 @@ fn legs() -> impl Strategy<Value = Vec<(f64, u16)>> {
     prop::collection::vec(prop_oneof![4 => slow, 2 => fast, 1 => rest], 1..24)
 }
 
-/// Legs of a speed each, at `largest` counts a tick at the most, joined as a hand joins them: with an acceleration that no
+/// Legs of a speed each, at most `largest` counts a tick, joined as a hand joins them: with an acceleration that no
 /// watch takes for a motor that is wired wrongly, and a rest before either end.
 fn walk(legs: &[(f64, u16)], largest: f64, furthest: i32) -> Vec<i32> {
     const PER_TICK: f64 = 0.004;

@@ -149,7 +149,7 @@ impl Twin {
         self.top(index, stretch) + self.layers[index].carried
     }
 
-    /// One layer touched or left, and one wall that gives way, a tick at the most.
+    /// At most one layer touched or left, and one wall that gives way, in a tick.
     fn meet(&mut self, depth: f64, stretch: f64, told: Transitions) {
         let bit = |index: usize| 1_u8 << index;
         let mut puncture = 0;

@@ -13,7 +13,7 @@ const LEAD_S: f64 = 0.15;
 const MOST_S: f64 = 12.0;
 /// The same while a start is searched, which takes many runs.
 const SEARCH_S: f64 = 2.0;
-/// A simulation this many travels away has left the recording for good.
+/// A simulation this many travels away has left the recording permanently.
 const GONE: f64 = 1e3;
 /// Places within a turn at which a start is tried.
 const STARTS: usize = 32;

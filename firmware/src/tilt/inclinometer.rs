@@ -4,7 +4,7 @@ use super::{Reading, Smoother, TiltSource, TiltTrouble, angle::from_sine};
 
 /// A 12-bit converter on the sensor's output.
 pub trait ReadCode {
-    /// Converts once; tens of microseconds at the most.
+    /// Converts once, within some tens of microseconds.
     fn read_code(&mut self) -> u16;
 }
 

@@ -11,7 +11,7 @@ use std::net::SocketAddr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Devices at the most; messages of one more are thrown away.
+/// The most devices; messages of further ones are dropped.
 const MOST_MEMBERS: usize = 200;
 /// Events that are kept of each device.
 const MOST_EVENTS: usize = 8;

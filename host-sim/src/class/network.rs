@@ -23,7 +23,7 @@ use zenoh::{Config, Session, Wait};
 const PERIOD: Duration = Duration::from_millis(40);
 /// How long the end of a program waits for a goodbye that the network may not take.
 const GOODBYE: Duration = Duration::from_millis(500);
-/// Bytes of a message in pieces that are put together, at the most; Zenoh's own is 1 GiB. The board takes half of it.
+/// The most bytes of a message put together from pieces; Zenoh's own limit is 1 GiB. The board takes half of it.
 const LONGEST_TRANSFER: &str = "131072";
 /// How long a connection may take to say who it is, ms. Zenoh's own is 10 s with 100 of them at a time: silent ones would keep
 /// devices out for so long.

@@ -180,7 +180,7 @@ impl<'a> Bench<'a> {
         self.not_saved.take().map_or(Ok(record), |why| Err(Failure::failed(why)))
     }
 
-    /// Tells the device where the rotor's angle is nought, in counts past the zero.
+    /// Tells the device where the rotor's angle is zero, in counts past the zero.
     pub fn index(&mut self, count: i32) -> Result<(), Failure> {
         self.driver.request(Request::Index(count));
         let until = self.now + Duration::from_millis(100);

@@ -1,5 +1,5 @@
 //! `commission`: finds out how a device is wired and built before anybody holds its needle, and gives it its part of the
-//! configuration. The encoder is known before the motor moves, and the motor moves with 2 mN·m at the most: more the device
+//! configuration. The encoder is known before the motor moves, and the motor moves with at most 2 mN·m: more the device
 //! itself refuses until it has been commissioned.
 
 pub mod bench;

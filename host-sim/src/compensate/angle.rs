@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 /// Agreement that is believed: the cosine between what was diagnosed and what the slow turn shows.
 const BELIEVED: f64 = 0.7;
-/// And so much of their size, at the least and at the most.
+/// The smallest and the largest share of their size that counts as agreement.
 const SIZE: std::ops::Range<f64> = 0.5..2.0;
 /// Ticks over which a speed is taken, and of the rows that are used, one in so many.
 const SPAN: usize = 100;
@@ -19,7 +19,7 @@ const STRIDE: usize = 10;
 /// Slower than this, rad/s, the roller may stick.
 const MOVING: f64 = 0.2;
 
-/// Where the rotor's angle is nought.
+/// The count at which the rotor's angle is zero, and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angle {
     /// Counts past the zero.

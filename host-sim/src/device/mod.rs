@@ -11,10 +11,10 @@ use std::time::Duration;
 /// An open connection that carries bytes both ways.
 pub trait Wire: Send {
     /// Reads what is there, waiting for at most `patience`; 0 bytes where nothing came. An error means that the connection is
-    /// gone for good.
+    /// permanently gone.
     fn read(&mut self, into: &mut [u8], patience: Duration) -> io::Result<usize>;
 
-    /// Writes all of `bytes`, or fails: then the connection is gone for good.
+    /// Writes all of `bytes`, or fails: then the connection is permanently gone.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 }
 

@@ -16,9 +16,9 @@ use table::{Knots, Table};
 const SAME_SPEED: f64 = 0.2;
 /// Angles that differ by less than this are one angle of the design, °.
 const SAME_ANGLE_DEG: f64 = 4.0;
-/// From knot to knot at the least, mm: finer than a puncture's fall is not felt.
+/// The smallest distance between knots, mm: finer than a puncture's fall is not felt.
 const FINEST_STEP_MM: f64 = 0.2;
-/// Knots at the most, as many as the device has room for.
+/// The most knots: as many as the device has room for.
 pub const MOST_KNOTS: usize = 64;
 
 /// How well an insertion is told.

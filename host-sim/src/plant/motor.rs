@@ -101,7 +101,7 @@ mod tests {
         let mut amplifier = Amplifier::default();
         for step in 1..=2_000_u32 {
             amplifier.step(&weak, Some(weak.wanted_current(1.0)), 0.0);
-            // Euler's steps run ahead of the exponential by a step at the most.
+            // Euler's steps run ahead of the exponential by at most a step.
             let time = f64::from(step + 1) * STEP_S;
             let bound =
                 weak.supply / weak.resistance * (1.0 - (-time * weak.resistance / weak.inductance).exp());

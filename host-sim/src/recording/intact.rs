@@ -97,7 +97,7 @@ mod tests {
             assert_eq!(intact(&file("", length)).len(), second, "{length}");
             assert_eq!(intact(&file("zstd", length)), file("zstd", length), "another reader's");
         }
-        // A record that ends too early leaves a rest that is none.
+        // A record that ends too early leaves bytes that are not a record.
         assert_eq!(intact(&file("", 1)).len(), second + HEAD + 1);
         for cut in 0..whole.len() {
             assert_eq!(intact(&whole[..cut]).len(), cut, "a file that was cut is not damaged");

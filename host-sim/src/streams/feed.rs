@@ -9,7 +9,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
-/// Between two looks at the session: 4 ms, 250 poses a second at the most.
+/// Between two looks at the session: 4 ms, at most 250 poses a second.
 const PERIOD: Duration = Duration::from_millis(4);
 
 /// What is known now.

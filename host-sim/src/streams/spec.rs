@@ -105,7 +105,7 @@ impl FromStr for Spec {
 pub struct Token(String);
 
 impl Token {
-    /// Characters at the least.
+    /// The smallest number of characters.
     pub const SHORTEST: usize = 12;
 
     /// Whether `said` is the token; takes as long whatever the first difference is.

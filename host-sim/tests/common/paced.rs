@@ -36,7 +36,7 @@ impl Paced {
         self.late.last().copied().unwrap_or_default()
     }
 
-    /// What it was behind half of the time at the most.
+    /// The median of how late it was.
     pub(crate) fn median(&self) -> Duration {
         self.late[self.late.len() / 2]
     }

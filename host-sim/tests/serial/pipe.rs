@@ -1,4 +1,4 @@
-//! Two byte queues in memory: the cable of a board that is none.
+//! Two byte queues in memory: the cable of a board that does not exist.
 
 use host_sim::device::Wire;
 use std::collections::VecDeque;

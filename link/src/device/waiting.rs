@@ -1,4 +1,4 @@
-//! What waits at the device's end of the link.
+//! The queues at the device's end of the link.
 
 use crate::frames::{Ack, Event, SampleBlock};
 use control_core::Order;
@@ -10,7 +10,7 @@ const WAITING_EVENTS: usize = 32;
 const WAITING_ACKS: usize = 16;
 const WAITING_ORDERS: usize = 4;
 
-/// What waits for the PC or for the control law. It is large, and may stand where it is at home from the start.
+/// The messages that wait for the PC or for the control law. It is large, and may be built in its final place.
 pub struct Waiting {
     pub(super) acks: Deque<Ack, WAITING_ACKS>,
     pub(super) events: Deque<Event, WAITING_EVENTS>,

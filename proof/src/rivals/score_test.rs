@@ -12,7 +12,7 @@ const BLOCK: f64 = 30.0;
 /// Chance of one false name in a case, shared among all candidates.
 const LEVEL: f64 = 0.01;
 
-/// Coefficients and names of what passes, one after another, three at the most.
+/// Returns the coefficients and names of the effects that pass, at most three, one after another.
 pub(super) fn select(
     features: &[Feature],
     normal: &Normal,

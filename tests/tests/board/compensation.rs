@@ -90,7 +90,7 @@ fn find_angle(board: &mut Board, pc: &mut Pc, found: &Found) -> i32 {
     let per_code = 0.0288 / 2_047.0;
     let angle =
         angle::find(&played, &found.waves, (4_000.0, per_code, 2_048.0, found.inertia)).expect("it shows");
-    println!("the rotor's angle is nought at {} counts, agreement {:.3}", angle.count, angle.agreement);
+    println!("the rotor's angle is zero at {} counts, agreement {:.3}", angle.count, angle.agreement);
     angle.count
 }
 

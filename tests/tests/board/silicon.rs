@@ -44,8 +44,8 @@ fn full_torque_both_ways_reaches_the_pin() {
     let codes: Vec<u16> =
         rig.board.at_stop(|stopped| stopped.log().put_out.iter().map(|output| output.code).collect());
     let (least, most) = (codes.iter().min().copied(), codes.iter().max().copied());
-    assert!(least.is_some_and(|code| code < 80), "{least:?} at the least");
-    assert!(most.is_some_and(|code| code > 4_015), "{most:?} at the most");
+    assert!(least.is_some_and(|code| code < 80), "the lowest code is {least:?}");
+    assert!(most.is_some_and(|code| code > 4_015), "the highest code is {most:?}");
     is_allowed(&mut rig.board);
 }
 

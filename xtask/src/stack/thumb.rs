@@ -4,7 +4,7 @@ use crate::elf::{Elf, Symbol};
 use crate::shell::Failure;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a function's instructions say.
+/// The facts that a function's instructions tell.
 #[derive(Debug, Default)]
 pub(crate) struct Body {
     /// Bytes that it takes from the stack, all branches together.
@@ -13,7 +13,7 @@ pub(crate) struct Body {
     pub(crate) calls: Vec<u32>,
     /// Calls through a register.
     pub(crate) pointer_calls: usize,
-    /// Whether it takes an amount from a register.
+    /// True if it takes an amount from a register.
     pub(crate) takes_unknown: bool,
     /// Constants that it builds, half by half.
     pub(crate) constants: Vec<u32>,
@@ -136,7 +136,7 @@ impl<'a> Code<'a> {
     }
 }
 
-/// Whether `first` begins an instruction of two halves.
+/// True if `first` begins an instruction of two halves.
 fn wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }

@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | PA15, PA1 | encoder A, B (TIM2, 32 bit) | both free on the board; PA0 has the button, PA5 the accelerometer |
 //! | PA4 | motor set value, 12 bit (DAC 1) | shared with the audio codec, which is held in reset |
-//! | PD4 | codec reset | low for good |
+//! | PD4 | codec reset | low, always |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
 //! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ; read back |
 //! | PE4 | emergency stop: to ground while it may run | pulled up inside: a jumper where there is no stop |

@@ -13,7 +13,7 @@
 //! | PC2, PF12 | motor current, scaled as PA4 (ADC 2, channel 12); PF12 to ground where it is fitted | CN10 9, CN7 20; read at start-up |
 //! | PC0 | analogue inclinometer (ADC 1, channel 10) | CN9 3; needs an external pull-down of 100 kΩ, which a wire that is off leaves it with |
 //! | PA11, PA12 | USB | the micro-USB connector CN13 |
-//! | PG6 | power switch of CN13, for a host | low for good: this is a device |
+//! | PG6 | power switch of CN13, for a host | low, always: this is a device |
 //! | PB0 | green LED LD1: running | on the board |
 
 use crate::chip::{

@@ -1,0 +1,183 @@
+//! The word check: phrases that `words/list.rs` replaces by plain ones, and doc comments that open like a question.
+//!
+//! Comments and string literals of Rust are read, and the whole text of Markdown, HTML, CSS, JavaScript, Python and TOML. A phrase is
+//! found in any case and across a line break, and never across punctuation.
+
+mod list;
+mod prose;
+
+use crate::shell::{self, Failure};
+use list::{OPENINGS, Phrase, STILL_TO_CLEAN};
+use prose::Word;
+use std::collections::HashMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Folders without prose of ours: what is built, and what git keeps.
+const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
+/// The list names what it bans.
+const LIST: &str = "xtask/src/words/list.rs";
+
+/// Checks every file of the repository, prints each finding, and fails if there is one.
+pub(crate) fn check() -> Result<(), Failure> {
+    let mut findings = Vec::new();
+    visit(&shell::top(), "", &mut findings)
+        .map_err(|error| Failure::new(format!("the sources could not be read: {error}")))?;
+    findings.iter().for_each(|finding| eprintln!("{finding}"));
+    if findings.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "{} phrases to rewrite, each printed above with what to write instead; {LIST} lists them with reasons",
+        findings.len()
+    )))
+}
+
+/// Appends the findings in every file below `folder`, whose path from the top of the repository is `path`.
+fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()> {
+    let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let name = entry.file_name();
+        let Some(name) = name.to_str() else { continue };
+        let below = if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
+        let kind = entry.file_type()?;
+        if kind.is_dir() && !SKIPPED.contains(&name) {
+            visit(&entry.path(), &below, findings)?;
+        } else if kind.is_file() && below != LIST {
+            let Some(prose) = prose::reader(name) else { continue };
+            let Ok(text) = fs::read_to_string(entry.path()) else { continue };
+            findings.extend(phrases(&prose(&text), &list::PHRASES).iter().map(|found| found.message(&below)));
+            if name.ends_with(".rs") && !STILL_TO_CLEAN.iter().any(|folder| below.starts_with(folder)) {
+                findings.extend(openings(&text).into_iter().map(|(line, word)| {
+                    format!(
+                        "{below}:{line}: a doc comment opens with \"{word}\": write a sentence, such as \"Returns …\", \"True if …\" or \
+                         \"The time constant of …, in s\""
+                    )
+                }));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A phrase of the list in a text.
+struct Found<'a> {
+    line: usize,
+    phrase: &'a Phrase,
+}
+
+impl Found<'_> {
+    fn message(&self, path: &str) -> String {
+        let Phrase { banned, plain, why } = self.phrase;
+        format!("{path}:{}: \"{banned}\": write \"{plain}\" ({why})", self.line)
+    }
+}
+
+/// Returns every occurrence of the phrases of `list`, in the order of the text.
+fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
+    let mut by_first: HashMap<&str, Vec<(Vec<&str>, &Phrase)>> = HashMap::new();
+    for phrase in list {
+        let mut banned = phrase.banned.split(' ');
+        let first = banned.next().unwrap_or_default();
+        by_first.entry(first).or_default().push((banned.collect(), phrase));
+    }
+    let mut found = Vec::new();
+    for (at, first) in words.iter().enumerate() {
+        for (rest, phrase) in by_first.get(first.text.as_str()).into_iter().flatten() {
+            let follows = words[at + 1..].iter().take(rest.len()).filter(|word| word.follows);
+            if follows.map(|word| word.text.as_str()).eq(rest.iter().copied()) {
+                found.push(Found { line: first.line, phrase });
+            }
+        }
+    }
+    found
+}
+
+/// Returns the lines of Rust in `text` that begin a doc comment with a word of [`OPENINGS`], each with the word.
+fn openings(text: &str) -> Vec<(usize, &'static str)> {
+    let mut found = Vec::new();
+    let mut is_inside = false;
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim_start();
+        let doc = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+        if let (Some(doc), false) = (doc, is_inside) {
+            let first = doc.trim_start().split(|letter: char| !letter.is_alphabetic()).next();
+            found
+                .extend(OPENINGS.iter().filter(|word| Some(**word) == first).map(|word| (number + 1, *word)));
+        }
+        is_inside = doc.is_some();
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIST: [Phrase; 2] = [
+        Phrase { banned: "quite so", plain: "so", why: "shorter" },
+        Phrase { banned: "verily", plain: "indeed", why: "younger" },
+    ];
+
+    /// The lines of `text`, a file named `name`, on which a phrase of the list begins.
+    fn lines(name: &str, text: &str) -> Vec<usize> {
+        let prose = prose::reader(name).expect("a kind of file with prose");
+        phrases(&prose(text), &LIST).iter().map(|found| found.line).collect()
+    }
+
+    #[test]
+    fn a_phrase_is_found_in_any_case_and_across_lines() {
+        assert_eq!(lines("a.md", "one\nQuite so, verily"), [2, 2]);
+        assert_eq!(lines("a.rs", "/// It is quite\n    /// so.\nfn f() {}"), [1]);
+        assert_eq!(lines("a.rs", "f(\"is quite \\\n   so\");"), [1]);
+        assert_eq!(lines("a.js", "/** is quite\n * so */"), [1]);
+    }
+
+    #[test]
+    fn punctuation_and_longer_words_separate() {
+        assert!(lines("a.md", "quite, so; quite (so) quite sore, unverily").is_empty());
+        assert!(lines("a.md", "quite\n\nso").is_empty(), "a paragraph ends");
+    }
+
+    #[test]
+    fn code_is_no_prose() {
+        assert!(lines("a.rs", "for verily in verily { let c = '\"'; quite(so) }").is_empty());
+        assert_eq!(lines("a.rs", "let c = '\"'; // verily\nlet r = r#\"a \"verily\" \"#;"), [1, 2]);
+        assert_eq!(lines("a.rs", "fn f<'a>(x: &'a str) {} /* verily /* so */ verily */"), [1, 1]);
+        assert_eq!(lines("a.rs", "let s = b\"verily\\\\\"; verily(); let t = \"\\\"verily\";"), [1, 1]);
+    }
+
+    #[test]
+    fn other_files_are_not_read() {
+        assert!(prose::reader("picture.png").is_none() && prose::reader("Cargo.lock").is_none());
+    }
+
+    #[test]
+    fn a_message_says_where_what_and_what_instead() {
+        let words = prose::reader("a.md").expect("a kind of file with prose")("x\nverily");
+        let found = phrases(&words, &LIST);
+        assert_eq!(found[0].message("docs/a.md"), "docs/a.md:2: \"verily\": write \"indeed\" (younger)");
+    }
+
+    #[test]
+    fn only_the_first_line_of_a_doc_comment_is_an_opening() {
+        let text = "//! What it is.\n\n/// Returns it.\n/// What follows.\nfn f() {}\n    /// Whether so.\n/// Whatever.";
+        assert_eq!(openings(text), [(1, "What"), (6, "Whether")]);
+        assert_eq!(openings("// What is it?\n/// Whatever it is, it is returned."), []);
+    }
+
+    #[test]
+    fn the_list_is_lower_case_and_holds_no_phrase_twice() {
+        for (at, phrase) in list::PHRASES.iter().enumerate() {
+            assert_eq!(phrase.banned, phrase.banned.to_lowercase());
+            assert!(!phrase.plain.is_empty() && !phrase.why.is_empty(), "{}", phrase.banned);
+            assert!(
+                list::PHRASES[..at].iter().all(|other| other.banned != phrase.banned),
+                "{}",
+                phrase.banned
+            );
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! The phrases that the project does not use, what it writes instead, and why.
+//!
+//! A phrase is added once it is gone from the repository, and only where it is wrong in every sentence.
+
+/// A phrase: words in lower case, one blank apart.
+pub(super) struct Phrase {
+    pub(super) banned: &'static str,
+    pub(super) plain: &'static str,
+    pub(super) why: &'static str,
+}
+
+const fn phrase(banned: &'static str, plain: &'static str, why: &'static str) -> Phrase {
+    Phrase { banned, plain, why }
+}
+
+const WORD_ORDER: &str = "the number follows it: at least 3";
+const NO_NUMBER: &str = "say what the thing is not: not finite, not a record, does not exist";
+
+pub(super) const PHRASES: [Phrase; 9] = [
+    phrase("at the least", "at least", WORD_ORDER),
+    phrase("at the most", "at most", WORD_ORDER),
+    phrase("is for good", "is permanent", "it also reads as praise"),
+    phrase("gone for good", "permanently gone", "it also reads as praise"),
+    phrase("low for good", "always low", "it also reads as praise"),
+    phrase("nought", "zero", "one word for one number"),
+    phrase("tells apart", "distinguishes", "the verb is distinguish"),
+    phrase("that is none", "that does not exist", NO_NUMBER),
+    phrase("that are none", "that are not", NO_NUMBER),
+];
+
+/// Words that do not open the first sentence of a doc comment: it says what is returned, true or stored.
+pub(super) const OPENINGS: [&str; 5] = ["What", "Whether", "How", "Where", "Of"];
+
+/// Folders and files whose doc comments still open otherwise; a clean one leaves this list.
+pub(super) const STILL_TO_CLEAN: [&str; 6] =
+    ["control-core/", "diagnosis/", "firmware/", "host-sim/", "proof/", "tests/"];
