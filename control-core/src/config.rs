@@ -110,7 +110,7 @@ pub struct Patient {
 /// Resolution of the converter that drives the amplifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DacWidth {
-    /// DAC0800, as in seed 001.
+    /// DAC0800, as in Paper 001.
     Bits8,
     /// The microcontroller's own.
     Bits12,
@@ -164,7 +164,7 @@ pub enum SpeedMethod {
 }
 
 impl Default for Device {
-    /// A 10 mm roller on the motor and encoder of seed 001, a 12-bit converter: the virtual device, which is known to be so.
+    /// A 10 mm roller on the motor and encoder of Paper 001, a 12-bit converter: the virtual device, which is known to be so.
     fn default() -> Self {
         let mm = |whole: i32| Millimetres(I16F16::from_bits(whole << 16));
         // 28.8 mN·m.

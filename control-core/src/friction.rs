@@ -1,4 +1,4 @@
-//! Friction along the needle inside tissue (seed 001, eq. 2): as printed, as a clamped proxy that holds, and as one with a static and a
+//! Friction along the needle inside tissue (Paper 001, eq. 2): as printed, as a clamped proxy that holds, and as one with a static and a
 //! dynamic level.
 
 use crate::math::{exp, saturating_multiply, saturating_product, truncating_product};

@@ -4,7 +4,7 @@
 use crate::units::Millimetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
-/// Where the needle is held to. P_curr_f of seed 001's eq. 2, the tracking wall of seed 002.
+/// Where the needle is held to. P_curr_f of Paper 001's eq. 2, the tracking wall of Paper 002.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Anchor {
     /// Finer than a depth: an anchor that comes after the needle does so by shares of a thousandth and less.

@@ -74,7 +74,7 @@ pub struct Wall {
     pub spring_back: I16F16,
 }
 
-/// `f(T) = (T − vertex)²/compliance + base` (seed 001, eq. 1).
+/// `f(T) = (T − vertex)²/compliance + base` (Paper 001, eq. 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parabola {
     /// n: travel past contact at which the parabola turns.

@@ -60,7 +60,7 @@ quantity!(
     "N·s/mm"
 );
 quantity!(
-    /// Compliance `a` of the jog effect in mm²/N (seed 001, eq. 1).
+    /// Compliance `a` of the jog effect in mm²/N (Paper 001, eq. 1).
     JogCompliance(I16F16),
     "mm²/N"
 );

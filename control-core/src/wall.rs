@@ -1,4 +1,4 @@
-//! The jog effect of a wall (seed 001, eq. 1): it resists along a rising parabola, gives way, and relieves along a
+//! The jog effect of a wall (Paper 001, eq. 1): it resists along a rising parabola, gives way, and relieves along a
 //! falling one that is felt only while the tip cuts on.
 
 use crate::math::{saturating_product, truncating_product, upper_half};

@@ -1,4 +1,4 @@
-//! The law of seed 002 against its floating-point twin, written from the equations, and what a hand would notice of it.
+//! The law of Paper 002 against its floating-point twin, written from the equations, and what a hand would notice of it.
 
 mod needle;
 

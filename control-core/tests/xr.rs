@@ -1,4 +1,4 @@
-//! The force table of seed 000 against its floating-point twin, and what a hand would notice of it.
+//! The force table of Paper 000 against its floating-point twin, and what a hand would notice of it.
 
 mod needle;
 

@@ -27,7 +27,7 @@ pub trait ByteBus {
     fn put(&mut self, byte: u8);
 }
 
-/// A DAC0800 or the like on eight lines, as in seed 001.
+/// A DAC0800 or the like on eight lines, as in Paper 001.
 pub struct ParallelDac<B>(pub B);
 
 impl<B: ByteBus> MotorDac for ParallelDac<B> {

@@ -104,7 +104,7 @@ fn the_first_commands_run_as_they_stand() {
 #[test]
 fn the_worked_example_finds_what_was_hidden_and_prints_what_the_guide_says() {
     let dir = folder("guide-example");
-    let blocks = blocks(GUIDE, "## One example to run");
+    let blocks = blocks(GUIDE, "## A complete example");
     let [commands, printed] = &blocks[..] else { panic!("{blocks:?}") };
     let said = run_in(&dir, commands);
     let (words, figures) = words_and_figures(printed);

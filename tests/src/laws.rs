@@ -49,13 +49,13 @@ fn with_layers(count: usize) -> Config {
     config
 }
 
-/// The law of seed 002 in all its layers.
+/// The law of Paper 002 in all its layers.
 #[must_use]
 pub fn shoulder() -> Config {
     sparte(MAX_LAYERS)
 }
 
-/// The law of seed 002 in the first `count` of its layers.
+/// The law of Paper 002 in the first `count` of its layers.
 #[must_use]
 pub fn sparte(count: usize) -> Config {
     let mut config = with_layers(count);
@@ -78,7 +78,7 @@ pub fn sparte(count: usize) -> Config {
     config
 }
 
-/// The law of seed 000 with as large a table as there may be.
+/// The law of Paper 000 with as large a table as there may be.
 #[must_use]
 pub fn phantom() -> Config {
     xr(MAX_LAYERS)

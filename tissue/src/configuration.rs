@@ -14,7 +14,7 @@ pub struct Layer {
     pub top_mm: f32,
     /// Its thickness, mm.
     pub thickness_mm: f32,
-    /// Distance between particles along the skin, mm: L₀ of seed 000's Table 1.
+    /// Distance between particles along the skin, mm: L₀ of Paper 000's Table 1.
     pub spacing_mm: f32,
     /// Rows of cells through its thickness.
     pub rows: usize,
@@ -163,11 +163,11 @@ impl Default for Configuration {
 }
 
 impl Configuration {
-    /// Seed 000: skin, vessel, skin, with the values of its Table 1. They have no unit there; L₀ is taken as metres (10, 15 and
+    /// Paper 000: skin, vessel, skin, with the values of its Table 1. They have no unit there; L₀ is taken as metres (10, 15 and
     /// 12 mm between particles), V₀ as a share of the volume as built, the bending angles as angles between planes, 180° being
     /// flat. The vessel's 0° is a wall folded on itself: taken literally and made weak, it is a vessel that tends to collapse
     /// (the table's "low-stiffness vascular response"). Thicknesses, stiffnesses and the depths at which walls give way are ours.
-    pub fn seed_000() -> Self {
+    pub fn paper_000() -> Self {
         let layer = |name: &str, top_mm, thickness_mm, l0_m: f32, v0, theta_deg, stiffness_kpa| Layer {
             name: name.into(),
             top_mm,

@@ -32,7 +32,7 @@ pub trait Constraint {
     fn violation(&self, points: &[Point]) -> (f32, f32);
 }
 
-/// `C = |x_a − x_b| − L₀`, seed 000.
+/// `C = |x_a − x_b| − L₀`, Paper 000.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
     /// The two particles.
@@ -73,7 +73,7 @@ impl Constraint for Distance {
     }
 }
 
-/// `C = V − V₀` of a tetrahedron, seed 000; V is signed, so that one turned inside out turns back.
+/// `C = V − V₀` of a tetrahedron, Paper 000; V is signed, so that one turned inside out turns back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
     /// The four corners.
@@ -135,8 +135,8 @@ impl Constraint for Volume {
     }
 }
 
-/// `C = θ − θ₀` of two triangles that share an edge, seed 000. θ is the angle between their normals in rad, signed: 0 is flat.
-/// Seed 000's angle is the one between the planes, 180° where they are flat: θ₀ = π − it.
+/// `C = θ − θ₀` of two triangles that share an edge, Paper 000. θ is the angle between their normals in rad, signed: 0 is flat.
+/// Paper 000's angle is the one between the planes, 180° where they are flat: θ₀ = π − it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bending {
     /// The two ends of the edge, then the two corners beside it.

@@ -152,8 +152,8 @@ fn a_wall_waits_for_the_device_where_the_device_decides() {
 }
 
 #[test]
-fn table_1_of_seed_000_is_a_configuration_that_holds_its_values_and_is_pierced_layer_by_layer() {
-    let configuration = Configuration::seed_000();
+fn table_1_of_paper_000_is_a_configuration_that_holds_its_values_and_is_pierced_layer_by_layer() {
+    let configuration = Configuration::paper_000();
     let table: Vec<_> =
         configuration.layers.iter().map(|l| (l.spacing_mm, l.volume_ratio, l.bending_deg)).collect();
     assert_eq!(table, [(10.0, 1.0, Some(180.0)), (15.0, 0.8, Some(0.0)), (12.0, 1.0, Some(180.0))]);

@@ -16,7 +16,7 @@ pub struct Medium {
 /// Speed that every machine assumes, m/s.
 pub const ASSUMED_SPEED: f32 = 1540.0;
 
-/// Impedance, attenuation and speed of blood, fat, muscle and bone: the table in the design notes (`force-models`).
+/// Impedance, attenuation and speed of blood, fat, muscle and bone: textbook values.
 pub const BLOOD: Medium = Medium { impedance: 1.61, attenuation: 0.18, speed: 1570.0, speckle_db: -34.0 };
 /// See [`BLOOD`].
 pub const FAT: Medium = Medium { impedance: 1.38, attenuation: 0.63, speed: 1450.0, speckle_db: -8.0 };
@@ -24,7 +24,7 @@ pub const FAT: Medium = Medium { impedance: 1.38, attenuation: 0.63, speed: 1450
 pub const MUSCLE: Medium = Medium { impedance: 1.70, attenuation: 1.09, speed: 1580.0, speckle_db: 0.0 };
 /// See [`BLOOD`].
 pub const BONE: Medium = Medium { impedance: 7.80, attenuation: 5.0, speed: 4080.0, speckle_db: 3.0 };
-/// Skin: density 1109 kg/m³ × 1624 m/s; an assumption of ours, the design notes give none.
+/// Skin: density 1109 kg/m³ × 1624 m/s; our assumption.
 pub const SKIN: Medium = Medium { impedance: 1.80, attenuation: 1.8, speed: 1624.0, speckle_db: 5.0 };
 /// Tendon: our assumption, between muscle and skin.
 pub const TENDON: Medium = Medium { impedance: 1.84, attenuation: 1.5, speed: 1650.0, speckle_db: 7.0 };

@@ -1,4 +1,4 @@
-//! The floating-point twin of the whole tick, written from the equations (seed 001 and the force laws of the design), not
+//! The floating-point twin of the whole tick, written from the equations (Paper 001 and the force laws of the design), not
 //! from the fixed-point code. It takes the configuration's own quantised values as exact.
 
 use control_core::TickOutput;

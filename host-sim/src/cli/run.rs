@@ -84,11 +84,11 @@ pub(crate) struct Run {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ModelName {
-    /// The jog effect and friction cone of the venepuncture device, seed 001.
+    /// The jog effect and friction cone of the venepuncture device, Paper 001.
     Jog,
-    /// Tracking walls and LuGre friction of the joint injection simulator, seed 002.
+    /// Tracking walls and LuGre friction of the joint injection simulator, Paper 002.
     Sparte,
-    /// The fitted force table of the layered-tissue simulator, seed 000.
+    /// The fitted force table of the layered-tissue simulator, Paper 000.
     Xr,
 }
 

@@ -12,11 +12,11 @@ use serde::Deserialize;
 /// The law of force, by the name that `--model` has for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// The jog effect and friction cone of the venepuncture device (seed 001).
+    /// The jog effect and friction cone of the venepuncture device (Paper 001).
     Jog,
-    /// Tracking walls and LuGre friction of the joint injection simulator (seed 002).
+    /// Tracking walls and LuGre friction of the joint injection simulator (Paper 002).
     Sparte,
-    /// The fitted force table of the layered-tissue simulator (seed 000).
+    /// The fitted force table of the layered-tissue simulator (Paper 000).
     Xr,
 }
 

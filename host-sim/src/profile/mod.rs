@@ -172,7 +172,7 @@ pub fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
     Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
 }
 
-/// `(T − n)²/a + b` of seed 001, eq. 1, in N; `travel_mm` is T.
+/// `(T − n)²/a + b` of Paper 001, eq. 1, in N; `travel_mm` is T.
 fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
     let from_vertex = travel_mm - parabola.vertex.0.to_num::<f64>();
     from_vertex * from_vertex / parabola.compliance.0.to_num::<f64>() + parabola.base.0.to_num::<f64>()
@@ -230,7 +230,7 @@ struct Vessel {
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
-    /// Whether the needle is to spare it; without it, what seed 002 has trainees avoid: tendon and cartilage.
+    /// Whether the needle is to spare it; without it, what Paper 002 has trainees avoid: tendon and cartilage.
     spare: Option<bool>,
     depth_mm: f64,
     /// What makes it as thick as it is; what lies below moves with it.
@@ -238,7 +238,7 @@ struct Layer {
     wall: Option<Wall>,
     /// Of the jog law.
     friction_n_per_mm: Option<f64>,
-    /// Of the law of seed 002.
+    /// Of the law of Paper 002.
     cutting: Option<law::Cut>,
 }
 

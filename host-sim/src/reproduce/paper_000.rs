@@ -91,7 +91,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     sheet.heading("Table 1");
     sheet.paragraph(
         "Constraints of the tissue's picture, as the paper prints them. It gives no unit to L₀, no compliance, no count of particles and no time \
-         step; its bending values are rest angles. They are one of the configurations of the tissue picture (`seed_000` in the folder tissue), where L₀ is \
+         step; its bending values are rest angles. They are one of the configurations of the tissue picture (`paper_000` in the folder tissue), where L₀ is \
          taken as metres between particles and V₀ as a share of the volume as built, and no part of the force.",
     );
     let cells = |name: &str, values: [&str; 3]| {

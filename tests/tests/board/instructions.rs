@@ -28,7 +28,7 @@ const LONGEST: u32 = 840;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_060;
 const EXCITING: u32 = 910;
-/// What a tick of the laws of seeds 002 and 000 may take.
+/// What a tick of the laws of Papers 002 and 000 may take.
 const OTHER_LAWS: u32 = 1_260;
 /// With all that can be fed forward.
 const COMPENSATED: u32 = 1_260;
