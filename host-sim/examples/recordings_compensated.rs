@@ -1,9 +1,9 @@
-//! What feeding forward would take from the forces of real machines, by calculation: diagnosed from recordings to fit, judged on
-//! recordings that were held out, beside a raw map of the same recordings.
+//! The predicted effect of feedforward on the forces of real machines: diagnosed from recordings to fit, judged on
+//! recordings that were held out, compared with a raw map of the same recordings.
 //!
-//!     cargo run --release -p host-sim --example recordings_compensated -- ../shared/recordings [CASE…]
+//!     cargo run --release -p host-sim --example recordings_compensated -- RECORDINGS [CASE…]
 //!
-//! A case is `emps`, `anticogging` or a folder of `machines`. The force that a machine needs beside its inertia is
+//! A case is `emps`, `anticogging` or a folder of `machines`. `docs/recordings.md` says where they come from. The force that a machine needs apart from its inertia is
 //! `gain·u − J·a + external`; what is fed forward is the law of `docs/compensation.md` with the usual gains, in floating point. The raw map is
 //! the mean of that force over 64 places of a turn (or of the travel) and both directions, at a gain of 1. Neither knows where a
 //! held-out recording begins: the place is fitted on its first two fifths, and the rest judges. Rows that hardly move do not count.
@@ -162,7 +162,7 @@ fn placed(rows: &[Row], span: f64, force: impl Fn(&Row, f64) -> f64) -> f64 {
     shifts.map(|shift| (left(shift), shift)).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |best| best.1)
 }
 
-/// What would be fed forward, N·m or N, for a machine that was found to be `rig`.
+/// Returns the force that a machine found to be `rig` would feed forward, N·m or N.
 fn fed_forward(rig: &Rig, row: &Row, shift: f64) -> f64 {
     let model = &rig.model;
     let mut dry = [model.coulomb.unwrap_or(0.0); 2];

@@ -25,7 +25,7 @@ pub struct Bedside {
 #[derive(Clone, Debug)]
 struct Asked {
     profile: Profile,
-    /// What the scripted hand does in it, where it does anything else than before.
+    /// The procedure of the scripted hand in it, if it differs from the default.
     procedure: Option<String>,
 }
 
@@ -86,13 +86,13 @@ impl Bedside {
         self.asked = None;
     }
 
-    /// What a picture needs to know of the patient that counts.
+    /// Returns the scene of the active patient.
     pub fn scene(&self) -> Scene {
         let procedure = self.setup.procedure.clone();
         self.profile.scene(self.source.clone(), procedure)
     }
 
-    /// What the scripted hand does in the patient that counts.
+    /// Returns the procedure of the scripted hand in the active patient.
     pub fn procedure(&self) -> Option<Procedure> {
         self.procedure.as_ref().and_then(|wanted| hand(wanted, &self.profile).ok())
     }
@@ -118,7 +118,7 @@ impl Bedside {
     }
 }
 
-/// What was asked of the hand, or where that has no sense in this patient, what the patient's file says.
+/// Returns the requested procedure or, if it makes no sense in this patient, the one that the patient's file names.
 fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Failure> {
     Procedure::find(wanted, profile)
         .or_else(|cause| Procedure::find(&profile.procedure, profile).map_err(|_| cause))

@@ -61,7 +61,7 @@ impl Listener for BoundedListener {
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
-    /// When it has been silent for too long.
+    /// The time at which it has been silent for too long.
     over: Pin<Box<Sleep>>,
     silence: Duration,
     _place: OwnedSemaphorePermit,

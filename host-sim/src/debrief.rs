@@ -17,7 +17,7 @@ use std::rc::Rc;
 /// One insertion with all that is drawn of it.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// Which file, and which insertion of it.
+    /// The file, and the number of the insertion in it.
     pub name: String,
     /// Its figures.
     pub figures: Insertion,
@@ -189,7 +189,7 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
     ]
 }
 
-/// What a teacher would say.
+/// Returns a teacher's comments.
 fn in_words(one: &Insertion) -> Vec<String> {
     let mut words = Vec::new();
     if one.through_far_wall {

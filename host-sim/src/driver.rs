@@ -20,7 +20,7 @@ pub const REPEAT: Duration = Duration::from_millis(100);
 /// A device that sends no samples for this long has started anew or is gone: hello again.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
-/// What a person may ask of any device.
+/// The requests that a person may make of any device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Power up.
@@ -35,9 +35,9 @@ pub enum Request {
     Patient(Box<Patient>),
     /// Another device's part.
     Device(Box<Device>),
-    /// What the device is configured with was found by commissioning it.
+    /// Mark the device's configuration as found by commissioning.
     Commission,
-    /// Which device's part is in force.
+    /// Report the device's part in force.
     ReportDevice,
     /// Other gains of the compensation.
     Compensate(Gains),
@@ -62,7 +62,7 @@ pub struct Driver {
     last_heartbeat: Option<Duration>,
     notice: Option<String>,
     refused: Option<String>,
-    /// What became of the last other patient that was asked for.
+    /// The answer to the last request for another patient.
     changed: Option<Result<(), String>>,
     out: Vec<u8>,
 }
@@ -169,7 +169,7 @@ impl Driver {
         }
     }
 
-    /// What to send now.
+    /// Returns the bytes to send now.
     pub fn transmit(&mut self, now: Duration) -> &[u8] {
         self.out.clear();
         if !self.open {
@@ -193,38 +193,38 @@ impl Driver {
         &self.out
     }
 
-    /// What has arrived and what has not.
+    /// Returns the counts of frames that arrived and that did not.
     pub fn counts(&self) -> Counts {
         self.reception.counts()
     }
 
-    /// Whether the device has taken its configuration and sends samples.
+    /// True if the device has taken its configuration and sends samples.
     pub fn is_ready(&self, now: Duration) -> bool {
         self.ready && now.saturating_sub(self.last_samples) <= SILENCE
     }
 
-    /// Whether the device has ever taken a start.
+    /// True if the device has ever accepted a start.
     pub fn has_started(&self) -> bool {
         self.has_started
     }
 
-    /// Whether a start is on its way.
+    /// True if a start is on its way.
     pub fn is_starting(&self) -> bool {
         let pending = self.pending.iter().map(|pending| &pending.command);
         self.waiting.iter().chain(pending).any(|command| matches!(command, Command::Start))
     }
 
-    /// What a person should know: why the last thing asked for was refused.
+    /// Returns a notice for a person: why the last request was refused.
     pub fn notice(&self) -> Option<&str> {
         self.notice.as_deref()
     }
 
-    /// Why this device will never do with this configuration, where it said so.
+    /// Returns the reason why this device can never run this configuration, if it gave one.
     pub fn refused(&self) -> Option<&str> {
         self.refused.as_deref()
     }
 
-    /// Whether the other patient that was asked for has been taken, once it is known; why not, where it was refused.
+    /// Returns once the answer to the request for another patient: taken, or refused for a reason.
     pub fn take_change(&mut self) -> Option<Result<(), String>> {
         self.changed.take()
     }

@@ -1,13 +1,13 @@
-//! What a person meets when something cannot be done: one sentence and an exit status.
+//! The failures that a person meets: one sentence and an exit status.
 
 use std::fmt;
 
 /// One sentence that says what is wrong, where, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// What was given cannot be used: exit status 2.
+    /// Unusable input: exit status 2.
     Input(String),
-    /// What was asked for did not work out: exit status 1.
+    /// A request that could not be carried out: exit status 1.
     Failed(String),
 }
 

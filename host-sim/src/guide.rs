@@ -35,7 +35,7 @@ struct State {
     steps: Vec<Step>,
     reading: Option<Reading>,
     end: Option<End>,
-    /// What the page has agreed to: the number of steps.
+    /// The number of steps that the page has agreed to.
     #[serde(skip)]
     agreed: usize,
     #[serde(skip)]
@@ -46,7 +46,7 @@ struct State {
 #[derive(Clone, Debug, Serialize)]
 struct Step {
     text: String,
-    /// Whether the motor moves in it.
+    /// True if the motor moves in it.
     moves: bool,
     stage: Stage,
 }
@@ -59,7 +59,7 @@ enum Stage {
     Done,
 }
 
-/// What the device reads, for a person who turns or tilts it.
+/// The device's readings, for a person who turns or tilts it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reading {
     /// Encoder's counts since the device was switched on.
@@ -116,7 +116,7 @@ impl Guide {
         Ok(())
     }
 
-    /// What the device reads now.
+    /// Sets the device's present readings.
     pub fn read(&self, reading: Reading) {
         self.lock().reading = Some(reading);
     }
@@ -135,7 +135,7 @@ impl Guide {
         drop(self.wait(state, |state| state.left));
     }
 
-    /// What a page is told: everything, as often as it looks.
+    /// Returns the messages for a page: the whole state, each time it looks.
     pub fn watches(&self) -> Watches {
         let guide = self.clone();
         Arc::new(move || -> Watch {
@@ -144,7 +144,7 @@ impl Guide {
         })
     }
 
-    /// What a page says; nonsense is refused.
+    /// Returns the handler of a page's messages; malformed ones are refused.
     pub fn said(&self) -> Said {
         let guide = self.clone();
         Arc::new(move |text| {

@@ -9,7 +9,7 @@ use std::path::Path;
 pub struct Text {
     /// The file, or the built-in name.
     pub origin: String,
-    /// What is in it.
+    /// Its text.
     pub text: String,
 }
 

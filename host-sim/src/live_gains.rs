@@ -1,5 +1,5 @@
-//! How much of a device's compensation is in force, for a person who feels the difference. Until the device is configured or restarted:
-//! what it has stored stays as it is.
+//! The share of a device's compensation that is active, adjustable while a person feels the difference. It lasts until the device is configured or restarted:
+//! the stored gains do not change.
 
 use control_core::Device;
 use control_core::compensation::{Gain, Gains};
@@ -12,7 +12,7 @@ pub struct LiveGains {
 }
 
 impl LiveGains {
-    /// What the device says of itself: it has all of its gains in force.
+    /// Takes the device's own report: all of its gains are active.
     pub fn learn(&mut self, device: &Device) {
         self.stored = device.compensation.is_some().then_some(device.compensation.gains);
         self.share = 1.0;

@@ -10,7 +10,7 @@ use crate::tally::Tally;
 use link::frames::{self, DeviceFrame};
 use std::time::Duration;
 
-/// What a page is told while there is no device.
+/// The notice for a page while there is no device.
 const WAITING: &str = "no answer from the device; waiting for it";
 
 /// Everybody who wants what arrives.

@@ -1,18 +1,18 @@
-//! How fast a simulated device runs: with the clock on the wall, or as fast as it goes.
+//! The speed of a simulated device: real time, or as fast as possible.
 
 use std::time::{Duration, Instant};
 
 /// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught up with.
 const LARGEST_LAG: Duration = Duration::from_millis(200);
 
-/// How fast a simulated device runs.
+/// The speed of a simulated device.
 #[derive(Clone, Copy, Debug)]
 pub enum Pace {
     /// As fast as it goes.
     Free,
     /// With the clock on the wall.
     RealTime {
-        /// Where the device's own time began.
+        /// The beginning of the device's own time.
         zero: Instant,
     },
 }

@@ -6,12 +6,12 @@ use std::fmt::Write as _;
 
 /// The smallest and the largest number of lines in a picture.
 const LINES: (f64, f64) = (8.0, 26.0);
-/// How much a line stands for, mm, unless that makes too few lines or too many.
+/// The depth of a line, mm, unless that makes too few lines or too many.
 const MM_PER_LINE: f64 = 0.5;
 /// Columns of tissue.
 const COLUMNS: usize = 18;
 
-/// Who `profile` is and what lies under its skin.
+/// Returns a description of the patient of `profile` and a picture of the layers.
 pub fn picture(profile: &Profile) -> String {
     let scene = profile.scene(Source::Virtual, None);
     let mut out = format!("{}\n", profile.name);
@@ -22,7 +22,7 @@ pub fn picture(profile: &Profile) -> String {
     out
 }
 
-/// What the profile's file says of the patient beside the tissue: its single values, and those of its tables without layers.
+/// Returns the file's statements about the patient apart from the tissue: its single values, and those of its tables without layers.
 fn about(profile: &Profile) -> Vec<String> {
     let table: toml::Table = profile.source.text.parse().unwrap_or_default();
     let words = |table: &toml::Table| {

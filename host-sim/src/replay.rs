@@ -7,7 +7,7 @@ use control_core::TICK_HZ;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long to sleep between looks at the clock.
+/// The sleep between looks at the clock.
 const NAP: Duration = Duration::from_millis(5);
 /// A gap in the ticks that is longer than this is skipped: 1 s.
 const LONGEST_GAP: u64 = TICK_HZ as u64;
@@ -177,7 +177,7 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Whether a device began anew, or was silent for so long that nobody waits for it.
+/// True if the device restarted, or was silent for too long to wait for.
 fn is_jump(last: u64, tick: u64) -> bool {
     tick + LONGEST_GAP < last || tick > last + LONGEST_GAP
 }
@@ -186,7 +186,7 @@ fn seconds(ticks: u64) -> f64 {
     ticks as f64 / f64::from(TICK_HZ)
 }
 
-/// When each message is played, in ticks from the beginning, never falling; and how long all takes.
+/// Returns the tick from the beginning at which each message is played, never falling, and the whole length.
 fn times(messages: &[Message]) -> (Vec<u64>, u64) {
     let (mut now, mut last) = (0, None);
     let times = messages

@@ -19,11 +19,11 @@ use std::time::{Duration, Instant};
 const LOCKSTEP_TICKS: u64 = 10;
 /// A port that could not be opened is tried again after this.
 const RETRY: Duration = Duration::from_millis(300);
-/// How long to wait for the device in one go: short enough for heartbeats and a quick answer to a person.
+/// The longest single wait for the device: short enough for heartbeats and a quick answer to a person.
 const PATIENCE: Duration = Duration::from_millis(2);
 /// A device that has never become ready after this is not one.
 const FIRST_ANSWER: Duration = Duration::from_secs(5);
-/// How much longer than asked for a run with gaps in it may take.
+/// The extra time for a run with gaps in it.
 const GRACE: Duration = Duration::from_secs(3);
 
 /// A run in progress.
@@ -33,19 +33,19 @@ pub struct Station<'a> {
     /// Set from outside (Ctrl-C) to end the run in good order.
     stop: &'a AtomicBool,
     was_ready: bool,
-    /// Whether this device, since it is connected, has been asked how it is configured.
+    /// True if this device has been asked for its configuration since it was connected.
     has_asked: bool,
     /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
     person_starts: bool,
     /// The tip is at depth 0 when it is started for the first time.
     zeroes_first: bool,
-    /// Where the patient may be changed.
+    /// The patient, if it may be changed.
     bedside: Option<Bedside>,
-    /// Where insertions are judged while somebody looks.
+    /// The practice that judges insertions while somebody looks.
     practice: Option<Practice>,
 }
 
-/// What a run came to.
+/// The totals of a run.
 pub struct Outcome {
     /// Totals of the link.
     pub link: link::host::Counts,

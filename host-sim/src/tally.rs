@@ -1,4 +1,4 @@
-//! What a run comes to: samples, punctures, the largest force. Counts exactly as many samples as were asked for.
+//! The totals of a run: samples, punctures, the largest force. It counts exactly the requested number of samples.
 
 use crate::recording::messages::Hello;
 use control_core::controller::Sample;
@@ -27,7 +27,7 @@ impl Tally {
         Self { limit, ..Self::default() }
     }
 
-    /// Who speaks from now on.
+    /// Sets the scale of the device that sends from now on.
     pub fn hello(&mut self, hello: Hello) {
         self.scale = Some(hello);
     }
@@ -54,7 +54,7 @@ impl Tally {
         }
     }
 
-    /// Whether all that were asked for have been taken.
+    /// True if all requested samples have been taken.
     pub fn is_full(&self) -> bool {
         self.limit.is_some_and(|limit| self.samples >= limit)
     }

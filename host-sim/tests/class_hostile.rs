@@ -125,7 +125,7 @@ fn flood(number: u64) -> (String, Vec<u8>) {
     (format!("flood-{}/pose", number % 5_000), pose.into_bytes())
 }
 
-/// How long the page took to come; none where it did not.
+/// Returns the time in which the page loads; `None` if it does not.
 fn page_takes(page: SocketAddr) -> Option<Duration> {
     let begin = Instant::now();
     let mut stream = TcpStream::connect_timeout(&page, PAGE_PATIENCE).ok()?;

@@ -45,7 +45,7 @@ fn jog(parabola: &toml::Value, travel_mm: f64) -> f64 {
     from_vertex * from_vertex / number(parabola, &["compliance_mm2_per_n"]) + number(parabola, &["base_n"])
 }
 
-/// Where a layer begins along the needle.
+/// Returns the depth of a layer along the needle, mm.
 fn top_mm(layer: &toml::Value) -> f64 {
     number(layer, &["depth_mm"]) / ANGLE_RAD.sin()
 }

@@ -47,7 +47,7 @@ fn every_fault_rejection_and_failure_to_save_stands_in_the_glossary_word_for_wor
     }
 }
 
-/// What the glossary calls a refusal. Whoever adds one sees it here.
+/// Returns the glossary's name of a refusal. A new refusal needs one here.
 fn called(refusal: Refusal) -> &'static str {
     match refusal {
         Refusal::OutOfRange { .. } => "out of range",

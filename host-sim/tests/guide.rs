@@ -10,7 +10,7 @@ use std::process::Command;
 
 const TRAINING: &str = include_str!("../../docs/training.md");
 const GUIDE: &str = include_str!("../../docs/diagnosis.md");
-/// How far a figure of the guide may be from what is printed, as a ratio.
+/// The largest difference between a figure of the guide and the printed one, as a ratio.
 const FIGURES_WITHIN: f64 = 0.2;
 
 /// The indented blocks of a section of a guide, without their indent.
@@ -126,7 +126,7 @@ fn the_worked_example_finds_what_was_hidden_and_prints_what_the_guide_says() {
     assert!(dir.join("report/patched-rig.xml").exists() && dir.join("simulated/simulation.html").exists());
 }
 
-/// Whether the guide quotes a line, told by its first words.
+/// True if the guide quotes a line, identified by its first words.
 fn line_is_quoted(line: &str, quoted: &str) -> bool {
     let begin: Vec<&str> = line.split_whitespace().take(4).collect();
     let begin = begin.join(" ");

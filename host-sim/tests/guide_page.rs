@@ -16,7 +16,7 @@ fn guide() -> (Guide, Arc<AtomicBool>) {
     (Guide::new("Commissioning", "virtual", stop.clone()), stop)
 }
 
-/// What a page that comes now is told.
+/// Returns the message to a page that opens now.
 fn told(guide: &Guide) -> Value {
     let text = guide.watches()()().expect("there is always something to tell");
     serde_json::from_str(&text).expect("JSON")

@@ -93,7 +93,7 @@ fn attack(listeners: &[(SocketAddr, &str)]) -> Vec<usize> {
     rounds
 }
 
-/// Whether something is sent to a well-behaved client.
+/// True if a well-behaved client receives something.
 fn is_served(address: SocketAddr, greeting: &[u8]) -> bool {
     (0..200).any(|_| {
         std::thread::sleep(Duration::from_millis(50));

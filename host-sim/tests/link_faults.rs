@@ -1,4 +1,4 @@
-//! What becomes of torque when the link goes wrong: silence, a pulled cable, lost and damaged bytes, a PC that comes back.
+//! The torque when the link fails: silence, a pulled cable, lost and damaged bytes, a PC that comes back.
 
 use host_sim::device::virtual_device::VirtualDevice;
 use host_sim::driver::{Driver, Request};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// What stands between backquotes in a line.
+/// Returns the texts between backquotes in a line.
 fn quoted(line: &str) -> impl Iterator<Item = &str> {
     line.split('`').skip(1).step_by(2)
 }

@@ -1,4 +1,4 @@
-//! What a teacher asks for, from the command line: scores, a debrief, patients, the papers.
+//! A teacher's tasks on the command line: scores, a debrief, patients, the papers.
 
 mod common;
 

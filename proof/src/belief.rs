@@ -3,7 +3,7 @@
 
 use crate::judge::Record;
 
-/// What is believed of a case.
+/// The expected answer to a case.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Belief {
     /// The first name has to be one of these.
@@ -19,7 +19,7 @@ const NONE: &str = "none";
 /// No name at all.
 const ABSTAIN: &str = "abstain";
 
-/// What became of a case.
+/// The judgement of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Outcome {
     /// The first name is right and none is false.
@@ -102,12 +102,12 @@ impl Belief {
         self.right.join(" or ")
     }
 
-    /// Whether a name, or its class, is right or acceptable.
+    /// True if a name, or its class, is right or acceptable.
     pub(crate) fn allows(&self, name: &str, class: &[String]) -> bool {
         holds(&self.right, name, class) || holds(&self.acceptable, name, class)
     }
 
-    /// What became of the case.
+    /// Judges the case.
     pub(crate) fn judge(&self, record: &Record) -> Outcome {
         let Ok(answer) = &record.answer else { return Outcome::Refused };
         if let Some(first) = answer.effects.first() {

@@ -15,7 +15,7 @@ use crate::rivals;
 use crate::scratch::Scratch;
 use crate::tool::{self, Tool, ask};
 
-/// What a folder held, with the answers.
+/// The contents of a folder, with the answers.
 #[derive(Debug, Default)]
 pub(crate) struct Judged {
     pub(crate) records: Vec<Record>,

@@ -35,7 +35,7 @@ const POOR: [(&str, &[Kind]); 10] = [
     ("asymmetric_friction", &[Kind::Staircase]),
 ];
 
-/// How many of what.
+/// The number of cases of each kind.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Amounts {
     /// Draws of each effect at each strength.

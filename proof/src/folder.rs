@@ -9,7 +9,7 @@ use crate::belief::{self, Belief};
 use crate::key::Key;
 use crate::tool::Paths;
 
-/// What is known of a case: a generator's key, or what is believed of a machine.
+/// The truth about a case: a generator's key, or the belief about a machine.
 #[derive(Clone, Debug)]
 pub(crate) enum Truth {
     Known(Key),

@@ -20,7 +20,7 @@ pub(crate) struct Record {
     pub(crate) id: String,
     pub(crate) key: Key,
     pub(crate) answer: Result<Answer, String>,
-    /// What is left on the held-out recording, by the judge's own inverse dynamics; else why that could not be had.
+    /// The residual on the held-out recording by the judge's own inverse dynamics, or why it could not be computed.
     pub(crate) left: Result<Left, String>,
     /// The same by the report's own residuals.
     pub(crate) reported: Option<Left>,
@@ -39,17 +39,17 @@ impl Record {
         self.answer.as_ref().map_or("failed", |a| a.verdict.as_str())
     }
 
-    /// Whether it says that physics is missing, by name or by verdict.
+    /// True if the answer reports missing physics, by name or by verdict.
     pub(crate) fn names_physics(&self) -> bool {
         !self.effects().is_empty() || self.verdict() == "missing_physics"
     }
 
-    /// Whether the name or its class is among what is hidden.
+    /// True if the name or its class is among the hidden effects.
     pub(crate) fn is_true(&self, named: &Named) -> bool {
         self.key.effects.iter().any(|hidden| named.holds(hidden))
     }
 
-    /// What came through the tool's search with its evidence, and whether it was right.
+    /// Returns the hypotheses that came through the tool's search with their evidence, and whether each was right.
     pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Weighed, bool)> {
         let all = self.answer.as_ref().map_or(&[][..], |a| &a.weighed);
         all.iter().map(|w| {
@@ -72,7 +72,7 @@ impl Record {
         self.effects().iter().all(|e| self.is_true(e))
     }
 
-    /// How many of the hidden effects are found, by name or class; never more than there are names.
+    /// Returns how many of the hidden effects are found, by name or class; never more than there are names.
     pub(crate) fn found(&self) -> usize {
         let found = self.key.effects.iter().filter(|h| self.effects().iter().any(|e| e.holds(h))).count();
         found.min(self.effects().len())
@@ -90,7 +90,7 @@ impl Record {
         told && self.effects().is_empty()
     }
 
-    /// What the case's category calls right.
+    /// True if the answer is right for the case's category.
     pub(crate) fn right(&self) -> bool {
         if self.answer.is_err() {
             return false;
@@ -180,8 +180,8 @@ impl Record {
         (room >= EXPLAINABLE * oracle.floor.powi(2) && room > 0.0).then_some((oracle.floor, room))
     }
 
-    /// Whether each 95 % interval of a parameter with a known truth holds it. Where the unit has force in it the truth is
-    /// taken in the scale of the gain that the tool believes: motor data cannot tell the gain.
+    /// Returns whether each 95 % interval of a parameter contains its known true value. If the unit contains force, that value is
+    /// scaled by the tool's own gain, because motor data do not determine the gain.
     pub(crate) fn coverage(&self) -> Vec<(String, bool)> {
         let Ok(answer) = &self.answer else { return Vec::new() };
         let gain = answer.gain.unwrap_or(self.nominal_gain);

@@ -1,10 +1,10 @@
-//! What is hidden in a case, as its author wrote it down, and the file format of it: `docs/benchmark.md`.
+//! The key of a case, as its author wrote it, and its file format: `docs/benchmark.md`.
 //!
 //! Whoever generates cases, this project or others, hands the judge these and nothing else.
 
 use serde_json::{Map, Value, json};
 
-/// What kind of case it is, and so what the right answer is.
+/// The kind of a case, which determines the right answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Category {
     /// One effect: name it, or a class of three at most that holds it.
@@ -63,7 +63,7 @@ impl Category {
         }
     }
 
-    /// Whether `text` is part of one of its words.
+    /// True if `text` is part of one of its words.
     pub(crate) fn matches(self, text: &str) -> bool {
         self.word().contains(text) || self.aliases().iter().any(|alias| alias.contains(text))
     }
@@ -73,7 +73,7 @@ impl Category {
     }
 }
 
-/// What whoever has the true model in hand would leave on the held-out recordings, and how that is measured: both
+/// The residual of the true model on the held-out recordings, and the way to measure it: both
 /// residuals go twice through a Butterworth low-pass of second order, rows at rest do not count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Oracle {
@@ -101,7 +101,7 @@ pub(crate) struct Parameter {
     pub(crate) force: bool,
 }
 
-/// What is hidden in a case.
+/// The hidden truth about a case.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Key {
     pub(crate) category: Category,
@@ -115,9 +115,9 @@ pub(crate) struct Key {
     pub(crate) random: bool,
     /// Effect over noise as asked for; zero where nothing is hidden.
     pub(crate) strength: f64,
-    /// What was reached, where the author says it.
+    /// The strength reached, if the author gives it.
     pub(crate) snr: Option<f64>,
-    /// Why the recordings cannot tell: `hidden` or `twin`.
+    /// The reason why the recordings cannot decide: `hidden` or `twin`.
     pub(crate) poverty: Option<String>,
     /// The machine in a few words.
     pub(crate) rig: String,
@@ -149,7 +149,7 @@ impl Key {
         }
     }
 
-    /// What is hidden, in words.
+    /// Returns the hidden effects, in words.
     pub(crate) fn hidden(&self) -> String {
         match &self.unknown {
             Some(unknown) => unknown.clone(),

@@ -67,7 +67,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     prove(options, &specs, &*tool)
 }
 
-/// What the reports call the tool.
+/// Returns the tool's name in the reports.
 fn tool_name(options: &Options) -> String {
     match (&options.tool, &options.reports) {
         (Some(line), _) => line.clone(),
@@ -147,7 +147,7 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<(), Strin
     if options.quick && options.only.is_none() { gate(&sums) } else { Ok(()) }
 }
 
-/// What the small run holds the tool to, so that it can fail in CI: far below what is wanted, above what luck gives.
+/// The requirements of the small run, so that it can fail in CI: far below the goals, above chance.
 fn gate(sums: &sums::Sums) -> Result<(), String> {
     let right = sums.strong;
     if sums.failures > 0 {

@@ -1,4 +1,4 @@
-//! What `prove` is asked to do.
+//! The options of `prove`.
 
 use std::path::PathBuf;
 
@@ -59,7 +59,7 @@ impl Default for Options {
     }
 }
 
-/// What `--only` takes for the measurement of the time and no case.
+/// The value of `--only` that measures the time and runs no case.
 pub(crate) const SPEED: &str = "speed";
 
 /// The flags that take a value.

@@ -12,7 +12,7 @@ use crate::stats::{Rate, quantile};
 use crate::sums::{Reliability, Sums, share_text};
 use crate::tool::Weighed;
 
-/// How long the tool took for 60 s at 10 kHz of some hidden physics.
+/// The tool's time for 60 s at 10 kHz of some hidden physics.
 #[derive(Clone, Debug)]
 pub(crate) struct Timed {
     pub(crate) hidden: &'static str,
@@ -24,12 +24,12 @@ fn times_text(times: &[Timed]) -> String {
     times.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// What was run, for the head of the report.
+/// The run, for the head of the report.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     pub(crate) options: Options,
     pub(crate) tool: String,
-    /// Where the cases came from.
+    /// The source of the cases.
     pub(crate) source: String,
     pub(crate) seconds: f64,
     /// Times for 60 s at 10 kHz, where they were measured.
@@ -86,7 +86,7 @@ struct Section {
     rows: Vec<Vec<String>>,
 }
 
-/// What stands below the main table, wherever it is shown.
+/// Returns the sections below the main table, for every output.
 fn sections(s: &Sums) -> Vec<Section> {
     let mut list = vec![
         Section {
@@ -228,7 +228,7 @@ fn columns(out: &mut String, rows: &[Vec<String>]) {
     }
 }
 
-/// What the terminal shows: the table, the sections, the confusion matrix, the misses.
+/// Returns the output for the terminal: the table, the sections, the confusion matrix, the misses.
 pub(crate) fn terminal(records: &[Record], s: &Sums, run: &Run) -> String {
     let mut out = head(records.len(), run) + "\n\n";
     columns(&mut out, &rows(s, run).iter().map(|r| r.to_vec()).collect::<Vec<_>>());
@@ -348,7 +348,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
     })
 }
 
-/// What may be told to the tool's author: sums and confusion, nothing of single cases.
+/// Returns the part that the tool's author may see: sums and confusion, nothing of single cases.
 pub(crate) fn aggregate(records: &[Record], s: &Sums, run: &Run) -> String {
     let full = markdown(records, s, run);
     let end = full.find("### Every miss").unwrap_or(full.len());

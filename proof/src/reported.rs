@@ -1,4 +1,4 @@
-//! What is left on the held-out recording, measured as a key's oracle is: by the judge's own inverse dynamics, and by the
+//! The residual on the held-out recording, measured as a key's oracle is: by the judge's own inverse dynamics, and by the
 //! residuals that the report gives.
 
 use std::path::Path;

@@ -92,7 +92,7 @@ pub(crate) struct Reliability {
     pub(crate) bins: [Bin; 10],
     /// Expected calibration error and Brier score; `None` where nothing was named.
     pub(crate) errors: Option<(f64, f64)>,
-    /// Of names given with [`BELIEVED`] or more.
+    /// The rate of right names among those given with [`BELIEVED`] or more.
     pub(crate) believed: Rate,
 }
 
@@ -132,7 +132,7 @@ impl Reliability {
     }
 }
 
-/// What one rival reached.
+/// The results of one rival.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RivalSums {
     pub(crate) name: &'static str,

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Where a case's files lie.
+/// The paths of a case's files.
 #[derive(Clone, Debug)]
 pub(crate) struct Paths {
     pub(crate) rig: PathBuf,
@@ -142,7 +142,7 @@ impl Named {
         if self.class.len() <= WIDEST_CLASS { &self.class } else { &[] }
     }
 
-    /// Whether the name or the class holds `effect`.
+    /// True if the name or the class holds `effect`.
     pub(crate) fn holds(&self, effect: &str) -> bool {
         self.name == effect || self.judged_class().iter().any(|c| c == effect)
     }
@@ -156,7 +156,7 @@ pub(crate) struct Weighed {
     pub(crate) evidence: BTreeMap<String, f64>,
 }
 
-/// What the judge reads of `diagnosis.json` and `patched-rig.toml`.
+/// The parts of `diagnosis.json` and `patched-rig.toml` that the judge reads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
     pub(crate) verdict: String,

@@ -25,7 +25,7 @@ const STEP: f64 = 2e-5;
 /// A way of the hand: times in s and depths in m, joined as a hand joins them.
 pub type Way = Vec<(f64, f64)>;
 
-/// What the roller does.
+/// The roller's state.
 #[derive(Debug, Clone)]
 pub struct Mechanism {
     /// The rotor's angle where the needle's depth is 0, rad: from which cogging repeats.
@@ -33,7 +33,7 @@ pub struct Mechanism {
     tilt: f64,
     depth: f64,
     speed: f64,
-    /// Where the hand leads the needle; `None`: nobody holds it.
+    /// The position to which the hand leads the needle; `None` if nobody holds it.
     way: Option<Way>,
     time: f64,
     hand_force: f64,
@@ -88,7 +88,7 @@ impl Mechanism {
         self.time += dt;
     }
 
-    /// What the encoder counts.
+    /// Returns the encoder's count.
     #[must_use]
     pub fn count(&self) -> i64 {
         (self.depth / RADIUS * COUNTS_PER_TURN / TAU).floor() as i64
@@ -123,10 +123,10 @@ fn place(way: &[(f64, f64)], time: f64) -> (f64, f64) {
 #[derive(Debug, Clone)]
 pub struct SharedMechanism(Arc<Mutex<(Mechanism, Vec<Moment>)>>);
 
-/// What the mechanism did at a time.
+/// The mechanism's state at a time.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment {
-    /// When.
+    /// Its time.
     pub at: Nanos,
     /// Depth in m.
     pub depth: f64,
@@ -149,7 +149,7 @@ impl SharedMechanism {
         what(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner).0)
     }
 
-    /// What it did since this was last asked.
+    /// Returns its states since the last call.
     #[must_use]
     pub fn take_moments(&self) -> Vec<Moment> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner).1)

@@ -14,18 +14,18 @@ const FULL_SCALE: f64 = 28.8 / 10.0;
 const GRIP: (f64, f64) = (1_500.0, 5.0);
 const COUNTS_PER_M: f64 = 63_662.0;
 
-/// What a test sees of it, and changes.
+/// The state that a test reads and changes.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
     /// Depth in m, and speed in m/s.
     pub depth: f64,
     /// Speed in m/s.
     pub speed: f64,
-    /// Where the hand holds it, in m; `None`: it has let go.
+    /// The position at which the hand holds it, in m; `None` if it has let go.
     pub hand: Option<f64>,
     /// Speed of the hand in m/s, while it holds.
     pub hand_speed: f64,
-    /// Whether the motor's leads are reversed.
+    /// True if the motor's leads are reversed.
     pub reversed: bool,
 }
 
@@ -41,7 +41,7 @@ impl Needle {
         Self(Arc::new(Mutex::new(state)))
     }
 
-    /// What it does.
+    /// Returns its state.
     #[must_use]
     pub fn state(&self) -> State {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)

@@ -18,15 +18,15 @@ use link::{Command, DeviceFrame};
 use crate::board::Board;
 use crate::usb_host::Port;
 
-/// How often the PC says that it is there: four times within the shortest default time-out.
+/// The period of the PC's heartbeats: a quarter of the shortest default time-out.
 const HEARTBEAT_MS: u64 = 50;
-/// How long the PC waits for a port, and for an answer.
+/// The longest wait of the PC for a port, and for an answer.
 const PORT_MS: u64 = 3_000;
 const ANSWER_MS: u64 = 200;
-/// How often it says hello in that time.
+/// The number of hellos in that time.
 const HELLOS: u64 = 2;
 
-/// What the device has said.
+/// The messages of the device.
 #[derive(Debug, Default)]
 pub struct Heard {
     /// The latest hello.
@@ -53,7 +53,7 @@ pub struct Pc {
     silent: bool,
     keep_samples: bool,
     last_beat_ms: u64,
-    /// What the device has said since [`Pc::connect`].
+    /// The messages of the device since [`Pc::connect`].
     pub heard: Heard,
 }
 
@@ -228,13 +228,13 @@ impl Pc {
         }
     }
 
-    /// What has arrived and what has not.
+    /// Returns the counts of frames that arrived and that did not.
     #[must_use]
     pub fn counts(&self) -> Counts {
         self.reception.counts()
     }
 
-    /// Whether the device has reported an event that `wanted` accepts.
+    /// True if the device has reported an event that `wanted` accepts.
     #[must_use]
     pub fn heard_event(&self, wanted: impl Fn(&EventKind) -> bool) -> bool {
         self.heard.events.iter().any(|event| wanted(&event.kind))

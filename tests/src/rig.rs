@@ -40,7 +40,7 @@ pub struct Rig {
     pub pc: Pc,
 }
 
-/// Whether the motor can't move: the amplifier off and no torque asked for.
+/// True if the motor cannot move: the amplifier off and no torque requested.
 fn is_safe(drive: Drive) -> bool {
     !drive.enabled && drive.code.is_none_or(|code| code == ZERO_TORQUE)
 }
@@ -169,7 +169,7 @@ impl Rig {
         assert!(10 * deviation.0 <= 2 * deviation.1, "torque fades in: {deviation:?} in 10 and 400 ms");
     }
 
-    /// When the amplifier was switched on since `since`.
+    /// Returns the times at which the amplifier was switched on since `since`.
     pub fn enabled_since(&mut self, since: Nanos) -> Vec<Nanos> {
         self.board.at_stop(move |stopped| {
             let changes = stopped.log().enable.iter();

@@ -18,7 +18,7 @@ const TO_BEGIN: Duration = Duration::from_secs(2);
 /// A device that is there answers within this.
 const TO_ANSWER: Duration = Duration::from_secs(5);
 
-/// What is going on.
+/// The phase of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     /// Waiting until the device has taken its configuration.
@@ -71,7 +71,7 @@ impl<'a> Conductor<'a> {
         self.driver.connected(now);
     }
 
-    /// What to send now; `begins` hears of every step that is asked for.
+    /// Returns the bytes to send now; calls `begins` for every step that is requested.
     pub fn transmit(&mut self, now: Duration, mut begins: impl FnMut(&Step)) -> &[u8] {
         self.now = now;
         match self.phase {
@@ -129,7 +129,7 @@ impl<'a> Conductor<'a> {
         self.samples.len() as f64 / f64::from(TICK_HZ)
     }
 
-    /// Whether there is nothing left to do.
+    /// True if there is nothing left to do.
     pub fn is_over(&self) -> bool {
         self.phase == Phase::Over || self.failure.is_some()
     }

@@ -14,7 +14,7 @@ use crate::failure::Failure;
 const STEPS_PER_TICK: u32 = 20;
 const STEP_S: f64 = 1.0 / (TICK_HZ as f64 * STEPS_PER_TICK as f64);
 
-/// What is wrong with the wires between motor, encoder and board.
+/// The faults in the wiring between motor, encoder and board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wiring {
     /// The motor's leads are reversed.
@@ -36,7 +36,7 @@ pub enum Channel {
 }
 
 impl Wiring {
-    /// What the board counts where the encoder is at `count`.
+    /// Returns the board's count when the encoder is at `count`.
     fn counted(self, count: i32) -> i32 {
         let count = match self.dead {
             None => count,
@@ -47,7 +47,7 @@ impl Wiring {
         if self.channels_swapped { count.wrapping_neg() } else { count }
     }
 
-    /// What the motor does of a command.
+    /// Returns the motor's response to a command.
     fn driven(self, command: f64) -> f64 {
         match self {
             Wiring { leads_off: true, .. } => 0.0,

@@ -21,7 +21,7 @@ use written::Track;
 
 /// Ticks between two exchanges with a virtual device.
 const LOCKSTEP_TICKS: u64 = 10;
-/// How long to wait for a real device in one go.
+/// The longest single wait for a real device.
 const PATIENCE: Duration = Duration::from_millis(2);
 
 /// The control configuration for characterising: no tissue matters, encoder and torque limits as they are.
@@ -36,7 +36,7 @@ pub fn scale(config: &Config) -> Result<Hello, Failure> {
     Ok(Hello::from(&device.hello()))
 }
 
-/// What a caller is told meanwhile.
+/// The progress that a caller is shown meanwhile.
 #[derive(Clone, Copy, Debug)]
 pub enum News<'a> {
     /// A recording begins.
@@ -129,7 +129,7 @@ pub fn on_port(
     Ok(tracks)
 }
 
-/// Whether every step may be played under `config`: the device checks it again.
+/// Checks that every step may be played under `config`; the device checks it again.
 pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
     let refuse =
         |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));

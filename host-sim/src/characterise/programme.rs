@@ -1,6 +1,6 @@
-//! What is played for each recording. Amplitudes follow from the nominal mechanism: dry friction sets the torques, inertia
+//! The excitations of each recording. Amplitudes follow from the nominal mechanism: dry friction sets the torques, inertia
 //! the servo's gains. The held-out recording mixes the same signals with other numbers, so that a model fitted to the others
-//! has to predict and not to repeat.
+//! must predict instead of repeating.
 
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
@@ -13,7 +13,7 @@ const SERVO_RAD_PER_S: f64 = 50.0;
 const SERVO_DAMPING_RATIO: f64 = 0.9;
 /// Furthest that the roller turns from where it began, mm along its surface.
 const TRAVEL_MM: f64 = 600.0;
-/// What the person at the device is asked to do while the motor holds.
+/// The instruction to the person at the device while the motor holds.
 const TILT_PROMPT: &str = "tilt the device slowly: level, needle down by 60°, level, up by 60°, level";
 
 /// One recording.
@@ -21,21 +21,21 @@ const TILT_PROMPT: &str = "tilt the device slowly: level, needle down by 60°, l
 pub struct Programme {
     /// Name of the file.
     pub file: &'static str,
-    /// What is played, in order.
+    /// The steps, in order.
     pub steps: Vec<Step>,
 }
 
 /// One excitation of a recording.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// What the device plays.
+    /// The excitation that the device plays.
     pub excitation: Excitation,
-    /// What a person is asked to do meanwhile.
+    /// The instruction to a person meanwhile.
     pub prompt: Option<&'static str>,
 }
 
 impl Step {
-    /// How a person who follows the prompt tilts the device `into` the step, in rad; the virtual device does it so.
+    /// Returns the tilt by a person who follows the prompt, `into` the step, in rad; the virtual device tilts this way.
     pub fn tilt_at(&self, into: Duration) -> f64 {
         let whole = f64::from(self.excitation.duration_ms) * 1e-3;
         match self.prompt {
@@ -103,7 +103,7 @@ pub fn servo(inertia: f64, radius_mm: f64) -> Servo {
     }
 }
 
-/// What the amplitudes follow from.
+/// The quantities that determine the amplitudes.
 struct Kit {
     servo: Servo,
     /// Nominal dry friction in mN·m.

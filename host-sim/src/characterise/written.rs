@@ -18,7 +18,7 @@ pub struct Track {
     pub hello: Hello,
     /// 10 kHz, without a gap.
     pub samples: Vec<Sample>,
-    /// What the servo was asked to follow, in counts.
+    /// The servo's reference, in counts.
     pub reference: Vec<f64>,
 }
 

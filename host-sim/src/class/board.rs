@@ -1,5 +1,5 @@
-//! What the instructor sees: the newest of every device, who is stuck, who is gone. Pure: it is told the time and handed
-//! messages. Whatever arrives is bounded, checked for its form and otherwise passed on to the page as it is.
+//! The instructor's board: the newest state of every device, who is stuck, who is gone. Pure: the caller passes the time and the
+//! messages. Each message is checked for its size and form and passed on to the page unchanged.
 
 use super::Name;
 use super::message::{ClassScore, Kind};
@@ -56,7 +56,7 @@ struct Poses<N, P> {
     poses: P,
 }
 
-/// What the board needs to understand of [`super::message::About`].
+/// The part of [`super::message::About`] that the board needs.
 #[derive(Debug, Deserialize)]
 struct About {
     scene: Value,
@@ -73,15 +73,15 @@ struct About {
 pub struct MemberView {
     /// Its name.
     pub name: String,
-    /// Whether nothing has been heard of it for 2 s.
+    /// True if no message has arrived for 2 s.
     pub gone: bool,
     /// Since when nothing has been heard of it, s.
     pub silent_s: f64,
-    /// Whether its computer hears the device.
+    /// True if its computer receives data from the device.
     pub connected: bool,
-    /// Whether it records.
+    /// True if it records.
     pub recording: bool,
-    /// Why its trainee seems to need help, in words.
+    /// The reason why its trainee seems to need help, in words.
     pub stuck: Option<String>,
     /// The newest pose, a [`crate::streams::NeedlePose`].
     pub pose: Option<Value>,
@@ -91,7 +91,7 @@ pub struct MemberView {
     pub score: ClassScore,
     /// Its last events, oldest first.
     pub events: Vec<Value>,
-    /// What is simulated; only where the page has not been sent it yet.
+    /// The scene; only if the page does not have it yet.
     pub scene: Option<Value>,
 }
 
@@ -105,7 +105,7 @@ struct ToClassPage<'a> {
     members: Vec<MemberView>,
 }
 
-/// What a page has been sent, so that a scene goes to it once.
+/// The scenes that a page has, so that each is sent once.
 #[derive(Debug, Default)]
 pub struct Sent {
     scenes: BTreeMap<Name, u64>,
@@ -126,7 +126,7 @@ impl Board {
         members.by_name.iter().map(|(name, member)| member.view(name, now, sent)).collect()
     }
 
-    /// What a page is told, as JSON: the class with all its members.
+    /// Returns the message for a page, as JSON: the class with all its members.
     pub fn text(&self, class: &Name, address: SocketAddr, now: Instant, sent: &mut Sent) -> Option<String> {
         let members = self.view(now, sent);
         let class = ToClassPage { kind: "class", name: class.as_str(), address, members };
@@ -228,7 +228,7 @@ impl Member {
 }
 
 impl About {
-    /// Why the trainee seems to need help: the gravest reason first.
+    /// Returns the reason why the trainee seems to need help: the most serious one first.
     fn stuck(&self) -> Option<String> {
         if let Some(fault) = &self.fault {
             return Some(format!("fault: {fault}"));

@@ -1,4 +1,4 @@
-//! What a device says to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`. Units stand in the names.
+//! The messages of a device to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`. Units stand in the names.
 
 use crate::score::Insertion;
 use crate::session::Scene;
@@ -45,7 +45,7 @@ impl Kind {
     }
 }
 
-/// Where the needle is, and the way there since the last message.
+/// The needle's pose, and its path since the last message.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Poses {
     /// The newest pose, in full.
@@ -87,15 +87,15 @@ impl ClassScore {
 /// All that stays true for longer than a pose.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct About {
-    /// What is simulated, as the trainee's own page has it.
+    /// The scene, as on the trainee's own page.
     pub scene: Scene,
-    /// Whether the trainee's computer hears its device.
+    /// True if the trainee's computer receives data from its device.
     pub connected: bool,
-    /// Whether it records.
+    /// True if it records.
     pub recording: bool,
     /// The fault that has latched, in words.
     pub fault: Option<String>,
-    /// How long the tip has been in the body and within 1 mm of one place, s; 0 outside.
+    /// The time for which the tip has been in the body and within 1 mm of one place, s; 0 outside.
     pub still_s: f64,
     /// Insertions so far.
     pub score: ClassScore,

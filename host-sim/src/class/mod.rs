@@ -23,7 +23,7 @@ use std::str::FromStr;
 #[cfg(feature = "class")]
 pub use network::{Listener, Membership, join, listen};
 
-/// Where the instructor's program listens unless told otherwise: Zenoh's own port on this computer.
+/// The default address of the instructor's program: Zenoh's own port on this computer.
 pub const USUAL_ADDRESS: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 7_447);
 
 /// Name of a class or of a device in it: a part of a Zenoh key, hence 1 to 40 letters, digits or `._-`.
@@ -33,7 +33,7 @@ pub struct Name(String);
 impl Name {
     const LONGEST: usize = 40;
 
-    /// What a device without a name of its own is called.
+    /// The name of a device that was given none.
     pub fn device() -> Self {
         Self("device".into())
     }
@@ -63,19 +63,19 @@ impl FromStr for Name {
     }
 }
 
-/// Where a class meets: on the instructor's side the address that is listened at, on a device's side the one to connect to.
+/// The meeting point of a class: on the instructor's side the address to listen on, on a device's side the one to connect to.
 #[derive(Clone, Debug)]
 pub struct Meeting {
     /// Name of the class.
     pub class: Name,
     /// The instructor's address.
     pub address: SocketAddr,
-    /// What every device has to know, where other computers take part.
+    /// The token that every device needs if other computers take part.
     pub token: Option<Token>,
 }
 
 impl Meeting {
-    /// Whether anybody but this computer could take part without a token; `flag` is what the address was given with.
+    /// Checks that nobody but this computer can take part without a token; `flag` is the option that gave the address.
     pub fn check(&self, flag: &str) -> Result<(), String> {
         if self.address.port() == 0 {
             return Err(format!("{flag} {} needs a port that both sides know, such as 7447", self.address));
@@ -90,7 +90,7 @@ impl Meeting {
     }
 }
 
-/// Why a class cannot meet.
+/// The reason why a class cannot meet.
 #[derive(Debug)]
 pub struct ClassError {
     sentence: String,

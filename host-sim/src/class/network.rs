@@ -21,16 +21,16 @@ use zenoh::{Config, Session, Wait};
 /// Between two looks at the session: 25 messages a second with forty poses each. A message costs both ends far more than a
 /// pose in it, and the instructor's page changes ten times a second.
 const PERIOD: Duration = Duration::from_millis(40);
-/// How long the end of a program waits for a goodbye that the network may not take.
+/// The longest wait at the program's end for a goodbye that the network may not take.
 const GOODBYE: Duration = Duration::from_millis(500);
 /// The most bytes of a message put together from pieces; Zenoh's own limit is 1 GiB. The board takes half of it.
 const LONGEST_TRANSFER: &str = "131072";
-/// How long a connection may take to say who it is, ms. Zenoh's own is 10 s with 100 of them at a time: silent ones would keep
+/// The longest time in which a connection must authenticate, ms. Zenoh's own limit is 10 s with 100 of them at a time: silent ones would keep
 /// devices out for so long.
 const ACCEPT_TIMEOUT_MS: &str = "2000";
 /// Connections at a time that have not said who they are; one more is closed.
 const ACCEPT_PENDING: &str = "400";
-/// What every key of this project begins with.
+/// The prefix of every key of this project.
 const PREFIX: &str = "needle";
 /// The only user that there is; the token is its password.
 const USER: &str = "class";
@@ -149,7 +149,7 @@ fn publish(session: &NeedleSession, device: Device, publishers: &Publishers, sto
     }
 }
 
-/// Which end of a class a program is.
+/// The side of a class that a program is on.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Side {
     /// Connects.

@@ -1,4 +1,4 @@
-//! What one device tells its class, from what its session brings. Pure: no clock, no network.
+//! The messages of one device to its class, from its session's batches. Pure: no clock, no network.
 
 use super::message::{About, ClassScore, Kind, Poses};
 use super::scoring::LiveScore;
@@ -34,7 +34,7 @@ pub struct Telling {
     fault: Option<String>,
     events: VecDeque<Event>,
     stillness: Stillness,
-    /// When the last [`About`] went out.
+    /// The time at which the last [`About`] was sent.
     told: Option<Duration>,
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct Characterise {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// What the virtual device's mechanism really is: a rig file, with effects that the written rig.toml does not know
+    /// The true mechanism of the virtual device: a rig file, with effects that the written rig.toml does not know
     #[arg(long, value_name = "RIG.toml")]
     plant: Option<PathBuf>,
     /// Ask nothing: the needle is out

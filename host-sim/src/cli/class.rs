@@ -29,10 +29,10 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(crate) struct Class {
     /// Name of the class: letters, digits, ._-
     name: Name,
-    /// Where devices connect to; an address that other computers reach needs --class-token
+    /// Address that devices connect to; one that other computers reach needs --class-token
     #[arg(long, default_value_t = USUAL_ADDRESS, value_name = "ADDRESS:PORT")]
     listen: SocketAddr,
-    /// What every device has to know; at least 12 characters
+    /// Token that every device must know; at least 12 characters
     #[arg(long, value_name = "TOKEN")]
     class_token: Option<Token>,
     /// Port of the page on this computer; 0 takes any free one
@@ -64,16 +64,16 @@ impl Class {
     }
 }
 
-/// How a run joins a class.
+/// The options by which a run joins a class.
 #[derive(Args)]
 pub(crate) struct ClassFlags {
     /// Publish pose, events and scores to the class of this name; needs a build with --features class
     #[arg(long, value_name = "NAME")]
     class: Option<Name>,
-    /// What the class calls this device; without it, this computer's name
+    /// Name of this device in the class; without it, this computer's name
     #[arg(long, value_name = "NAME", requires = "class")]
     class_as: Option<Name>,
-    /// Where the instructor's program listens; another computer's address needs --class-token
+    /// Address of the instructor's program; another computer's needs --class-token
     #[arg(long, default_value_t = USUAL_ADDRESS, value_name = "ADDRESS:PORT")]
     class_at: SocketAddr,
     /// The class's token, as the instructor gave it
@@ -82,7 +82,7 @@ pub(crate) struct ClassFlags {
 }
 
 impl ClassFlags {
-    /// What clap cannot check.
+    /// Checks the options beyond what clap can.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         self.meeting().map_or(Ok(()), |meeting| meeting.check("--class-at")).map_err(Failure::input)
     }

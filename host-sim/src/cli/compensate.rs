@@ -34,10 +34,10 @@ pub(crate) struct Compensate {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// What the virtual device's mechanism really is: a rig file
+    /// The true mechanism of the virtual device: a rig file
     #[arg(long, value_name = "RIG.toml")]
     plant: Option<PathBuf>,
-    /// Of the usual gains (0.92 of waves, weight and drive, 0.8 of friction), 0 to 1
+    /// Share of the usual gains (0.92 for waves, weight and drive, 0.8 for friction), 0 to 1
     #[arg(long, default_value_t = 1.0, value_name = "0..1")]
     gain: f64,
     /// Only find the rotor's angle again, after a restart of a device that is compensated
@@ -90,7 +90,7 @@ impl Compensate {
         VirtualLine::commissioned(&plant, &file, scale.roller_radius_mm)
     }
 
-    /// What came of it, a line each.
+    /// Runs on `line` and returns the result, one line each.
     fn on(&self, line: impl Line, rig: &Rig, consent: &Consent) -> Result<Vec<String>, Failure> {
         let mut line = GuidedLine { line, guide: consent.guide() };
         if self.align {

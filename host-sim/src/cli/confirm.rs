@@ -1,4 +1,4 @@
-//! What a person has to agree to before a motor moves: on the terminal, or in the page of a guide.
+//! The consent of a person before a motor moves: on the terminal, or in the page of a guide.
 
 use super::output;
 use clap::Args;
@@ -10,7 +10,7 @@ use std::io::BufRead;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Where a person agrees.
+/// The options for a person's consent.
 #[derive(Args)]
 pub(crate) struct ConsentFlags {
     /// Ask nothing: the needle is out

@@ -22,7 +22,7 @@ pub(crate) struct Import {
     /// Folder to write to; made where there is none
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Which column is the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
+    /// The column of the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
     /// turns the sign
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,

@@ -1,4 +1,4 @@
-//! What is printed beside results, and the browser that a program for people without a terminal opens by itself.
+//! Messages beside the results, and the browser that a program for people without a terminal opens.
 
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! How far long work is: one line on a terminal, nothing in a pipe.
+//! Progress of long work: one line on a terminal, nothing in a pipe.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};

@@ -41,7 +41,7 @@ pub(crate) struct Run {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// What the scripted hand does: venepuncture, slow, shoulder-straight, insertion-5mms-60deg …, or a TOML file like those in
+    /// Procedure of the scripted hand: venepuncture, slow, shoulder-straight, insertion-5mms-60deg …, or a TOML file like those in
     /// host-sim/procedures; without it, what the patient's file says
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
@@ -49,7 +49,7 @@ pub(crate) struct Run {
     /// host-sim/profiles; without it, adult, or the one that is made for --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// How the device is built: a TOML file as commissioning writes it; without it, a real device keeps what it has
+    /// The device's construction: a TOML file as commissioning writes it; without it, a real device keeps its own
     #[arg(long, value_name = "FILE")]
     device_config: Option<PathBuf>,
     /// The law of force; the patient's must be the same
@@ -195,7 +195,7 @@ impl Run {
         }
     }
 
-    /// What clap cannot check.
+    /// Checks the options beyond what clap can.
     fn check(&self) -> Result<Option<f64>, Failure> {
         self.streams.check()?;
         self.class.check()?;

@@ -57,7 +57,7 @@ fn models(path: &Path) -> Result<Vec<(String, Rig)>, Failure> {
     Ok(out)
 }
 
-/// What the model is called whose values were fitted by motion.
+/// The name of the model whose values were fitted by motion.
 const MOTION_FITTED: &str = "motion-fitted";
 
 fn file_name(path: &Path) -> String {
@@ -65,7 +65,7 @@ fn file_name(path: &Path) -> String {
 }
 
 impl Simulate {
-    /// What to do after this, with the last of the rigs that were read called `last`.
+    /// Returns the suggested next steps, with the last of the rigs called `last`.
     fn next(&self, last: &str) -> Vec<String> {
         let mut items = Vec::new();
         let (rig, out) = (self.rig.display(), self.out.display());

@@ -11,13 +11,13 @@ pub(crate) struct StreamFlags {
     /// PlotJuggler, 9870), foxglove (8765); on this computer unless an address says otherwise
     #[arg(long = "stream", value_name = "KIND[=ADDRESS:PORT]")]
     streams: Vec<Spec>,
-    /// What a client on another computer has to give first; at least 12 characters
+    /// Token that a client on another computer must send first; at least 12 characters
     #[arg(long = "stream-token", value_name = "TOKEN")]
     token: Option<Token>,
 }
 
 impl StreamFlags {
-    /// What clap cannot check.
+    /// Checks the options beyond what clap can.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         self.streams.iter().try_for_each(|spec| spec.check(self.token.as_ref())).map_err(Failure::input)
     }

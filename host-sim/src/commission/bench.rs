@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 
 /// A device that is there answers within this.
 const TO_ANSWER: Duration = Duration::from_secs(5);
-/// How long to wait for a real device in one go.
+/// The longest single wait for a real device.
 const PATIENCE: Duration = Duration::from_millis(2);
 
-/// What a hand does to the roller or to the device, for a line that has its own hand.
+/// The actions of a hand on the roller or the device, for a line with a virtual hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Act {
     /// Nothing; nobody touches the roller.
@@ -36,7 +36,7 @@ pub trait Line {
     /// Sends `out`, adds what has come to `into`, and says how long the line has been open.
     fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure>;
 
-    /// What is asked of the hand. Where a person has the hand, a prompt has asked already.
+    /// Makes the virtual hand act. If a person is the hand, a prompt has asked already.
     fn act(&mut self, act: Act);
 
     /// The newest sample of what has come.
@@ -47,7 +47,7 @@ pub trait Line {
 pub struct GuidedLine<L> {
     /// The way to the device.
     pub line: L,
-    /// What shows them, where there is one.
+    /// The guide that shows the steps, if there is one.
     pub guide: Option<Guide>,
 }
 
@@ -187,7 +187,7 @@ impl<'a> Bench<'a> {
         self.until("the device did not take the rotor's angle; start it again", |bench| bench.now >= until)
     }
 
-    /// What the hand is asked to do, and samples until `is_done` says so or `longest` is over.
+    /// Prompts the hand, and returns samples until `is_done` says so or `longest` is over.
     pub fn watch(
         &mut self,
         act: Act,

@@ -1,4 +1,4 @@
-//! What recordings of a device's first movements say of its wiring and its mechanism. Pure calculation.
+//! The wiring and the mechanism of a device, found from recordings of its first movements. Pure calculation.
 
 use control_core::controller::Sample;
 use control_core::units::{Grams, Newtons};
@@ -28,7 +28,7 @@ const LARGEST_SPEED: f64 = 400.0;
 /// Turned by less than this, the tilt sensor does not follow; in mrad.
 const LEAST_TILT: f64 = 200.0;
 
-/// Why a device cannot be commissioned as it is.
+/// The reasons why a device cannot be commissioned as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trouble {
     /// No edge at all.
@@ -108,7 +108,7 @@ fn travelled(samples: &[Sample]) -> (i32, u32) {
     (counts, edges)
 }
 
-/// Whether the roller has been moved and rests since `rest_ticks`.
+/// True if the roller has been moved and then rested for `rest_ticks`.
 pub fn has_moved_and_rests(samples: &[Sample], rest_ticks: usize) -> bool {
     let Some((begin, tail)) = samples.len().checked_sub(rest_ticks).map(|at| samples.split_at(at)) else {
         return false;
@@ -150,7 +150,7 @@ pub fn mean_tilt(samples: &[Sample], ticks: usize) -> f64 {
     tail.iter().map(|sample| f64::from(sample.tilt_mrad)).sum::<f64>() / tail.len().max(1) as f64
 }
 
-/// Whether the tilt follows a needle that is pointed down, from `flat` to `down` in mrad.
+/// Checks that the tilt follows a needle that is pointed down, from `flat` to `down` in mrad.
 pub fn check_tilt(flat: f64, down: f64) -> Result<(), Trouble> {
     match down - flat {
         turned if turned <= -LEAST_TILT => Err(Trouble::TiltBackwards),
@@ -159,7 +159,7 @@ pub fn check_tilt(flat: f64, down: f64) -> Result<(), Trouble> {
     }
 }
 
-/// What moves, as seen from the motor's shaft.
+/// The moving mechanism, as seen from the motor's shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mechanism {
     /// kg·m². Negative: the motor turns against its torque.

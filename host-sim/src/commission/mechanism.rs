@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Ticks between two exchanges.
 const LOCKSTEP_TICKS: u64 = 10;
-/// How fast the hand turns the roller, rad/s, and how stiffly it holds it, N·m/rad and N·m·s/rad.
+/// The speed at which the hand turns the roller, rad/s, and the stiffness and damping of its grip, N·m/rad and N·m·s/rad.
 const HAND_SPEED: f64 = 6.0;
 const GRIP: (f64, f64) = (0.2, 1.0e-3);
 /// A hand tilts slowly: rad/s.
@@ -24,10 +24,10 @@ pub struct VirtualLine {
     /// The roller's true radius in mm.
     radius_mm: f64,
     act: Act,
-    /// Where the hand has the roller, and where it ends, rad.
+    /// The angle at which the hand holds the roller, and the one that it moves to, rad.
     held: Option<(f64, f64)>,
     tilt: f64,
-    /// What the sensor reads with the needle level, rad, and its sign.
+    /// The sensor's reading with the needle level, rad, and its sign.
     sensor: (f64, f64),
 }
 

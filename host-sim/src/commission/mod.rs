@@ -24,10 +24,10 @@ use std::time::Duration;
 const HAND: Duration = Duration::from_secs(60);
 /// A roller that has not moved for this long has been turned to its end.
 const REST: Duration = Duration::from_millis(1_500);
-/// How long a tilt is looked at, and how long a person has to get there.
+/// The time over which a tilt is averaged, and the time that a person has to reach it.
 const LOOK: Duration = Duration::from_millis(500);
 const TILTING: Duration = Duration::from_secs(6);
-/// What the virtual hand tilts to; a person's may be anything from 15° on.
+/// The tilt of the virtual hand; a person's may be anything from 15° on.
 const DOWN_RAD: f64 = 0.8;
 /// The pulses: each rises from zero in this time, there and back, so often.
 const PULSE_MS: u16 = 100;
@@ -35,7 +35,7 @@ const PULSES: u32 = 6;
 /// The furthest that they may move the roller, along its surface.
 const PULSE_TRAVEL_MM: i32 = 450;
 
-/// What a person says of the device.
+/// The facts that a person gives about the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Wish {
     /// Turns of the roller by hand.
@@ -46,7 +46,7 @@ pub struct Wish {
     pub counts_per_turn: Option<u16>,
 }
 
-/// What comes next, said before it is done.
+/// The next step, announced before it is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// The person turns the roller.
@@ -62,7 +62,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// Whether the device moves by itself in it.
+    /// True if the motor moves in it.
     pub fn moves(self) -> bool {
         self == Step::Pulses
     }
@@ -94,7 +94,7 @@ impl fmt::Display for Step {
     }
 }
 
-/// What was found.
+/// The result.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The device's part, as the device has it now, under its seal.
@@ -105,14 +105,14 @@ pub struct Outcome {
     pub leads_reversed: bool,
     /// The roller's radius.
     pub radius_mm: f64,
-    /// What moves.
+    /// The moving mechanism.
     pub mechanism: Mechanism,
     /// The device allowed a stiffness that its mechanism does not bear.
     pub stiffness_lowered: bool,
 }
 
 impl Outcome {
-    /// What was found, a line each.
+    /// Returns the result, one line each.
     pub fn lines(&self) -> Vec<String> {
         let (device, m) = (&self.record.device, &self.mechanism);
         let way =
@@ -220,7 +220,7 @@ pub fn commission(
     Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism, stiffness_lowered })
 }
 
-/// What moves; none where it turns against its torque.
+/// Plays the pulses and returns the mechanism; `None` if the motor turns against its torque.
 fn pulses(bench: &mut Bench, device: &Device) -> Result<Option<Mechanism>, Failure> {
     let excitation = Excitation {
         signal: Signal::BreakawayRamps { torque: GENTLE_TORQUE, ramp_ms: PULSE_MS },

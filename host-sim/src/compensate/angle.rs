@@ -24,7 +24,7 @@ const MOVING: f64 = 0.2;
 pub struct Angle {
     /// Counts past the zero.
     pub count: i32,
-    /// How well the waves agree, −1 to 1.
+    /// The agreement of the waves, −1 to 1.
     pub agreement: f64,
 }
 

@@ -20,7 +20,7 @@ const FULL_COUNTS: f64 = 2.5;
 /// An order may be off a whole number by so much, and is rounded.
 const WHOLE: f64 = 0.02;
 
-/// What is fed forward, and what is not.
+/// The coefficients to feed forward, and the findings that are not.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// For the device.
@@ -31,11 +31,11 @@ pub struct Found {
     pub inertia: f64,
     /// True if the rig has a weight, found or given; one of zero counts.
     pub has_weight: bool,
-    /// What was found and cannot be fed forward, a sentence each.
+    /// The findings that cannot be fed forward, a sentence each.
     pub left_out: Vec<String>,
 }
 
-/// What `rig` found, for `device`, every gain at `share` of the most that is usual.
+/// Returns the coefficients that `rig` gives for `device`, every gain at `share` of the usual one.
 pub fn found(rig: &Rig, device: &Device, share: f64) -> Result<Found, Failure> {
     if rig.kind != Kind::Rotary || rig.actuator.command_unit != "dac" {
         return Err(Failure::input(

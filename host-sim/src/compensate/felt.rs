@@ -1,7 +1,7 @@
-//! What a hand would feel of the mechanism, with nobody's hand on it: the soft servo of the device moves the roller slowly in and
-//! out and then holds it, and what the servo has to give is what a hand would have to. Pure calculation.
+//! The force of the mechanism that a hand would feel, measured without a hand: the soft servo of the device moves the roller slowly in and
+//! out and then holds it, and the servo's force is the one that a hand would need. Pure calculation.
 //!
-//! Where the device feeds forward as well, its torque is not the servo's alone. The servo's is worked out again by the control
+//! Where the device feeds forward as well, its torque is not the servo's alone. The servo's is computed again by the control
 //! core itself, from the same counts.
 
 use crate::failure::Failure;

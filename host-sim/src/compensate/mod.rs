@@ -30,9 +30,9 @@ use std::time::Duration;
 const SPEED_MM_S: f64 = 10.0;
 /// Turns of the roller each way.
 const TURNS: f64 = 1.05;
-/// How long the roller is held.
+/// The time for which the roller is held.
 const HOLD_MS: u32 = 6_000;
-/// How long a person has to tilt the device, and what the virtual hand tilts to, rad.
+/// The time that a person has to tilt the device, and the tilt of the virtual hand, rad.
 const TILTING: Duration = Duration::from_secs(4);
 const DOWN_RAD: f64 = 0.5;
 
@@ -42,7 +42,7 @@ const LEAST_TILT_RAD: f64 = 0.15;
 const REPEATS_N: f64 = 2e-3;
 const REPEATS_SHARE: f64 = 0.05;
 
-/// What comes next, said before it is done.
+/// The next step, announced before it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The person lays the device level: the report knows no weight, so that it is measured.
@@ -87,7 +87,7 @@ impl fmt::Display for Step {
     }
 }
 
-/// What is fed forward under one gain.
+/// The parts with one gain each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Cogging and an off-centre mass.
@@ -142,22 +142,22 @@ impl fmt::Display for Part {
     }
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The device's part, as the device has it now, under its seal.
     pub record: Record,
-    /// Where the rotor's angle is zero, where anything depends on it.
+    /// The rotor's angle, if any part depends on it.
     pub angle: Option<angle::Angle>,
-    /// What a hand would feel of the mechanism as it is.
+    /// The force of the mechanism that a hand would feel without compensation.
     pub before: Felt,
-    /// What it would feel with what the device feeds forward now.
+    /// The force that it would feel with compensation.
     pub after: Felt,
     /// The weight that was measured because the report had none, in mN·m.
     pub weight_mnm: Option<f64>,
-    /// What was found and cannot be fed forward, a sentence each.
+    /// The findings that cannot be fed forward, a sentence each.
     pub left_out: Vec<String>,
-    /// What was tried and taken back because the hand would have felt more than before, a sentence each.
+    /// The parts that were tried and undone because the hand would have felt more than before, a sentence each.
     pub taken_back: Vec<String>,
     /// False where everything was taken back: the device is configured as it was before.
     pub is_compensated: bool,
@@ -340,7 +340,7 @@ fn excess(before: &Felt, after: &Felt) -> f64 {
     phases.map(|((_, was), (_, is))| (is - was - f64::max(REPEATS_N, REPEATS_SHARE * was)).max(0.0)).sum()
 }
 
-/// Why a part was taken back, in a sentence.
+/// Returns the reason why a part was undone, in a sentence.
 fn said(part: Part, before: &Felt, after: &Felt) -> String {
     let phases = before.phases().into_iter().zip(after.phases());
     let worst = phases.max_by(|a, b| (a.1.1 - a.0.1).total_cmp(&(b.1.1 - b.0.1)));

@@ -25,7 +25,7 @@ pub fn find(level: &[Sample], tilted: &[Sample], device: &Device) -> Result<f64,
     Ok((level.torque_mnm - tilted.torque_mnm) / apart)
 }
 
-/// What a turn shows on average.
+/// The means over a turn.
 struct Mean {
     torque_mnm: f64,
     sine: f64,

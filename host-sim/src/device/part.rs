@@ -18,7 +18,7 @@ use std::path::Path;
 /// A device's part from a file.
 #[derive(Clone, Debug)]
 pub struct DevicePart {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// As the control law takes it, checked.
     pub device: Device,
@@ -107,7 +107,7 @@ struct Limits {
     heartbeat_ms: Option<u16>,
 }
 
-/// What moves, which decides how stiff a wall may be.
+/// The moving mechanism, which limits the stiffness of a wall.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Moving {

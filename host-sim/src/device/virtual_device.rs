@@ -25,7 +25,7 @@ const DRAG_MM_PER_S2: f64 = 3000.0;
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
 
-/// What moves the needle.
+/// The source of the needle's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Hand {
     /// The procedure, since this tick.
@@ -44,10 +44,10 @@ pub struct VirtualDevice {
     procedure: Procedure,
     tick: u64,
     hand: Hand,
-    /// Where the hand is, mm past the plant's zero.
+    /// The hand's position, mm past the plant's zero.
     hand_mm: f64,
     hand_mm_per_s: f64,
-    /// Where a person set the zero, mm past the plant's zero.
+    /// The zero that a person has set, mm past the plant's zero.
     zero_mm: f64,
     /// By how much the procedure has turned the needle, rad.
     turned_rad: f64,
@@ -97,7 +97,7 @@ impl VirtualDevice {
         &self.plant
     }
 
-    /// Whether the amplifier is on.
+    /// True if the amplifier is on.
     pub fn is_enabled(&self) -> bool {
         self.enable
     }
@@ -236,7 +236,7 @@ impl VirtualDevice {
         if self.controller.plan().device().encoder_reversed { count.wrapping_neg() } else { count }
     }
 
-    /// Where the hand wants the tip and how fast, in m and m/s.
+    /// Returns the tip's position and speed that the hand wants, in m and m/s.
     fn move_hand(&mut self) -> (f64, f64) {
         let (wanted_mm, speed) = match self.hand {
             Hand::Script { since } => {

@@ -8,7 +8,7 @@ const SINES: usize = 6;
 const BAND: (f64, f64) = (8.0, 12.0);
 const TICK_S: f64 = 1e-4;
 
-/// How a hand holds the needle.
+/// The stiffness and damping of the grip on the needle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// N/m.
@@ -27,7 +27,7 @@ pub struct Hand {
     grip: Grip,
     sines: [Sine; SINES],
     ticks: u32,
-    /// Whether and from where the hand has taken hold; it does so without a jerk.
+    /// The position at which the hand took hold; it does so without a jerk.
     start: f64,
 }
 
@@ -60,7 +60,7 @@ impl Hand {
         Self { grip, sines, ticks: 0, start }
     }
 
-    /// Where the hand was when time began, m.
+    /// Returns the hand's position at the beginning, m.
     pub fn start(&self) -> f64 {
         self.start
     }

@@ -20,7 +20,7 @@ pub const STEP_S: f64 = 1.0 / (10_000.0 * STEPS_PER_TICK as f64);
 /// Standard gravity in m/s².
 pub const GRAVITY: f64 = 9.806_65;
 
-/// What the mechanism is made of.
+/// The parameters of the mechanism.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantConfig {
     /// Motor and amplifier.
@@ -80,7 +80,7 @@ pub struct Plant {
     /// Place and speed of the needle's tip, m and m/s.
     tip: f64,
     tip_speed: f64,
-    /// How far the coat is sheared: needle ahead of the roller's surface, m.
+    /// The shear of the coat: needle ahead of the roller's surface, m.
     shear: f64,
     tilt: f64,
     /// Weight of the needle along its axis, N.
@@ -160,7 +160,7 @@ impl Plant {
         self.shear = shear.clamp(-self.most_shear, self.most_shear);
     }
 
-    /// What the encoder has counted since the tip was at the skin, quantised.
+    /// Returns the encoder's count since the tip was at the skin, quantised.
     pub fn count(&self) -> i32 {
         let counts_per_rad = f64::from(self.config.counts_per_turn) / std::f64::consts::TAU;
         // Travel is centimetres; `as` would saturate anyway.
@@ -200,7 +200,7 @@ impl Plant {
             + c.coat_stiffness * self.shear.powi(2))
     }
 
-    /// What it is made of.
+    /// Returns its parameters.
     pub fn config(&self) -> &PlantConfig {
         &self.config
     }

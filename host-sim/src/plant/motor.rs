@@ -2,7 +2,7 @@
 
 use super::{STEP_S, settled};
 
-/// What motor and amplifier are made of.
+/// The parameters of motor and amplifier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     /// Terminal resistance, Ω.

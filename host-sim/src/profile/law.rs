@@ -86,7 +86,7 @@ pub(super) struct Forces {
     depth_step_mm: f64,
     speeds_mm_s: Vec<f64>,
     angles_deg: Vec<f64>,
-    /// Of each speed and angle, whether anybody measured it; the angles of a speed together.
+    /// True for each speed and angle that was measured; the angles of a speed together.
     measured: Vec<bool>,
     /// As many rows, a force for each depth.
     force_n: Vec<Vec<f64>>,
@@ -162,7 +162,7 @@ pub(super) fn law(
     }
 }
 
-/// Of each layer, of which there are not too many.
+/// Returns the cutting of each layer, of which there are not too many.
 fn cutting(layers: &[Layer]) -> Result<Vec<Cutting>, String> {
     layers
         .iter()

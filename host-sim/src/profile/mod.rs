@@ -32,17 +32,17 @@ pub const BUILT_IN: [(&str, &str); 7] = [
 /// A profile that may run.
 #[derive(Clone, Debug)]
 pub struct Profile {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Angle of the needle to the skin at entry, in rad.
     pub entry_rad: f64,
-    /// What the device is configured with: its own part and this patient.
+    /// The device's configuration: its own part and this patient.
     pub config: Config,
     /// The same, checked.
     pub plan: Plan,
     /// Whom it stands for.
     pub person: Person,
-    /// What a scripted hand does in it unless it is asked to do something else.
+    /// The default procedure of a scripted hand.
     pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
@@ -96,7 +96,7 @@ impl Profile {
         Model::of(&self.config.patient.law)
     }
 
-    /// What a picture needs to know.
+    /// Returns the scene for a picture.
     pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
         let layers = self.config.patient.layers.iter().map(|layer| SceneLayer {
             name: tissue_name(layer.tissue).to_owned(),
@@ -230,15 +230,15 @@ struct Vessel {
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
-    /// Whether the needle is to spare it; without it, what Paper 002 has trainees avoid: tendon and cartilage.
+    /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
     spare: Option<bool>,
     depth_mm: f64,
-    /// What makes it as thick as it is; what lies below moves with it.
+    /// The rule for its thickness; the layers below move with it.
     thickness: Option<Thickness>,
     wall: Option<Wall>,
-    /// Of the jog law.
+    /// For the jog law.
     friction_n_per_mm: Option<f64>,
-    /// Of the law of Paper 002.
+    /// For the law of Paper 002.
     cutting: Option<law::Cut>,
 }
 

@@ -15,11 +15,11 @@ pub struct Person {
     pub height_cm: Option<f64>,
     /// Sex, where the anatomy depends on it.
     pub sex: Option<Sex>,
-    /// What the patient suffers from, in words of at most 80 characters.
+    /// The patient's illness, in words of at most 80 characters.
     pub pathology: Option<String>,
-    /// Where the needle goes in.
+    /// The site of the insertion.
     pub site: Option<Site>,
-    /// How hard it is to do well.
+    /// The difficulty of doing it well.
     pub difficulty: Option<Difficulty>,
 }
 
@@ -33,7 +33,7 @@ pub enum Sex {
     Male,
 }
 
-/// Where the needle goes in.
+/// The site of the insertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Site {
@@ -47,7 +47,7 @@ pub enum Site {
     Phantom,
 }
 
-/// How hard it is to do well.
+/// The difficulty of doing it well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Difficulty {
@@ -59,7 +59,7 @@ pub enum Difficulty {
     Hard,
 }
 
-/// What makes a layer as thick as it is.
+/// The rule for a layer's thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Thickness {
@@ -69,7 +69,7 @@ pub(super) enum Thickness {
 }
 
 impl Thickness {
-    /// Of this patient, mm; refused where the patient's file does not say enough.
+    /// Returns the thickness for this patient, mm; an error if the patient's file does not say enough.
     pub(super) fn of_mm(self, person: &Person) -> Result<f64, String> {
         let Self::ByBodyMass = self;
         let missing = || "thickness by-body-mass needs patient.sex, weight_kg and height_cm".to_owned();
@@ -83,7 +83,7 @@ impl Thickness {
     }
 }
 
-/// Where each layer begins, mm: as its key says, unless one above it is as thick as the patient makes it.
+/// Returns the depth of each layer, mm: as its key says, unless the patient sets the thickness of one above it.
 pub(super) fn depths_mm(layers: &[Layer], person: &Person) -> Result<Vec<f64>, String> {
     let (mut depths_mm, mut moved_mm) = (Vec::new(), 0.0);
     for (number, layer) in layers.iter().enumerate() {

@@ -22,13 +22,13 @@ pub struct Stretch {
     pub first_tick: u64,
     /// 10 kHz.
     pub samples: Vec<Sample>,
-    /// What happened during these samples.
+    /// The events during these samples.
     pub events: Vec<Event>,
-    /// What had been set up anew before them; none where it was the recording's beginning.
+    /// The setup before them, if a new one was made; `None` for the recording's own.
     pub setup: Option<Setup>,
 }
 
-/// What was written.
+/// The files that were written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exported {
     /// The rig file.
@@ -105,7 +105,7 @@ fn counts_per_turn(hello: &Hello) -> f64 {
     std::f64::consts::TAU * hello.roller_radius_mm / hello.mm_per_count
 }
 
-/// What the mechanism behind `hello` is made of, as its data sheets have it.
+/// Returns the parameters of the mechanism behind `hello`, as its data sheets give them.
 pub(crate) fn mechanism(hello: &Hello) -> PlantConfig {
     // The plant takes the encoder's resolution as a whole number.
     let counts = counts_per_turn(hello).round() as u16;

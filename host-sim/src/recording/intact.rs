@@ -4,7 +4,7 @@
 /// Opcode and length of a record.
 const HEAD: usize = 9;
 const CHUNK: u8 = 0x06;
-/// What stands in a chunk before the name of its compression: times, size, check sum.
+/// The bytes of a chunk before the name of its compression: times, size, checksum.
 const BEFORE_COMPRESSION: usize = 28;
 
 /// The beginning of an MCAP file, up to the first record that runs out of an uncompressed chunk. Anything else that is wrong with
@@ -27,7 +27,7 @@ pub(super) fn intact(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// Where in an uncompressed chunk, whole or cut, a record begins that does not end in it.
+/// Returns the offset in an uncompressed chunk, whole or cut, of a record that begins but does not end in it.
 fn runs_out(chunk: &[u8]) -> Option<usize> {
     let compression = u32_at(chunk, BEFORE_COMPRESSION)?;
     let begin = BEFORE_COMPRESSION + 4 + 8;

@@ -1,4 +1,4 @@
-//! What stands in a recording, channel by channel: the frames of the link in decimal numbers, with the unit in the name.
+//! The contents of a recording, channel by channel: the frames of the link in decimal numbers, with the unit in the name.
 
 use control_core::config::DacWidth;
 use control_core::controller::Sample;
@@ -18,16 +18,16 @@ pub const CHANNELS: [(&str, &str, &str); 6] = [
     ("/link", "Link", include_str!("schemas/link.json")),
 ];
 
-/// What was set up before anything moved.
+/// The setup before anything moved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setup {
     /// Version of the program that recorded.
     pub program: String,
-    /// Where the samples came from.
+    /// The source of the samples.
     pub source: String,
     /// The profile's file as it stood, which the configuration can be made from again.
     pub profile_toml: String,
-    /// What errors call it.
+    /// The file's name in errors.
     pub profile_origin: String,
     /// Name of the scripted procedure, where a hand followed one.
     pub procedure: Option<String>,
@@ -36,10 +36,10 @@ pub struct Setup {
     pub device_toml: Option<String>,
 }
 
-/// Who spoke and in which scale.
+/// The device's identity and scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
-    /// Of the link.
+    /// Version of the link's protocol.
     pub version: u16,
     /// The microcontroller's unique number, hexadecimal.
     pub identity: String,
@@ -73,7 +73,7 @@ pub struct Samples {
     pub first_tick: u64,
     /// Counts past the zero.
     pub count: Vec<i32>,
-    /// What was written to the converter.
+    /// The codes written to the converter.
     pub dac: Vec<u16>,
     /// State, by its number.
     pub state: Vec<u8>,
@@ -81,10 +81,10 @@ pub struct Samples {
     pub tilt_mrad: Vec<i16>,
 }
 
-/// Where the needle was.
+/// The needle's pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// When.
+    /// Its tick.
     pub tick: u64,
     /// Depth past the zero.
     pub depth_mm: f64,
@@ -96,12 +96,12 @@ pub struct Pose {
     pub tilt_mrad: i16,
     /// State, by its number.
     pub state: u8,
-    /// What held torque back, a bit each.
+    /// The limits that held torque back, a bit each.
     pub limits: u8,
     /// Angle to the skin that the layers were met at; 0 in a recording from before it was told.
     #[serde(default)]
     pub angle_mrad: i16,
-    /// Where the tip was as seen from the vessel, by its number.
+    /// The tip's place relative to the vessel, by its number.
     #[serde(default)]
     pub vessel: u8,
     /// Force across the needle that would have held its direction.
@@ -137,7 +137,7 @@ pub enum Message {
 }
 
 impl Message {
-    /// When, for what has a time.
+    /// Returns the tick of a message that has one.
     pub fn tick(&self) -> Option<u64> {
         match self {
             Message::Samples(block) => Some(block.first_tick),
@@ -171,7 +171,7 @@ impl From<&frames::Hello> for Hello {
 }
 
 impl Hello {
-    /// Whether a device could have said this: what follows divides by it.
+    /// True if a device could have sent this: later code divides by it.
     pub fn is_plausible(&self) -> bool {
         (1e-6..=10.0).contains(&self.mm_per_count)
             && (0.1..=1_000.0).contains(&self.roller_radius_mm)

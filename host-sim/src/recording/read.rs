@@ -11,13 +11,13 @@ use std::path::Path;
 /// A recording in memory.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What errors call it.
+    /// The file's name in errors.
     pub file: String,
-    /// What was set up at the beginning.
+    /// The setup at the beginning.
     pub setup: Setup,
     /// Everything else, later set-ups too, in the order in which it was written.
     pub messages: Vec<Message>,
-    /// Why it ends early, where it does.
+    /// The reason why it ends early, if it does.
     pub cut: Option<String>,
 }
 

@@ -106,7 +106,7 @@ impl<W: Write + Seek> Recorder<W> {
         self.put(0, setup)
     }
 
-    /// Who speaks.
+    /// Writes the device's identity and scale.
     pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Failure> {
         self.put(1, &Hello::from(hello))
     }
@@ -134,7 +134,7 @@ impl<W: Write + Seek> Recorder<W> {
         self.bytes.load(Ordering::Relaxed)
     }
 
-    /// What errors call the file.
+    /// Returns the file's name for errors.
     pub fn file(&self) -> &str {
         &self.file
     }

@@ -128,7 +128,7 @@ impl Session {
         let _ = self.hub.controls.send(control);
     }
 
-    /// What a picture needs to know before anything moves.
+    /// Returns the scene for a picture before anything moves.
     pub fn scene(&self) -> Scene {
         lock(&self.hub.scene).clone()
     }
@@ -242,7 +242,7 @@ impl Publisher {
         self.each(|buffer| buffer.patient = Some(patient.clone()));
     }
 
-    /// What is practised: the goal that insertions are judged by, as JSON.
+    /// Sets the practised goal that insertions are judged by, as JSON.
     pub fn practice(&self, practice: &Value) {
         lock(&self.hub.state).practice = Some(practice.clone());
         self.each(|buffer| buffer.practice = Some(practice.clone()));
@@ -260,7 +260,7 @@ impl Publisher {
         self.each(|buffer| buffer.timing = Some(timing));
     }
 
-    /// How the link is doing.
+    /// Changes the state of the link.
     pub fn link(&self, change: impl FnOnce(&mut LinkStatus)) {
         change(&mut lock(&self.hub.state).link);
     }

@@ -1,13 +1,13 @@
-//! What a picture needs to know before anything moves, and what people call its parts. Nothing here changes while it runs.
+//! The scene that a picture shows before anything moves, and the names of its parts. It does not change while the session runs.
 
 use control_core::config::Tissue;
 use control_core::event::{State, VesselState};
 use serde::Serialize;
 
-/// What a picture needs to know before anything moves. Layers lie in the body: their depths are perpendicular to the skin.
+/// The scene that a picture shows before anything moves. Depths of layers are perpendicular to the skin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scene {
-    /// Where the samples come from.
+    /// The source of the samples.
     pub source: Source,
     /// Name of the profile.
     pub profile: String,
@@ -29,11 +29,11 @@ pub struct Scene {
     pub vessel: Option<SceneVessel>,
     /// The needle, the same for every picture.
     pub needle: SceneNeedle,
-    /// Whether [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] do anything: only with the virtual device.
+    /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] have an effect: only with the virtual device.
     pub hand: bool,
 }
 
-/// Where samples come from.
+/// The source of the samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Source {
@@ -60,7 +60,7 @@ pub struct SceneVessel {
     pub height_mm: f64,
     /// Diameter along the skin in mm.
     pub width_mm: f64,
-    /// How far the needle's plane passes beside the axis in mm.
+    /// The distance of the needle's plane from the axis in mm.
     pub offset_mm: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct SceneNeedle {
 
 /// Lengths in which such needles are sold (1, 1¼, 1½, 2 and 3⅛ inches), in mm.
 const LENGTHS_MM: [f64; 5] = [25.0, 32.0, 38.0, 50.0, 80.0];
-/// How much of the cannula stays outside at the deepest wall in mm.
+/// The length of the cannula that stays outside at the deepest wall in mm.
 const OUTSIDE_MM: f64 = 8.0;
 
 impl SceneNeedle {
@@ -97,15 +97,15 @@ impl SceneNeedle {
 /// One layer of tissue.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneLayer {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Whether it is the vessel that the procedure aims at.
+    /// True if it is the vessel that the procedure aims at.
     pub is_vessel: bool,
-    /// Whether it begins with the vessel's far wall.
+    /// True if it begins with the vessel's far wall.
     pub is_far_wall: bool,
     /// Depth of its outer face in mm, perpendicular to the skin.
     pub depth_mm: f64,
-    /// How far its wall is pushed in along the needle before it gives way, in mm, where it has one.
+    /// The travel along the needle at which its wall gives way, in mm, if it has one.
     pub puncture_travel_mm: Option<f64>,
     /// Part of that which is left when it has just given way, 0 to 1.
     pub spring_back: Option<f64>,
@@ -115,7 +115,7 @@ pub struct SceneLayer {
     pub friction_n_per_mm: f64,
 }
 
-/// What people call a tissue.
+/// Returns the name of a tissue for people.
 pub fn tissue_name(tissue: Tissue) -> &'static str {
     match tissue {
         Tissue::Skin => "skin",
@@ -130,7 +130,7 @@ pub fn tissue_name(tissue: Tissue) -> &'static str {
     }
 }
 
-/// What programs call the place of the tip as seen from a vessel.
+/// Returns the name for programs of the tip's place relative to a vessel.
 pub fn vessel_name(code: u8) -> &'static str {
     match VesselState::from_code(code) {
         Some(VesselState::Outside) => "outside",
@@ -142,7 +142,7 @@ pub fn vessel_name(code: u8) -> &'static str {
     }
 }
 
-/// What people call a state of the device.
+/// Returns the name of a device's state for people.
 pub fn state_name(code: u8) -> &'static str {
     match State::from_code(code) {
         Some(State::Idle) => "idle",

@@ -1,4 +1,4 @@
-//! What whoever looks at a device is told of it while it runs, and what a person may ask. Data alone: nothing here waits or sends.
+//! The messages to those who watch a running device, and the requests of a person. Data only: nothing here waits or sends.
 
 use super::Scene;
 use control_core::controller::Sample;
@@ -11,7 +11,7 @@ const NEAR_TICKS: u64 = control_core::TICK_HZ as u64 / 10;
 /// Something that happened, and where the needle was just before: after a puncture the force has already dropped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Happening {
-    /// What happened.
+    /// The event.
     pub event: Event,
     /// The last pose before its tick, where there was one lately.
     pub before: Option<Pose>,
@@ -34,23 +34,23 @@ pub struct PatientStatus {
     pub names: Vec<String>,
     /// The profile that counts, key by key as in its file.
     pub profile: serde_json::Value,
-    /// What became of the last wish.
+    /// The answer to the last request.
     pub answer: Option<PatientAnswer>,
 }
 
-/// What became of a wish for another patient.
+/// The answer to a request for another patient.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PatientAnswer {
-    /// Whether the device has taken it, whole.
+    /// True if the device has taken it, whole.
     pub taken: bool,
-    /// Why not, in one sentence.
+    /// The reason if it has not, in one sentence.
     pub reason: String,
 }
 
-/// How the link is doing, in totals since the session began.
+/// The state of the link, in totals since the session began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatus {
-    /// Whether the device has answered lately.
+    /// True if the device has answered lately.
     pub connected: bool,
     /// Frames that arrived whole.
     pub frames: u64,
@@ -64,24 +64,24 @@ pub struct LinkStatus {
     pub garbage: u64,
     /// The recording in progress.
     pub recording: Option<RecordingStatus>,
-    /// What a person should know: why there is no connection, why a command was refused, why recording ended.
+    /// A notice for a person: why there is no connection, why a command was refused, why recording ended.
     pub notice: Option<String>,
-    /// Where a recording that is played stands.
+    /// The position in a recording that is played.
     pub replay: Option<ReplayStatus>,
     /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
     pub compensation: Option<f64>,
 }
 
-/// Where a recording that is played stands.
+/// The position in a recording that is played.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ReplayStatus {
     /// Time into the recording, s.
     pub at_s: f64,
-    /// How long it is, s.
+    /// Its length, s.
     pub length_s: f64,
-    /// Whether it goes on by itself.
+    /// True if it plays.
     pub playing: bool,
-    /// How often it has jumped: what a page has drawn of another place is no longer true.
+    /// The number of jumps: after one, a page's drawing of another place is no longer valid.
     pub jumps: u64,
 }
 
@@ -97,7 +97,7 @@ pub struct RecordingStatus {
 /// All that arrived since the last drain.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// What is simulated, where that has changed (a subscriber's first batch says it too).
+    /// The scene, if it has changed (and in a subscriber's first batch).
     pub scene: Option<Scene>,
     /// The patient, where anything about it has changed.
     pub patient: Option<PatientStatus>,
@@ -115,7 +115,7 @@ pub struct Batch {
     pub events: Vec<Happening>,
     /// The latest times of the stages, where there were any.
     pub timing: Option<Timing>,
-    /// How the link is doing now.
+    /// The present state of the link.
     pub link: LinkStatus,
     /// Samples that this subscriber was too slow for.
     pub skipped_samples: u64,
@@ -130,7 +130,7 @@ pub enum PatientWish {
     Edited(serde_json::Value),
 }
 
-/// What a person may ask.
+/// The requests of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Control {
     /// Power up; torque fades in, a latched fault is cleared.
@@ -160,7 +160,7 @@ pub enum Control {
         /// Share of the stored gains, 0 to 1.
         share: f64,
     },
-    /// What happens is recorded from now on, in a new file of this name.
+    /// Record from now on, into a new file of this name.
     Record {
         /// Name without folder and ending.
         name: String,

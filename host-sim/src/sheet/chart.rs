@@ -17,9 +17,9 @@ const COLUMNS: usize = 600;
 /// One curve.
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
-    /// What the legend calls it; nothing for one that needs no name.
+    /// Its name in the legend; empty if it needs none.
     pub name: String,
-    /// Which colour: 0 to 5.
+    /// Its colour: 0 to 5.
     pub colour: u8,
     /// Drawn in dashes.
     pub dashed: bool,
@@ -36,7 +36,7 @@ pub struct Chart {
     pub x_label: String,
     /// Beside it, with the unit.
     pub y_label: String,
-    /// What is drawn, the last on top.
+    /// The curves, the last on top.
     pub curves: Vec<Curve>,
     /// Places along x that have a name.
     pub marks: Vec<(f64, String)>,

@@ -24,9 +24,9 @@ pub enum Cell {
     Number(String),
     /// One of a few words that the eye should find, each kind in its own colour.
     Tag {
-        /// What it says.
+        /// Its text.
         text: String,
-        /// Which kind: 0 to 3.
+        /// Its kind: 0 to 3.
         kind: u8,
     },
 }
@@ -50,7 +50,7 @@ pub fn decimal(value: f64, decimals: usize) -> String {
     text.replace('-', if is_zero { "" } else { "−" })
 }
 
-/// What HTML takes as itself.
+/// Returns `text` escaped for HTML.
 pub fn safe(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

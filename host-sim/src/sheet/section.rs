@@ -15,7 +15,7 @@ const HIGHEST: f64 = 460.0;
 /// A layer: it reaches down to the next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
-    /// What it is called; its colour goes by it.
+    /// Its name, which sets its colour.
     pub name: String,
     /// Depth of its upper face, perpendicular to the skin, mm.
     pub top_mm: f64,
@@ -33,9 +33,9 @@ pub struct Tube {
 /// A way of the tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Way {
-    /// What the legend calls it.
+    /// Its name in the legend.
     pub name: String,
-    /// Which colour: 0 to 5.
+    /// Its colour: 0 to 5.
     pub colour: u8,
     /// Along the skin and below it, mm.
     pub points: Vec<(f64, f64)>,
@@ -54,22 +54,22 @@ pub struct Needle {
     pub cannula_mm: [f64; 3],
 }
 
-/// What is drawn.
+/// The drawing of a section.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
     /// Over it.
     pub title: String,
     /// Outermost first.
     pub bands: Vec<Band>,
-    /// Where there is one.
+    /// The vessel, if there is one.
     pub vessel: Option<Tube>,
     /// The last on top.
     pub ways: Vec<Way>,
-    /// Where there is one, as far as the picture reaches.
+    /// The needle, if there is one, as far as the picture reaches.
     pub needle: Option<Needle>,
 }
 
-/// What is in view, mm.
+/// The field of view, mm.
 struct View {
     left: f64,
     right: f64,

@@ -12,20 +12,20 @@ use tokio::time::{MissedTickBehavior, interval};
 /// Between two looks at the session: 4 ms, at most 250 poses a second.
 const PERIOD: Duration = Duration::from_millis(4);
 
-/// What is known now.
+/// The present state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// The newest pose; none before the first.
     pub pose: Option<NeedlePose>,
-    /// Whether the device answers.
+    /// True if the device answers.
     pub connected: bool,
     /// The fault that has latched, in words.
     pub fault: Option<String>,
-    /// What has happened.
+    /// The events.
     pub events: Events,
 }
 
-/// How many events there were since the device came, and the last of them.
+/// The number of events since the device connected, and the last of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Events {
     total: u64,
@@ -44,7 +44,7 @@ impl Events {
         }
     }
 
-    /// How many there were.
+    /// Returns their number.
     #[cfg(any(test, feature = "foxglove"))]
     pub fn total(&self) -> u64 {
         self.total
@@ -58,7 +58,7 @@ impl Events {
     }
 }
 
-/// Where the needle is and what it feels, as it goes out in JSON; units stand in the names.
+/// The needle's pose and force as sent in JSON; units are in the names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NeedlePose {
     /// Seconds of the device's own clock.
@@ -81,7 +81,7 @@ pub struct NeedlePose {
     pub angle_rad: f64,
     /// The state of the control law, as [`messages::Pose::state`] names it.
     pub state: &'static str,
-    /// Where the tip is as seen from the vessel, as [`messages::Pose::vessel`] names it.
+    /// The tip's place relative to the vessel, as [`messages::Pose::vessel`] names it.
     pub vessel: &'static str,
 }
 
@@ -131,7 +131,7 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
     }
 }
 
-/// What an event says of the latched fault: one latches, a start clears it, others say nothing.
+/// Returns an event's effect on the latched fault: one latches, a start clears it, others have none.
 fn fault(happening: &Happening) -> Option<Option<String>> {
     match happening.event.kind {
         link::frames::EventKind::Fault { cause } => Some(Some(cause.to_string())),

@@ -31,7 +31,7 @@ const MOST_CLIENTS: usize = 32;
 /// A client that takes nothing for so long is gone.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Why a stream cannot be served.
+/// The reason why a stream cannot be served.
 #[derive(Debug)]
 pub struct StreamError {
     spec: Spec,
@@ -60,14 +60,14 @@ impl std::error::Error for StreamError {}
 /// Streams being served; dropped, they are not any more.
 #[derive(Debug)]
 pub struct Streams {
-    /// Where each stream is, in the order asked for.
+    /// The address of each stream, in the order of the request.
     addresses: Vec<(Kind, SocketAddr)>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Streams {
-    /// Where each stream is served (for UDP: sent to), in the order asked for.
+    /// Returns the address of each stream (for UDP, the destination), in the order of the request.
     pub fn addresses(&self) -> &[(Kind, SocketAddr)] {
         &self.addresses
     }

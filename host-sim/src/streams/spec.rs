@@ -1,4 +1,4 @@
-//! Which streams to serve, as a person writes them: `KIND` or `KIND=ADDRESS:PORT`.
+//! The streams to serve, as a person writes them: `KIND` or `KIND=ADDRESS:PORT`.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -43,7 +43,7 @@ impl fmt::Display for Kind {
 pub struct Spec {
     /// The protocol.
     pub kind: Kind,
-    /// Where it listens; for UDP, where it sends to.
+    /// Its address; for UDP, the destination.
     pub address: SocketAddr,
 }
 
@@ -59,7 +59,7 @@ impl Spec {
         Self { kind, address: SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port) }
     }
 
-    /// Whether anybody but this computer can take part without a token.
+    /// Checks that nobody but this computer can take part without a token.
     pub fn check(&self, token: Option<&Token>) -> Result<(), String> {
         if self.address.ip().is_loopback() {
             return Ok(());
@@ -100,7 +100,7 @@ impl FromStr for Spec {
     }
 }
 
-/// What a client beyond this computer has to say first.
+/// The token that a client beyond this computer must send first.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
@@ -108,7 +108,7 @@ impl Token {
     /// The smallest number of characters.
     pub const SHORTEST: usize = 12;
 
-    /// Whether `said` is the token; takes as long whatever the first difference is.
+    /// True if `said` is the token; takes equally long wherever they first differ.
     pub(super) fn is(&self, said: &[u8]) -> bool {
         let own = self.0.as_bytes();
         own.len() == said.len() && own.iter().zip(said).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0

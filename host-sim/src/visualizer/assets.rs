@@ -27,7 +27,7 @@ pub(super) const CLASS_PAGE: Asset = asset!("/", "class.html", PAGE);
 /// The page of a guide.
 pub(super) const GUIDE_PAGE: Asset = asset!("/", "guide.html", PAGE);
 
-/// What the pages are made of.
+/// The files of the pages.
 pub(super) const ASSETS: &[Asset] = &[
     asset!("/style.css", "style.css", "text/css; charset=utf-8"),
     asset!("/class.css", "class.css", "text/css; charset=utf-8"),

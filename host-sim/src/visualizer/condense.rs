@@ -32,7 +32,7 @@ struct Ranges {
 }
 
 impl Condenser {
-    /// What the page is told of `batch`: who the device is, where that changed, and everything but who moves the needle.
+    /// Returns the messages of `batch` for the page: the device, if it changed, and everything but who moves the needle.
     pub fn take(&mut self, mut batch: Batch) -> (Option<Device>, messages::Frame) {
         let device = batch.hello.take().map(|hello| self.begin(hello));
         self.notice_restart(&batch);
@@ -147,7 +147,7 @@ impl Condenser {
     }
 }
 
-/// What turns counts and codes into physical units.
+/// The scale from counts and codes to physical units.
 struct Scale {
     mm_per_count: f64,
     roller_radius_mm: f64,

@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToPage {
-    /// What is simulated; at the beginning, and again whenever it is another patient. Its fields are those of [`Scene`].
+    /// The scene; at the beginning, and again with each other patient. Its fields are those of [`Scene`].
     Scene(Scene),
     /// The patient, where it may be changed; again with the answer to each wish.
     Patient(PatientStatus),
-    /// What is practised, where insertions are judged: `goal` in words; again with another patient.
+    /// The practised goal, if insertions are judged: `goal` in words; again with another patient.
     Practice(serde_json::Value),
     /// An insertion that has ended, with its verdict: the fields of `practice::Attempt`.
     Attempt(serde_json::Value),
-    /// Who the device is; again whenever it starts anew.
+    /// The device; again whenever it restarts.
     Device(Device),
-    /// What has happened since the last frame.
+    /// The changes since the last frame.
     Frame(Frame),
 }
 
-/// Who the device is.
+/// The device.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Device {
     /// Its unique number in hexadecimal; zeros on the virtual device.
@@ -46,27 +46,27 @@ pub struct Device {
     pub fault: Option<String>,
 }
 
-/// What has happened since the last frame.
+/// The changes since the last frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Frame {
     /// The newest pose; null where none has arrived since the last frame.
     pub pose: Option<Pose>,
-    /// What the plots draw, oldest first.
+    /// The plots' buckets, oldest first.
     pub trace: Vec<Bucket>,
-    /// What happened, oldest first.
+    /// The events, oldest first.
     pub events: Vec<Event>,
-    /// How the link does.
+    /// The state of the link.
     pub link: Link,
-    /// Who moves the needle.
+    /// The one who moves the needle.
     pub hand: Hand,
     /// Times of the device's stages, once a second.
     pub timing: Option<Timing>,
 }
 
-/// Where the needle is and what it feels.
+/// The needle's pose and force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Pose {
-    /// When, in s.
+    /// Its time, in s.
     pub t_s: f64,
     /// Depth of the tip past the zero in mm.
     pub depth_mm: f64,
@@ -74,7 +74,7 @@ pub struct Pose {
     pub speed_mm_s: f64,
     /// The force that the control core computed, in N, positive when it resists insertion.
     pub force_n: f64,
-    /// What the motor gives at the needle after all limits, from the converter's code; in N, the same sign.
+    /// The motor's force at the needle after all limits, from the converter's code; in N, with the same sign.
     pub motor_n: f64,
     /// The motor's torque in mN·m, positive in the insertion direction.
     pub torque_mnm: f64,
@@ -82,7 +82,7 @@ pub struct Pose {
     pub tilt_rad: f64,
     /// Angle to the skin that the layers are met at, smoothed, in rad.
     pub angle_rad: f64,
-    /// Where the tip is as seen from the vessel: `outside`, `touching`, `in_lumen`, `through`, `beside` or `unknown`.
+    /// The tip's place relative to the vessel: `outside`, `touching`, `in_lumen`, `through`, `beside` or `unknown`.
     pub vessel: &'static str,
     /// The force across the needle that would hold its direction, in N; no motor gives it.
     pub lateral_n: f64,
@@ -113,7 +113,7 @@ impl Range {
 /// Something happened.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Event {
-    /// When, in s.
+    /// Its time, in s.
     pub t_s: f64,
     /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`, `flashback`, `far_wall`, `barrier` or `other`.
     pub kind: &'static str,
@@ -129,17 +129,17 @@ pub struct Event {
     pub limits: Option<u8>,
 }
 
-/// How the link does, totals since the session began.
+/// The state of the link, in totals since the session began.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Link {
-    /// What the session says of it.
+    /// The session's own status.
     #[serde(flatten)]
     pub status: LinkStatus,
     /// Samples that this page was too slow for; they are in the recording all the same.
     pub skipped_samples: u64,
 }
 
-/// Who moves the needle.
+/// The one who moves the needle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hand {

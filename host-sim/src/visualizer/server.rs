@@ -23,7 +23,7 @@ const LONGEST_MESSAGE: usize = 32_768;
 /// Connections at a time: eight pages with all their files. Whoever publishes does so to each.
 const MOST_CONNECTIONS: usize = 64;
 
-/// Why the page cannot be served.
+/// The reason why the page cannot be served.
 #[derive(Debug)]
 pub enum ServeError {
     /// Something else listens there.
@@ -35,7 +35,7 @@ pub enum ServeError {
     Io {
         /// The port.
         port: u16,
-        /// What the system says.
+        /// The system's error.
         error: io::Error,
     },
 }
@@ -56,11 +56,11 @@ impl fmt::Display for ServeError {
 
 impl std::error::Error for ServeError {}
 
-/// What every request needs.
+/// The state that every request needs.
 #[derive(Clone)]
 pub(super) struct Shared {
     pub(super) session: Session,
-    /// Whether a person has taken the needle in any page.
+    /// True if a person has taken the needle in any page.
     pub(super) person: Arc<AtomicBool>,
 }
 
@@ -73,7 +73,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Where the page is.
+    /// Returns the page's address.
     pub fn url(&self) -> String {
         format!("http://{}/", self.address)
     }

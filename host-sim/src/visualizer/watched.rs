@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-/// What one page is told: the next JSON text, where there is one.
+/// The source of one page's messages: the next JSON text, if there is one.
 pub type Watch = Box<dyn FnMut() -> Option<String> + Send>;
 /// A [`Watch`] for each page that comes.
 pub type Watches = Arc<dyn Fn() -> Watch + Send + Sync>;
@@ -17,7 +17,7 @@ pub type Watches = Arc<dyn Fn() -> Watch + Send + Sync>;
 /// Takes what a page says; false where it is nonsense, which ends that page's connection.
 pub type Said = Arc<dyn Fn(&str) -> bool + Send + Sync>;
 
-/// What a page of this kind is joined to.
+/// The connection of a page of this kind.
 #[derive(Clone)]
 pub(super) struct Watched {
     pub(super) watches: Watches,

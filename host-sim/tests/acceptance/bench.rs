@@ -14,7 +14,7 @@ const START_MM: f64 = -2.0;
 const STEADY_HAND: Grip =
     Grip { stiffness_n_per_m: 10_000.0, damping_n_s_per_m: 20.0, tremor_rms_m: 0.0, seed: 1 };
 
-/// What is looked at in each tick.
+/// The quantities of a tick that the tests look at.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// Depth along the needle, mm.
@@ -47,7 +47,7 @@ pub(crate) struct Bench {
     hand_mm: f64,
     /// Every tick since it was started.
     pub(crate) seen: Vec<Seen>,
-    /// What has happened since it was started.
+    /// The events since it was started.
     pub(crate) events: Vec<Event>,
 }
 

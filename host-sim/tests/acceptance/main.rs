@@ -1,4 +1,4 @@
-//! What the three documents ask of a simulator, a test for each sentence, by the sentence's name. They run the device's own control core
+//! The requirements of the three papers on a simulator, a test for each sentence, under its name. They run the device's own control core
 //! on the simulated mechanism; `tests` runs the same core's laws in the flash image bit for bit.
 
 mod bench;

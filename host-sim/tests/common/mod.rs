@@ -1,4 +1,4 @@
-//! What the tests of the command line share: the program, a folder of one's own, its output.
+//! The shared parts of the command line's tests: the program, a separate folder, its output.
 #![allow(dead_code, reason = "each test file uses some of it")]
 
 use std::path::{Path, PathBuf};

@@ -22,11 +22,11 @@ pub(crate) fn open() -> (Session, Publisher) {
     (session, publisher)
 }
 
-/// What became of a run.
+/// The result of a run.
 pub(crate) struct Paced {
     /// Its totals.
     pub(crate) outcome: Outcome,
-    /// How far the control path was behind the clock, looked at every 100 ms, least first.
+    /// The lag of the control path behind the clock, every 100 ms, in ascending order.
     pub(crate) late: Vec<Duration>,
 }
 
@@ -42,12 +42,12 @@ impl Paced {
     }
 }
 
-/// When a run ends.
+/// The end of a run.
 #[allow(dead_code, reason = "each test program uses the way that it needs")]
 pub(crate) enum End<'a> {
     /// After so many seconds.
     After(u64),
-    /// When somebody says so, however long that takes on a slow machine.
+    /// When the flag is set, however long that takes on a slow machine.
     When(&'a AtomicBool),
 }
 

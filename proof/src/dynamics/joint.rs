@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::rig::Entry;
 
-/// What the joint sees of a row.
+/// The joint's inputs at a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Instant {
     /// After the command's own effects, in the rig's unit.

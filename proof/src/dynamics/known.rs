@@ -13,10 +13,10 @@ use crate::signal::Normal;
 const GRID: usize = 5;
 const STEPS: usize = 24;
 
-/// How an effect's shape is searched: (name, lowest, highest), both positive, even in the logarithm.
+/// The search range of a shape's parameter: (name, lowest, highest), both positive, even in the logarithm.
 type Axis = (&'static str, f64, f64);
 
-/// What is fitted of an effect.
+/// The form of an effect to fit.
 struct Form {
     entry: Entry,
     axes: Vec<Axis>,
@@ -109,7 +109,7 @@ struct Fitted {
     cost: f64,
 }
 
-/// What the fit with the whole structure leaves on the held-out recording, and of which inertia.
+/// Returns the residual of the fit with the whole structure on the held-out recording, and its inertia.
 ///
 /// # Errors
 /// An effect that nothing is fitted to.
@@ -211,7 +211,7 @@ fn fit_at(
     Ok(Fitted { rig: fitted, cost: normal.residual(&moved) / normal.rows.max(1) as f64 })
 }
 
-/// What one unit of a coefficient adds to the left-hand side of the equation, in the band.
+/// Returns what one unit of a coefficient adds to the left-hand side of the equation, in the band.
 fn column(
     rig: &Rig,
     effect: usize,

@@ -1,6 +1,6 @@
-//! What a patched rig's effects do along a recording, as force: the sum of coefficient times term for every row.
+//! The force of a patched rig's effects along a recording: the sum of coefficient times term for every row.
 //!
-//! What is periodic along the travel is kept apart: encoder zeros differ between recordings, so its phase is found anew.
+//! Periodic terms along the travel are separate: encoder zeros differ between recordings, so their phase is found for each.
 
 use std::f64::consts::TAU;
 
@@ -26,7 +26,7 @@ pub(crate) struct Forces {
     pub(crate) waves: Vec<Wave>,
 }
 
-/// Whether the effect depends on the place along the travel, beyond what is periodic.
+/// True if the effect depends on the position along the travel, apart from periodic terms.
 pub(crate) fn is_along_travel(entry: &Entry) -> bool {
     matches!(
         entry.name.as_str(),
@@ -34,7 +34,7 @@ pub(crate) fn is_along_travel(entry: &Entry) -> bool {
     ) || is_over(entry, "travel")
 }
 
-/// Whether it is a table over this variable.
+/// True if it is a table over this variable.
 pub(crate) fn is_over(entry: &Entry, variable: &str) -> bool {
     entry.table.as_ref().is_some_and(|t| t.over.iter().any(|v| v == variable))
 }

@@ -27,7 +27,7 @@ pub(crate) struct Motion {
 
 /// Slower than this part of the recording's rms speed is at rest.
 const SLOWEST: f64 = 0.01;
-/// How far a low-pass smears a reversal to either side, over the inverse of its corner.
+/// The time over which a low-pass smears a reversal to either side, relative to the inverse of its corner.
 const SMEARED: f64 = 0.35;
 
 /// Rows of which one lies so many before or after that has something about it.

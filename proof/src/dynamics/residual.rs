@@ -136,7 +136,7 @@ impl Band {
         ]
     }
 
-    /// How many of `rows` rows that follow each other are worth one that is independent.
+    /// Returns the number of consecutive rows that count as one independent row.
     pub(super) fn dependence(bands: &[Band], rows: usize, seconds: f64) -> f64 {
         let corner = bands.first().map_or(1.0, |b| b.filters_hz[0].min(b.filters_hz[1]));
         (rows as f64 / (2.0 * corner * seconds).max(1.0)).max(1.0)

@@ -77,7 +77,7 @@ impl Entry {
     }
 }
 
-/// What the judge needs of a rig; units as in the contract.
+/// The parts of a rig that the judge needs; units as in the contract.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Rig {
     pub(crate) inertia: f64,

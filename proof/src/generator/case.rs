@@ -11,17 +11,17 @@ use super::strength::{Declared, Measured, measure};
 use crate::key::{Category, Parameter};
 use crate::rng::Rng;
 
-/// What to build.
+/// The specification of a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Spec {
     /// Opaque number: the only thing that the tool can see of it.
     pub(crate) id: usize,
     pub(crate) category: Category,
-    /// What is hidden: contract names, or foreign ones in [`Category::Outside`].
+    /// The hidden effects: contract names, or foreign ones in [`Category::Outside`].
     pub(crate) hidden: Vec<&'static str>,
     /// Effect over noise that is asked for; zero where nothing is hidden.
     pub(crate) strength: f64,
-    /// Which draw of the same kind this is.
+    /// The number of the draw among those of the same kind.
     pub(crate) repeat: usize,
     /// Plays one of these alone: recordings that cannot tell.
     pub(crate) poor: Option<&'static [Kind]>,
@@ -61,7 +61,7 @@ pub(crate) struct Case {
     /// A loop ran, and its reference is recorded.
     pub(crate) with_reference: [bool; 3],
     pub(crate) with_force: bool,
-    /// What the case turned out to be: what does not show in the recordings drawn cannot be asked for.
+    /// The category that the case turned out to have: effects that do not show in the recordings cannot be asked for.
     pub(crate) category: Category,
     /// The level nearest to what was reached.
     pub(crate) level: f64,
@@ -102,7 +102,7 @@ fn level(reached: f64) -> Option<f64> {
     LEVELS.iter().find(|(_, least)| reached >= *least).map(|(level, _)| *level)
 }
 
-/// What a case asks for, by what shows in it: one effect of a pair that does not show makes it a case of one.
+/// Returns the category and strength of a case by what shows in it: a pair with one effect that does not show is a case of one.
 fn settle(spec: &Spec, alone: &[f64]) -> (Category, f64) {
     let strongest = alone.iter().copied().fold(0.0, f64::max);
     match spec.category {
@@ -285,7 +285,7 @@ fn lost_control(rows: &[Row], m: &Machine) -> bool {
     clipped * 10 > rows.len() || far * 10 > rows.len()
 }
 
-/// What is played in a recording, whatever is hidden: three kinds, in the small run two.
+/// Draws the excitations of a recording, independent of the hidden effects: three kinds, in the small run two.
 fn draw_kinds(spec: &Spec, quick: bool, pick: &mut Rng) -> Vec<Kind> {
     if let Some(poor) = spec.poor {
         return vec![*pick.pick(poor)];

@@ -11,10 +11,10 @@ use super::strength::{Declared, Measured, measure};
 use crate::key::Category;
 use crate::rng::Rng;
 
-/// What is played and drawn for one recording.
+/// The excitation and the draws for one recording.
 pub(super) struct Plan {
     pub(super) segments: Vec<Segment>,
-    /// How long the machine has been running already, s.
+    /// The time for which the machine has been running already, s.
     pub(super) warm: f64,
     pub(super) times: Vec<f64>,
     pub(super) tilt: Series,
@@ -103,7 +103,7 @@ impl Draft<'_> {
         simulate(plant, believed, &run, step)
     }
 
-    /// What effect `i` alone does. Its companions that are terms of the nominal model are there as they will be, and known.
+    /// Measures what effect `i` alone does. Its companions that are terms of the nominal model are present and known.
     pub(super) fn measured(
         &self,
         i: usize,

@@ -1,4 +1,4 @@
-//! What makes the machine move: open-loop commands, motion profiles, and the loop that follows them. The loop runs at the
+//! The drive of the machine: open-loop commands, motion profiles, and the loop that follows them. The loop runs at the
 //! rows of the recording, on counts, so that the recorded command is exactly what the drive was sent.
 
 use std::f64::consts::TAU;
@@ -140,7 +140,7 @@ impl Drive {
         self.profile.as_ref().map_or((0.0, 0.0, 0.0), |p| p.at(t))
     }
 
-    /// What is added to a loop's command.
+    /// Returns the signal that is added to a loop's command.
     pub(crate) fn injected(&self, t: f64) -> f64 {
         self.tones.at(t)
     }

@@ -41,7 +41,7 @@ pub(crate) const EFFECTS: [&str; 25] = [
     "missed_counts",
 ];
 
-/// What the effect asks of the machine.
+/// Returns the effect's requirements on the machine.
 pub(crate) fn needs(name: &str) -> Needs {
     let mut needs = Needs::default();
     match name {
@@ -63,8 +63,8 @@ pub(crate) fn needs(name: &str) -> Needs {
     needs
 }
 
-/// Whether two effects may be hidden together: not where one takes the other's place, nor where motor data cannot tell the
-/// two apart.
+/// True if two effects may be hidden together: not if one can replace the other, nor if motor data cannot distinguish
+/// them.
 pub(crate) fn go_together(a: &str, b: &str) -> bool {
     const APART: [&[&str]; 8] = [
         &["backlash", "drive_compliance", "roller_slip", "presliding_friction"],

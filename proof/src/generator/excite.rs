@@ -36,7 +36,7 @@ pub(crate) enum Kind {
     OneTriangle,
 }
 
-/// What an engineer may play on any machine, whatever is wrong with it.
+/// The excitations that an engineer may play on any machine, whatever is wrong with it.
 pub(crate) const RICH: [Kind; 9] = [
     Kind::Staircase,
     Kind::Triangle,

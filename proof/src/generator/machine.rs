@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use super::plant::{Dry, Plant, Train};
 use crate::rng::Rng;
 
-/// What a case asks of the machine.
+/// The requirements of a case on the machine.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Needs {
     /// `Some(true)`: rotary only.
@@ -40,7 +40,7 @@ pub(crate) struct Machine {
     pub(crate) rate: f64,
     /// Duration of a recording, s.
     pub(crate) duration: f64,
-    /// Whether the rig file tells the turn.
+    /// True if the rig file states the turn.
     pub(crate) turn_told: bool,
     /// Start spread as the rig file tells it.
     pub(crate) start_spread: Option<f64>,
@@ -61,7 +61,7 @@ pub(crate) struct Machine {
     pub(crate) noise_share: f64,
 }
 
-/// How even the rows are.
+/// The regularity of the rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Clock {
     Even,
@@ -71,7 +71,7 @@ pub(crate) enum Clock {
     Host(f64),
 }
 
-/// How the time of a row is written down.
+/// The way in which the time of a row is written down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stamping {
     True,
@@ -84,12 +84,12 @@ pub(crate) enum Stamping {
 }
 
 impl Stamping {
-    /// Whether it errs anew with every row.
+    /// True if it errs independently at every row.
     pub(crate) fn by_chance(self) -> bool {
         matches!(self, Self::Noisy(_) | Self::Rounded(_))
     }
 
-    /// What stands in the file for the times, in whole microseconds, increasing.
+    /// Returns the times in the file, in whole microseconds, increasing.
     pub(crate) fn of(self, times: &[f64], rng: &mut Rng) -> Vec<f64> {
         let mut last = f64::NEG_INFINITY;
         times

@@ -22,12 +22,12 @@ pub(crate) const FOREIGN: [&str; 11] = [
 /// Kinds that the tool tells for what they are, without a name: no longer outside.
 const DETECTED: [&str; 5] = ["creep_spring", "hum", "payload_change", "linkage_inertia", "gear_loss"];
 
-/// Whether the tool has a detector for it.
+/// True if the tool has a detector for it.
 pub(crate) fn has_detector(name: &str) -> bool {
     DETECTED.contains(&name)
 }
 
-/// What it asks of the machine.
+/// Returns its requirements on the machine.
 pub(crate) fn needs(name: &str) -> Needs {
     let mut needs = Needs::default();
     if matches!(name, "irregular_wells" | "linkage_inertia" | "latching_force" | "travel_times_speed") {

@@ -1,5 +1,5 @@
-//! What the machine truly is: every piece of physics that a case may hide, as plain numbers. Written from the physics;
-//! knows nothing of the diagnosis and of what a rig file says.
+//! The true machine: every piece of physics that a case may hide, as plain numbers. Written from the physics;
+//! independent of the diagnosis and of the rig file.
 //!
 //! Units: rad or m for travel (called `u` for unit below), N·m or N for force, kg·m² or kg for inertia.
 
@@ -11,7 +11,7 @@ pub(crate) struct Harmonic {
     pub(crate) phase: f64,
 }
 
-/// How small commands vanish.
+/// The way in which small commands vanish.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum DeadbandKind {
     /// Zero inside, the excess outside: `u − d·sgn(u)`.
@@ -34,7 +34,7 @@ pub(crate) struct Clip {
     pub(crate) knee: f64,
 }
 
-/// How a slow change goes from start to settled.
+/// The course of a slow change from start to settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum DriftLaw {
     /// `1 − exp(−t/τ)`.
@@ -129,7 +129,7 @@ pub(crate) struct Dry {
     pub(crate) presliding: Option<Presliding>,
 }
 
-/// How the driven inertia hangs on the motor.
+/// The connection of the driven inertia to the motor.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Train {
     Rigid,
@@ -180,7 +180,7 @@ pub(crate) enum Foreign {
     Linkage { share: f64, centre: f64, width: f64 },
 }
 
-/// Where and how the encoder loses counts.
+/// The conditions and the size of lost counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LostCounts {
     /// Counts a burst.
@@ -258,7 +258,7 @@ impl Plant {
         (level * (1.0 + dry.asymmetry * sign(speed))).max(0.0)
     }
 
-    /// What the drive's electronics make of a command, before the current has risen.
+    /// Returns the command after the drive's electronics, before the current has risen.
     pub(crate) fn shaped_command(&self, command: f64) -> f64 {
         let mut u = command;
         if let Some(d) = self.deadband {

@@ -61,11 +61,11 @@ pub(crate) struct Run {
     pub(crate) offset: f64,
     /// Mechanical place at the start.
     pub(crate) start: f64,
-    /// What the encoder shows at mechanical zero.
+    /// The encoder's count at mechanical zero.
     pub(crate) zero_counts: f64,
     /// Standard deviation of a reading beyond its rounding, counts.
     pub(crate) noise_counts: f64,
-    /// How long the machine has been running already, for what warms, s.
+    /// The time for which the machine has been running already, for effects that warm up, s.
     pub(crate) warm: f64,
     /// |speed| beyond which the run counts as diverged.
     pub(crate) speed_bound: f64,
@@ -96,7 +96,7 @@ pub(crate) struct Row {
     pub(crate) moving: bool,
 }
 
-/// Why a run gave no recording.
+/// The reason why a run gave no recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Diverged;
 

@@ -1,4 +1,4 @@
-//! How strong an effect is, defined.
+//! The definition of an effect's strength.
 //!
 //! Let B be 100 Hz, or a twentieth of the sampling rate where that is less. In the two fit recordings, on rows that move
 //! (no instant at rest, and faster than 1 % of the recording's rms speed):
@@ -31,7 +31,7 @@ pub(crate) struct Declared {
     pub(crate) offset_allowed: bool,
 }
 
-/// What is measured of a set of recordings.
+/// The measurements of a set of recordings.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measured {
     pub(crate) effect: f64,

@@ -7,7 +7,7 @@ use crate::dynamics::recording::Recording;
 use crate::folder;
 use crate::tool::Paths;
 
-/// Where a carrier is.
+/// The location of a carrier.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     /// Name of the case's folder.

@@ -20,7 +20,7 @@ const EXACT: f64 = 0.1;
 pub(crate) struct Ground {
     pub(crate) carrier: Carrier,
     states: Vec<State>,
-    /// Of the recordings to fit on, in the band of the tool's force errors.
+    /// Those of the recordings to fit on, in the band of the tool's force errors.
     sights: Vec<Sight>,
 }
 
@@ -126,7 +126,7 @@ impl Ground {
         Some(Drawn { effect, changed, coulomb, oracle })
     }
 
-    /// Whether nobody would wonder at the size of the forces.
+    /// True if the size of the forces is plausible.
     fn bearable(&self, effect: &Concealed, changed: &[Changed]) -> bool {
         let rig = &self.carrier.rig;
         if let Law::Eccentric = effect.law {

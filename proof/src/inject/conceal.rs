@@ -26,7 +26,7 @@ pub(crate) struct Concealed {
     pub(crate) seed: u64,
 }
 
-/// What becomes of a recording.
+/// A recording with the effect concealed in it.
 #[derive(Clone, Debug)]
 pub(crate) struct Changed {
     pub(crate) command: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Whether concealing is exact, judged by the generator's integrator: a machine without the effect makes a recording; the
+//! The exactness of concealing, judged by the generator's integrator: a machine without the effect makes a recording; the
 //! effect is concealed in it; then a machine that *has* the effect in its equations is driven with the concealed command and
 //! has to move as recorded. The laws that move it are the generator's own.
 

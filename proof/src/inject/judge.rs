@@ -1,4 +1,4 @@
-//! What became of a concealed effect: whether it was found, what was named falsely, and where it was lost.
+//! The judgement of a concealed effect: whether it was found, which names are false, and where it was lost.
 
 use serde_json::Value;
 
@@ -12,12 +12,12 @@ pub(crate) struct Case {
     pub(crate) carrier: String,
     pub(crate) machine: String,
     pub(crate) hidden: &'static str,
-    /// What the effect leaves over what the tool's own model leaves on the untouched machine.
+    /// The ratio of the effect's residual to that of the tool's own model on the untouched machine.
     pub(crate) factor: f64,
     pub(crate) size: f64,
     pub(crate) oracle: Oracle,
     pub(crate) answer: Result<Answer, String>,
-    /// Where the tool lost the effect, and why it says so.
+    /// The stage at which the tool lost the effect, and its reason.
     pub(crate) lost: Lost,
     /// Names that the tool gives on the untouched machine.
     pub(crate) own: Vec<Named>,
@@ -27,7 +27,7 @@ pub(crate) struct Case {
     pub(crate) seconds: f64,
 }
 
-/// Where an effect stands among the hypotheses of the report.
+/// The rank of an effect among the hypotheses of the report.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Lost {
     /// It gains most on the held-out recordings, and is refused.
@@ -96,7 +96,7 @@ pub(crate) fn lost(report: &Value, hidden: &str) -> Lost {
     }
 }
 
-/// What a method said of a case.
+/// A method's answer to a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Said {
     Found,

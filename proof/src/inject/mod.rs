@@ -30,7 +30,7 @@ use crate::rng::Rng;
 use crate::scratch::Scratch;
 use crate::tool::{self, Paths, Tool};
 
-/// What the effect leaves over what the tool's own model leaves on the untouched machine.
+/// The ratios of the effect's residual to that of the tool's own model on the untouched machine.
 const FACTORS: [f64; 2] = [3.0, 1.0];
 /// Carriers that are tried for an effect before the case is given up.
 const ATTEMPTS: usize = 60;
@@ -43,7 +43,7 @@ const CASES: usize = 44;
 struct Known {
     place: Place,
     untouched: Untouched,
-    /// What the plain rival finds on it, once it has been asked.
+    /// The findings of the plain rival, once it has been run.
     plain: OnceLock<Vec<(&'static str, f64)>>,
     /// Its recordings, once a draw has asked for them; none where they cannot be read.
     ground: OnceLock<Option<Ground>>,
@@ -63,7 +63,7 @@ impl Known {
     }
 }
 
-/// Which case to draw.
+/// The case to draw.
 #[derive(Clone, Debug)]
 struct Wish {
     id: usize,

@@ -166,7 +166,7 @@ fn waves(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
     }
 }
 
-/// What a reading that errs once a turn makes of the inertia's force.
+/// The error of the inertia's force due to a reading error once per turn.
 fn eccentricity(b: &mut Builder, turn: f64) {
     let columns: Columns = Box::new(move |s, _| {
         let of = |f: fn(f64) -> f64| {

@@ -18,7 +18,7 @@ impl Block {
         }
     }
 
-    /// What coefficients leave at each row.
+    /// Returns the residual of `coefficients` at each row.
     pub(crate) fn left(&self, coefficients: &[f64]) -> Vec<f64> {
         let mut left = self.target.clone();
         for (c, column) in coefficients.iter().zip(&self.columns) {
@@ -72,7 +72,7 @@ pub(crate) fn left_on(blocks: &[Block], coefficients: &[f64]) -> f64 {
     rms(&errors)
 }
 
-/// What least squares says that knows the law.
+/// The result of least squares with the known law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Oracle {
     /// Coefficient of the true law, one where it is found as it is.
@@ -92,7 +92,7 @@ impl Oracle {
         Self { coefficient: with[last], share }
     }
 
-    /// Whether the recordings show the effect to who knows it.
+    /// True if the recordings show the effect to one who knows it.
     pub(crate) fn solves(&self) -> bool {
         (0.6..=1.6).contains(&self.coefficient) && self.share >= 0.1
     }

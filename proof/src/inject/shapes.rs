@@ -83,7 +83,7 @@ pub(crate) enum Law {
     },
 }
 
-/// Where a law acts.
+/// The side of the equation on which a law acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Force,
@@ -132,7 +132,7 @@ impl Law {
         }
     }
 
-    /// Whether forces grow in proportion to the size.
+    /// True if forces grow in proportion to the size.
     pub(crate) fn is_linear(&self) -> bool {
         self.side() == Side::Force || *self == Law::Eccentric
     }

@@ -1,4 +1,4 @@
-//! What a machine did, estimated from the recording alone: place and speed at the rows, for the laws, and every column of
+//! A machine's motion, estimated from the recording alone: position and speed at the rows, for the laws, and every column of
 //! the equation of motion through one low-pass, for regressions.
 
 use super::rig_file::RigFile;
@@ -120,7 +120,7 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// Of the recording with the command and counts given in place of its own.
+    /// Estimates the motion of the recording, with the given command and counts instead of its own.
     pub(crate) fn of(r: &Recording, rig: &RigFile, band: f64) -> Self {
         let (stamps, time, h) = grid(r);
         let rate = 1.0 / h;

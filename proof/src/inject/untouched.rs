@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::carrier::Place;
 use crate::tool::{self, Answer, Tool};
 
-/// What the tool says of an untouched machine.
+/// The tool's answer for an untouched machine.
 #[derive(Clone, Debug)]
 pub(crate) struct Untouched {
     pub(crate) answer: Answer,
@@ -28,7 +28,7 @@ fn stamp(place: &Place, tool: &str) -> String {
     format!("{hash:016x}")
 }
 
-/// Which tool this is, for the stamp: its command line, or the program itself.
+/// Returns an identification of the tool for the stamp: its command line, or the program itself.
 pub(crate) fn tool_mark(line: Option<&str>) -> String {
     if let Some(line) = line {
         return line.into();

@@ -1,5 +1,5 @@
-//! What one would do without the tool, on the same files: refit only, forward selection by BIC, sparse regression, a score
-//! test without opponents, an unstructured residual model, and a fit that has been told the whole structure. Each written in the straightforward way, on one common estimate of the motion.
+//! Methods without the tool, on the same files: refit only, forward selection by BIC, sparse regression, a score
+//! test without opponents, an unstructured residual model, and a fit that knows the whole structure. Each is written in the straightforward way, on one common estimate of the motion.
 
 mod estimate;
 mod features;
@@ -14,7 +14,7 @@ use crate::signal::Normal;
 use estimate::Table;
 use features::Feature;
 
-/// What a rival says of a case.
+/// The answer of a rival to a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Opinion {
     /// Whose it is, in [`RIVALS`].
@@ -109,7 +109,7 @@ fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {
     (gain.is_finite() && all > EXPLAINABLE * refit).then(|| (gain / all).clamp(-2.0, 2.0))
 }
 
-/// What the coefficients leave at the kept rows, and the rows' numbers.
+/// Returns the residual of the coefficients at the kept rows, and the rows' numbers.
 fn left_over<'a>(
     columns: &'a [Vec<f64>],
     table: &'a Table,

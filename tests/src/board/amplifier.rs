@@ -2,7 +2,7 @@
 
 use super::plant::Drive;
 
-/// What is wrong with it.
+/// The amplifier's fault.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Amplifier {
     /// Nothing.
@@ -19,7 +19,7 @@ pub enum Amplifier {
 }
 
 impl Amplifier {
-    /// What the motor gets where the board puts out `asked`.
+    /// Returns the motor's drive when the board outputs `asked`.
     pub(super) fn drive(self, asked: Drive) -> Drive {
         match self {
             Self::Sound => asked,
@@ -29,7 +29,7 @@ impl Amplifier {
         }
     }
 
-    /// Whether the enable line is high, where the board drives it to `level`.
+    /// Returns the level of the enable line when the board drives it to `level`.
     pub(super) fn line(self, level: bool) -> bool {
         level || self == Self::LineHigh
     }

@@ -35,7 +35,7 @@ const SOFTWARE: u32 = 0b111;
 /// The codes that the output buffer reaches: 0.2 V from either rail of 3.0 V.
 const BUFFERED: std::ops::RangeInclusive<u16> = 273..=4_095 - 273;
 
-/// Which trigger lets a held code out, `CR.TSEL1`.
+/// Returns the trigger that releases a held code, `CR.TSEL1`.
 fn selected(control: u32) -> u32 {
     control >> 3 & 0b111
 }
@@ -59,7 +59,7 @@ impl Dac {
         (self.control & EN1 != 0).then_some(reached)
     }
 
-    /// What the firmware did that the manual does not describe.
+    /// Returns the firmware's actions that the manual does not describe.
     #[must_use]
     pub(super) fn violations(&self) -> &[String] {
         &self.violations

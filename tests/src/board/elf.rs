@@ -5,7 +5,7 @@
 pub struct Symbol {
     /// As the compiler mangled it.
     pub name: String,
-    /// Where it is; a function's without the Thumb bit.
+    /// Its address; a function's without the Thumb bit.
     pub address: u32,
     /// Its size in bytes.
     pub size: u32,
@@ -36,7 +36,7 @@ fn sections(bytes: &[u8]) -> Option<Vec<[u32; 5]>> {
         .collect()
 }
 
-/// Where the code holds an instruction whose first four bytes `is_it` knows, by address.
+/// Returns the addresses of the instructions whose first four bytes satisfy `is_it`.
 #[must_use]
 pub fn instructions(bytes: &[u8], is_it: impl Fn([u8; 4]) -> bool) -> Vec<u32> {
     const PROGRAM: u32 = 1;
@@ -89,7 +89,7 @@ pub fn exits(bytes: &[u8], symbols: &[Symbol], address: u32) -> Vec<u32> {
     exits
 }
 
-/// Where the long branch at `place` leads: `b.w`, encoding T4.
+/// Returns the target of the long branch at `place`: `b.w`, encoding T4.
 fn branch(place: u32, first: u16, second: u16) -> u32 {
     let bit = |half: u16, at: u16| u32::from(half >> at & 1);
     let sign = bit(first, 10);

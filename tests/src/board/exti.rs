@@ -26,7 +26,7 @@ pub(super) struct Exti {
     pending: u32,
     /// The detector's output: the supply is below its threshold.
     detector: bool,
-    /// What the detector has become and the controller has not seen yet.
+    /// The detector's new state that the controller has not seen yet.
     arriving: Option<bool>,
     line: bool,
 }

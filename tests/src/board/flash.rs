@@ -49,9 +49,9 @@ pub struct Array {
     /// The supply goes right before this operation, and the core is reset.
     pub cut_before: Option<u64>,
     pub(super) cut: bool,
-    /// Whether it no longer takes what is programmed: an array at the end of its life.
+    /// True if it no longer accepts what is programmed: an array at the end of its life.
     pub worn: bool,
-    /// What the firmware did against the rules.
+    /// The firmware's actions against the rules.
     pub violations: Vec<String>,
 }
 
@@ -95,7 +95,7 @@ impl Array {
         self.words.keys().copied().collect()
     }
 
-    /// Whether the next operation still has supply; the one that hasn't cuts it.
+    /// True if the supply lasts for the next operation; the one for which it does not cuts the supply.
     fn powered(&mut self) -> bool {
         if self.cut_before == Some(self.operations) {
             self.cut_before = None;

@@ -84,7 +84,7 @@ impl Timer {
     }
 }
 
-/// Where the amplifier's set value comes from.
+/// The source of the amplifier's set value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SetValue {
     /// The part's own converter, 12 bits.
@@ -93,7 +93,7 @@ pub enum SetValue {
     Lines,
 }
 
-/// What is connected to the part. The default is the Discovery, with what is on it.
+/// The connections of the part. The default is the Discovery, with its parts.
 #[derive(Debug, Clone, Copy)]
 pub struct Wiring {
     /// The timer the encoder's tracks go to.
@@ -101,21 +101,21 @@ pub struct Wiring {
     /// The timer whose update is the tick, with the rate it counts at in hertz; without one no
     /// latency is measured.
     pub tick: Option<(Timer, u64)>,
-    /// Which pin goes where.
+    /// The pins in use.
     pub pins: Pins,
-    /// Where the motor's set value comes from.
+    /// The source of the motor's set value.
     pub set_value: SetValue,
     /// The accelerometer, if any.
     pub tilt: Option<tilt::Model>,
-    /// Whether an analogue inclinometer is there, level until [`Stopped::set_analogue`] says otherwise, and its strap with it.
+    /// True if an analogue inclinometer and its strap are fitted, level until [`Stopped::set_analogue`] changes it.
     pub inclinometer: bool,
-    /// Whether the motor's current is measured.
+    /// True if the motor's current is measured.
     pub current_monitor: bool,
     /// The part's supply when it is switched on, in millivolts.
     pub supply: u32,
-    /// How often the plant moves, in nanoseconds.
+    /// The period of the plant, in nanoseconds.
     pub plant_period: Nanos,
-    /// Whether the flash holds the record of a device that was commissioned, the default one.
+    /// True if the flash holds the record of a commissioned device, the default one.
     pub commissioned: bool,
 }
 
@@ -144,7 +144,7 @@ impl Wiring {
     }
 }
 
-/// Why a board could not be switched on.
+/// The reason why a board could not be switched on.
 #[derive(Debug)]
 pub struct Refused(String);
 
@@ -156,7 +156,7 @@ impl std::fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// Where the flash image is: `FIRMWARE_ELF`, or where `cargo xtask firmware` leaves it.
+/// Returns the path of the flash image: `FIRMWARE_ELF`, or where `cargo xtask firmware` leaves it.
 #[must_use]
 pub fn firmware_path() -> PathBuf {
     const DEFAULT: &str = "target/thumbv7em-none-eabihf/firmware/firmware";
@@ -164,14 +164,14 @@ pub fn firmware_path() -> PathBuf {
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(DEFAULT), PathBuf::from)
 }
 
-/// Where the image for a board is: beside the default board's.
+/// Returns the path of a board's image: in the folder of the default board's.
 #[must_use]
 pub fn image_for(pins: &Pins) -> PathBuf {
     let default = firmware_path();
     if *pins == pins::DISCOVERY { default } else { default.with_file_name(pins.image) }
 }
 
-/// Whether two addresses are in one memory of the part, the second as an end.
+/// True if two addresses are in one memory of the part, the second as an end.
 fn same_memory(low: u64, top: u64) -> bool {
     low < top && low >> 28 == (top - 1) >> 28
 }

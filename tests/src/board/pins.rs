@@ -1,4 +1,4 @@
-//! Which pin of the part goes where: one value for each board that there is an image for, read from its manual and from
+//! The connections of the part's pins: one value for each board that there is an image for, read from its manual and from
 //! `docs/hardware.md`, not from the firmware.
 
 /// A pin of the part: its port, 0 for A, and its number in the port.
@@ -31,7 +31,7 @@ impl PartPin {
     }
 }
 
-/// What is on the part's clock input.
+/// The source at the part's clock input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
     /// A crystal, which needs the oscillator (RM0090 7.2.1: `HSEBYP` clear).

@@ -1,16 +1,16 @@
-//! What hangs on the device's shaft: a plant takes the drive and gives the encoder's angle.
+//! The plant on the device's shaft: it takes the drive and gives the encoder's angle.
 
 use std::fmt;
 
 /// Virtual time since the board was switched on, in nanoseconds.
 pub type Nanos = u64;
 
-/// What the device puts out.
+/// The device's outputs to the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drive {
     /// The DAC code, 0 to 4095; mid-scale is zero torque. `None` while the pin is not driven.
     pub code: Option<u16>,
-    /// Whether the amplifier is enabled.
+    /// True if the amplifier is enabled.
     pub enabled: bool,
 }
 
@@ -112,7 +112,7 @@ impl Encoder {
         }
     }
 
-    /// When the next edge is due.
+    /// Returns the time of the next edge.
     pub(super) fn due(&self) -> Option<Nanos> {
         (self.angle != self.target).then_some(self.next_edge)
     }

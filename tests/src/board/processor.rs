@@ -17,7 +17,7 @@ use super::flash::{Flash, WRITABLE};
 use super::machine::INSTRUCTIONS_PER_SECOND;
 use super::pins::{PartPin, register};
 
-/// Where the manual puts the USB core, how much of it there is, and where its window is.
+/// The address of the USB core in the manual, its size, and the address of its window.
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
 /// The same for the DAC.
 pub(super) const DAC: (u64, u64, u64) = (0x4000_7400, 0x400, 0x4010_0000);
@@ -43,7 +43,7 @@ const REGISTER_XPSR: usize = 16;
 pub struct HandlerRun {
     /// The instruction count of the run at its first instruction.
     pub from: u64,
-    /// How many instructions it took.
+    /// The number of its instructions.
     pub instructions: u32,
 }
 
@@ -52,13 +52,13 @@ pub struct HandlerRun {
 pub struct Upset {
     /// The exception that has to be running; 0 is thread mode.
     pub exception: u32,
-    /// How many of its instructions it may do first.
+    /// The number of its instructions before the effect.
     pub after: u32,
-    /// What happens then.
+    /// The effect.
     pub effect: Effect,
 }
 
-/// What goes wrong.
+/// The kinds of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// The program goes on at this address. Bit 0 is ignored.
@@ -76,14 +76,14 @@ pub struct Counted {
     pub exits: Vec<u32>,
 }
 
-/// What a probe counts and does.
+/// The counts and actions of a probe.
 #[derive(Debug, Default)]
 pub struct Tally {
     /// The handler that is counted, if any.
     pub counted: Option<Counted>,
     /// Every completed run of that handler.
     pub runs: Vec<HandlerRun>,
-    /// Where the image masks all interrupts (PRIMASK, `true`) and restores what was before, by address.
+    /// The addresses at which the image masks all interrupts (PRIMASK, `true`) and restores the previous state.
     pub masks: BTreeMap<u32, bool>,
     /// The instruction count at which interrupts were masked, and how many times one in the other.
     masked_since: u64,
@@ -104,7 +104,7 @@ pub struct Tally {
 pub struct Probe(Arc<Mutex<Tally>>);
 
 impl Probe {
-    /// What was counted, to read or to change.
+    /// Returns the counts, to read or to change.
     pub fn tally(&self) -> MutexGuard<'_, Tally> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -118,7 +118,7 @@ pub(super) struct Probed {
     flash: Flash,
     /// Instructions' time in which nothing ran.
     stalled: u64,
-    /// Where breakpoints stop the core.
+    /// The addresses of breakpoints that stop the core.
     breakpoints: BTreeSet<u32>,
     /// The run of the counted handler that is under way.
     counting: Option<Run>,
@@ -397,7 +397,7 @@ struct Rerouted<'a> {
     /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
     standstill: u64,
     shorted: Option<PartPin>,
-    /// Whether the core is looked at after every instruction.
+    /// True if the core is inspected after every instruction.
     stepping: bool,
 }
 

@@ -21,7 +21,7 @@ use super::{SetValue, Timer, Wiring, rtt};
 /// A code on its way to the motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
-    /// When.
+    /// Its time.
     pub at: Nanos,
     /// The code.
     pub code: u16,
@@ -32,13 +32,13 @@ pub struct Output {
 /// A read of the encoder's counter by the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EncoderRead {
-    /// When.
+    /// Its time.
     pub at: Nanos,
     /// The counter.
     pub value: u32,
 }
 
-/// What the pins did.
+/// The log of the pins.
 #[derive(Debug, Clone, Default)]
 pub struct Log {
     /// Every write of a code to DAC channel 1.
@@ -49,11 +49,11 @@ pub struct Log {
     pub encoder: Vec<EncoderRead>,
     /// Every change of the amplifier's enable line, with what it became.
     pub enable: Vec<(Nanos, bool)>,
-    /// What came out of the RTT terminal.
+    /// The output of the RTT terminal.
     pub rtt: Vec<u8>,
 }
 
-/// Where to find things in the image.
+/// The addresses of symbols in the image.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Symbols {
     pub(super) rtt: Option<u64>,
@@ -64,17 +64,17 @@ pub(super) struct Symbols {
 /// A visit of the test to the stopped board.
 pub(super) type Visit = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
 
-/// What a test asks of the emulator's thread.
+/// The order from a test to the emulator's thread.
 pub(super) enum Order {
     Until(Nanos),
     Visit(Visit),
     End,
 }
 
-/// What the emulator's thread answers once the order is done.
+/// The answer of the emulator's thread once the order is done.
 pub(super) struct Done;
 
-/// What surrounds the part.
+/// The surroundings of the part.
 pub(super) struct World {
     pub(super) wiring: Wiring,
     pub(super) symbols: Symbols,
@@ -88,21 +88,21 @@ pub(super) struct World {
     pub(super) enabled: bool,
     pub(super) code: Option<u16>,
     latch_at: Option<Nanos>,
-    /// When the charge on the strap's pin has gone, which its pull-down takes away.
+    /// The time at which the pull-down has drained the strap's pin.
     strap_settles: Option<Nanos>,
     pub(super) amplifier: Amplifier,
-    /// Which of the drive's lines are connected to ground.
+    /// The drive's lines that are connected to ground.
     pub(super) closed: [bool; 3],
-    /// What the firmware did that a data sheet forbids.
+    /// The firmware's actions that a data sheet forbids.
     pub(super) violations: Vec<String>,
     busy: bool,
     painted: bool,
     pub(super) log: Log,
 }
 
-/// How often the RTT terminal is emptied.
+/// The period in which the RTT terminal is emptied.
 const DRAIN_EVERY: Nanos = 1_000_000;
-/// What an untouched word of the stack holds.
+/// The content of an unused word of the stack.
 pub(super) const PAINT: u32 = 0xC5C5_C5C5;
 
 impl World {
@@ -226,7 +226,7 @@ impl World {
         }
     }
 
-    /// When the trigger comes that a held code waits for: the compare of the tick's timer.
+    /// Returns the time of the trigger that a held code waits for: the compare of the tick's timer.
     fn trigger_due(&self, session: &mut Session<Machine>, at: Nanos) -> Option<Nanos> {
         const TIM4_TRGO: u32 = 0b101;
         let (timer, hertz) = self.wiring.tick?;
@@ -381,7 +381,7 @@ impl World {
         session.board_mut().part().rcc.attach_crystals(if fits { CLOCK_HZ } else { 0 }, 0);
     }
 
-    /// Where no strap is, its pin's pull-down begins to take the charge away.
+    /// Starts to drain the strap's pin by its pull-down if no strap is fitted.
     fn watch_strap(&mut self, at: Nanos, address: u64, value: u64) {
         const PULL_DOWN: u64 = 0b10;
         let Some(strap) = self.wiring.pins.strap.filter(|_| !self.wiring.inclinometer) else { return };

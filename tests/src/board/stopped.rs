@@ -74,7 +74,7 @@ impl Stopped<'_> {
         &mut self.world.log
     }
 
-    /// What drives the plant.
+    /// Returns the input of the plant.
     #[must_use]
     pub fn drive(&self) -> Drive {
         Drive { code: self.world.code, enabled: self.world.enabled }
@@ -129,7 +129,7 @@ impl Stopped<'_> {
         self.host.write(address, Width::W32, value.into()).is_ok()
     }
 
-    /// What the firmware did that the manual does not describe.
+    /// Returns the firmware's actions that the manual does not describe.
     #[must_use]
     pub fn violations(&self) -> Vec<String> {
         let machine = self.session.board();

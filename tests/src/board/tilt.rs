@@ -14,7 +14,7 @@ const OUT_LAST: u8 = 0x2D;
 /// Both measure a hundred times a second as the firmware sets them up.
 const MEASURE_EVERY: u64 = 10_000_000;
 
-/// Which accelerometer is on the board.
+/// The model of the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
     /// LIS302DL: 8 bits, 18 mg a digit.
@@ -23,7 +23,7 @@ pub enum Model {
     Lis3dsh,
 }
 
-/// What is wrong with it.
+/// The sensor's fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Health {
     /// Nothing.
@@ -42,7 +42,7 @@ pub enum Health {
 #[derive(Debug)]
 pub struct Accelerometer {
     model: Model,
-    /// What is wrong with it, if anything.
+    /// Its fault, if any.
     pub health: Health,
     registers: [u8; 128],
     /// The address the next byte goes to or comes from, once the first byte has come.
@@ -52,7 +52,7 @@ pub struct Accelerometer {
     noise: u64,
     transfers: u64,
     axes: [i32; 3],
-    /// When the next measurement is ready, in nanoseconds.
+    /// The time of the next measurement, in nanoseconds.
     next: u64,
 }
 
@@ -84,7 +84,7 @@ impl Accelerometer {
         chip
     }
 
-    /// What it measures along X, Y and Z from now on, in thousandths of a gravity.
+    /// Sets its measurements along X, Y and Z from now on, in thousandths of a gravity.
     pub fn set_milligravities(&mut self, axes: [i32; 3]) {
         self.axes = axes;
     }

@@ -13,7 +13,7 @@ use super::plant::{Encoder, Nanos};
 use super::wires::Wires;
 use super::{Timer, Wiring};
 
-/// How long a pull of 40 kΩ (data sheet DS8626, I/O static characteristics) takes to empty a pin with a wire on it: 100 pF
+/// The time that a pull of 40 kΩ (data sheet DS8626, I/O static characteristics) takes to empty a pin with a wire on it: 100 pF
 /// through the level at which the input changes, with a margin.
 pub(super) const PULL_SETTLES: Nanos = 10_000;
 
@@ -29,9 +29,9 @@ pub(super) struct Tracks {
     /// The charge that a pin without a wire still keeps, and until when.
     floating: [Option<bool>; 2],
     pub(super) floating_until: Option<Nanos>,
-    /// Where pins without a wire have been pulled to.
+    /// The levels to which pins without a wire have been pulled.
     settled: [bool; 2],
-    /// Whether the timer hears each pin.
+    /// True for each pin that the timer receives.
     heard: [bool; 2],
 }
 
@@ -76,7 +76,7 @@ impl Tracks {
         }
     }
 
-    /// When the next thing happens by itself.
+    /// Returns the time of the next change by itself.
     pub(super) fn due(&self) -> Option<Nanos> {
         self.encoder.due().into_iter().chain(self.glitch_ends).min()
     }
@@ -116,7 +116,7 @@ impl Tracks {
         }
     }
 
-    /// Whether the multiplexer leads from a pin to the timer.
+    /// True if the multiplexer connects a pin to the timer.
     fn hears(&self, session: &mut Session<Machine>, at: Nanos, place: PartPin) -> bool {
         use rigless::mcu::Operate;
         const ALTERNATE: u64 = 0b10;
@@ -142,7 +142,7 @@ impl Tracks {
         self.drive(session, at);
     }
 
-    /// What floats has gone where it is pulled, if that is due.
+    /// Moves floating pins to the level of their pull, if that is due.
     pub(super) fn settle(&mut self, session: &mut Session<Machine>, at: Nanos) {
         if self.floating_until.is_none_or(|due| due > at) {
             return;

@@ -13,7 +13,7 @@ pub enum Wire {
 }
 
 impl Wire {
-    /// What drives the pin, if anything.
+    /// Returns the level that drives the pin, if anything does.
     fn level(self, track: bool) -> Option<bool> {
         match self {
             Self::Sound => Some(track),
@@ -30,14 +30,14 @@ pub struct Wires {
     pub a: Wire,
     /// To the pin of track B.
     pub b: Wire,
-    /// Whether each goes to the other's pin.
+    /// True if each goes to the other's pin.
     pub swapped: bool,
     /// Pulses of this many nanoseconds on both pins, one at every step of the plant, as the motor's PWM leads bring them.
     pub glitches: Option<u64>,
 }
 
 impl Wires {
-    /// What drives the pins of track A and track B.
+    /// Returns the levels that drive the pins of track A and track B.
     pub(super) fn drive(&self, (a, b): (bool, bool), is_in_glitch: bool) -> [Option<bool>; 2] {
         let (a, b) = if self.swapped { (b, a) } else { (a, b) };
         [self.a.level(a), self.b.level(b)].map(|level| level.map(|level| level != is_in_glitch))

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// Where Debian and Ubuntu put it.
+/// The paths on Debian and Ubuntu.
 const PROGRAMS: &[&str] = &["/usr/bin/chromium", "/usr/bin/chromium-browser"];
 /// A first start with a fresh profile on a busy machine.
 const START_TIMEOUT: Duration = Duration::from_secs(60);

@@ -12,7 +12,7 @@ pub use chromium::Chromium;
 pub use page::Page;
 pub use program::{Places, Program};
 
-/// What went wrong with the browser, in one sentence.
+/// The browser's failure, in one sentence.
 pub type Failure = String;
 
 /// An error with what was seen instead, where something does not hold.

@@ -2,7 +2,7 @@
 
 use super::wire::{Device, Handshake};
 
-/// How a control transfer ended.
+/// The end of a control transfer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Ended {
     /// Not yet: the next transaction is due, at once or after the device asked for time.

@@ -1,10 +1,10 @@
-//! What a host learns from a device's descriptors: USB 2.0 chapter 9 and CDC 1.2 section 5.
+//! The information in a device's descriptors: USB 2.0 chapter 9 and CDC 1.2 section 5.
 
 /// The communications interface class, and the data interface class.
 const CLASS_COMMUNICATIONS: u8 = 0x02;
 const CLASS_DATA: u8 = 0x0A;
 
-/// Who the device says it is.
+/// The device's description of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Identity {
     /// The vendor's number.

@@ -22,12 +22,12 @@ pub use state::{Counts, Port};
 type Nanos = u64;
 
 const MILLISECOND: Nanos = 1_000_000;
-/// What a host waits after it sees a device, before it resets it; USB 2.0 section 7.1.7.3.
+/// The wait of a host between seeing a device and resetting it; USB 2.0 section 7.1.7.3.
 const DEBOUNCE: Nanos = 100 * MILLISECOND;
-/// How long it drives reset, and what the device gets to recover; section 7.1.7.5.
+/// The length of a reset, and of the device's recovery; section 7.1.7.5.
 const RESET: Nanos = 50 * MILLISECOND;
 const RECOVERY: Nanos = 10 * MILLISECOND;
-/// How long it drives resume, with the recovery after it; section 7.1.7.7.
+/// The length of a resume, with the recovery after it; section 7.1.7.7.
 const RESUME: Nanos = 30 * MILLISECOND;
 /// A bus without a start of frame for this long is suspended; section 7.1.7.6.
 const IDLE: Nanos = 3 * MILLISECOND;
@@ -35,7 +35,7 @@ const IDLE: Nanos = 3 * MILLISECOND;
 const PATIENCE: Nanos = 5_000 * MILLISECOND;
 /// A NAK is followed by the next token after this long.
 const NAK_WAIT: Nanos = 25_000;
-/// How often the interrupt endpoint is asked.
+/// The period in which the interrupt endpoint is polled.
 const NOTIFY_EVERY: Nanos = 16 * MILLISECOND;
 
 /// The most endpoint 0 of a full-speed device may take at once, in bytes; what a host assumes until
@@ -151,7 +151,7 @@ impl Host {
         self.line_state = Some(false);
     }
 
-    /// Whether an open application also reads; one that hangs does not.
+    /// Sets whether an open application also reads; one that hangs does not.
     pub fn set_reading(&mut self, reading: bool) {
         self.reading = reading;
     }
@@ -172,7 +172,7 @@ impl Host {
         self.input.drain(..).collect()
     }
 
-    /// Where the port stands.
+    /// Returns the state of the port.
     #[must_use]
     pub fn port(&self) -> Port {
         match &self.phase {
@@ -184,19 +184,19 @@ impl Host {
         }
     }
 
-    /// Whether the port is there, open, and the device has been told.
+    /// True if the port is present, open, and the device knows it.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.open && self.port() == Port::Configured
     }
 
-    /// Who the device said it is, the last time it was enumerated.
+    /// Returns the device's description of itself at the last enumeration.
     #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// What was counted.
+    /// Returns the counts.
     #[must_use]
     pub fn counts(&self) -> Counts {
         self.counts

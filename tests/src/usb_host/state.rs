@@ -1,6 +1,6 @@
-//! What a program on the PC sees of the port.
+//! The port as a program on the PC sees it.
 
-/// Where the port stands.
+/// The state of the port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Port {
     /// No cable, or a device that doesn't show itself.
@@ -15,12 +15,12 @@ pub enum Port {
     Failed(String),
 }
 
-/// What the host counted since it was made.
+/// The counts of the host since it was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// How often the serial port appeared.
+    /// The number of times that the serial port appeared.
     pub enumerations: u32,
-    /// How often it went away without the cable being pulled: the device restarted.
+    /// The number of times that it disappeared without the cable being pulled: the device restarted.
     pub disconnects: u32,
     /// Transactions that the device did not answer after it was configured.
     pub silences: u64,

@@ -1,4 +1,4 @@
-//! What crosses a full-speed USB cable, as whole transactions, and the device at its far end.
+//! The whole transactions on a full-speed USB cable, and the device at its far end.
 
 /// A device's answer to a token.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub enum Handshake {
 
 /// A device as the wire sees it.
 pub trait Device {
-    /// Whether it pulls D+ up, which is how a host sees a full-speed device.
+    /// True if it pulls D+ up, which is how a host sees a full-speed device.
     fn pulls_up(&self) -> bool;
     /// The host drives single-ended zero.
     fn bus_reset(&mut self);

@@ -168,7 +168,7 @@ fn no_command_raises_a_ceiling() {
 struct Bench {
     board: Board,
     needle: Needle,
-    /// Where the hand ends, in m.
+    /// The position at which the hand stops, in m.
     end: Option<f64>,
 }
 

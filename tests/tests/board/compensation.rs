@@ -1,4 +1,4 @@
-//! What was found of a mechanism's own forces is not felt any longer: on the flash image, and for a minute at rest with the same
+//! Compensation cancels the mechanism's own forces as they were found: on the flash image, and for a minute at rest with the same
 //! core on this machine. `fixtures/hidden-found.toml` is what the diagnosis made of `fixtures/hidden.toml`
 //! (`docs/compensation.md` has the commands).
 
@@ -40,7 +40,7 @@ fn insertion() -> Way {
     vec![(0.2, 0.0), (0.6, -0.002), (3.2, 0.012), (4.7, 0.012), (7.3, -0.002)]
 }
 
-/// Which part of it a time belongs to.
+/// The phases, each with its first and last time.
 const PHASES: [(&str, f64, f64); 3] = [("insertion", 0.6, 3.2), ("hold", 3.3, 4.7), ("withdrawal", 4.7, 7.3)];
 
 struct Felt {
@@ -94,7 +94,7 @@ fn find_angle(board: &mut Board, pc: &mut Pc, found: &Found) -> i32 {
     angle.count
 }
 
-/// What the hand feels beyond the law on the flash image.
+/// Returns the force beyond the law that the hand feels on the flash image.
 fn felt_on_board(found: Option<&Found>) -> Felt {
     let mechanism = SharedMechanism::new(Mechanism::new(ROTOR, TILT));
     let mut board = board(mechanism.plant());

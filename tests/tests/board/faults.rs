@@ -1,4 +1,4 @@
-//! What goes wrong takes torque away in time, is reported, and stays until a person starts again.
+//! Faults take torque away in time, are reported, and stay until a person starts again.
 
 use control_core::Config;
 use control_core::event::{Fault, Limits};
@@ -11,7 +11,7 @@ use tests::board::{Effect, MILLISECOND, Nanos, Wiring, plant};
 use tests::rig::{PRESSED, Rig, task};
 
 const TICK: Nanos = 100_000;
-/// What a tick can see is over in two ticks; the look at the pins adds 10 µs.
+/// A fault that a tick can see ends within two ticks; looking at the pins adds 10 µs.
 const TWO_TICKS: Nanos = 2 * TICK + 10_000;
 const HUNG: Nanos = 20 * MILLISECOND;
 

@@ -1,4 +1,4 @@
-//! What may be fitted instead: the 8-bit converter that a configuration names, the analogue inclinometer that a strap names.
+//! Alternative parts: the 8-bit converter that a configuration names, the analogue inclinometer that a strap names.
 //! The image is the same one.
 
 use control_core::Config;

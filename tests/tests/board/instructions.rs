@@ -1,4 +1,4 @@
-//! What a tick costs in instructions, and how deep the stack gets.
+//! The cost of a tick in instructions, and the depth of the stack.
 
 use std::collections::BTreeMap;
 
@@ -23,18 +23,18 @@ use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 
 /// The tick's interrupt handler.
 const TICK: &str = "TIM4";
-/// What a tick of the default may take, with nothing fed forward: five per cent of its cycles. The converter is latched after 3,360.
+/// The limit for a tick of the default patient without compensation: five per cent of its cycles. The converter is latched after 3,360.
 const LONGEST: u32 = 840;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_060;
 const EXCITING: u32 = 910;
-/// What a tick of the laws of Papers 002 and 000 may take.
+/// The limit for a tick of the laws of Papers 002 and 000.
 const OTHER_LAWS: u32 = 1_260;
 /// With all that can be fed forward.
 const COMPENSATED: u32 = 1_260;
 const WORKING: [State; 5] =
     [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal];
-/// When the hand begins to move.
+/// The time at which the hand begins to move.
 const BEGIN: Nanos = 200 * MILLISECOND;
 
 /// The instructions of each tick by what the tick was doing.

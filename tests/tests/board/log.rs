@@ -1,4 +1,4 @@
-//! What the firmware says over RTT is readable with nothing but its image: the bytes decoded as `defmt`.
+//! The firmware's log over RTT is readable with its image alone: the bytes decoded as `defmt`.
 
 use tests::board::log::Log;
 use tests::board::tilt::Health;

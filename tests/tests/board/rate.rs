@@ -7,7 +7,7 @@ use tests::scenario::{board_wired, venepuncture};
 
 const TICK: Nanos = 100_000;
 const MINUTE_TICKS: u64 = 600_000;
-/// What the cable may hold for the device: the host keeps it full.
+/// The bytes that the cable may hold for the device: the host keeps it full.
 const FLOOD_BYTES: usize = 4_096;
 
 /// Bytes that are no frame, and many that end one.

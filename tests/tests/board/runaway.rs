@@ -12,10 +12,10 @@ use tests::pc::Pc;
 use tests::rig::{Rig, ZERO_TORQUE, task};
 use tests::scenario::board_wired;
 
-/// What is asked of every fault of the drive, and of a dead channel.
+/// The time limits for every fault of the drive, and for a dead channel.
 const SOON: Nanos = 5 * MILLISECOND;
 const DEAD_CHANNEL: Nanos = 20 * MILLISECOND;
-/// How far the needle may have gone by then, in m.
+/// The largest travel of the needle by then, in m.
 const FAR: f64 = 0.002;
 
 /// A needle held 2.5 mm deep in skin, with torque on it.

@@ -15,7 +15,7 @@ use tests::rig::{Rig, ZERO_TORQUE, task};
 use tests::scenario::{board_wired, venepuncture};
 use tests::usb_host::Port;
 
-/// What a tick can see is over in two ticks; the look at the pins adds 10 µs.
+/// A fault that a tick can see ends within two ticks; looking at the pins adds 10 µs.
 const TWO_TICKS: Nanos = 210_000;
 
 fn connected() -> Rig {

@@ -1,4 +1,4 @@
-//! What the part and the board ask for and an emulator easily forgives: each test failed on the image of before.
+//! Requirements of the part and the board that an emulator easily forgives: each test failed on the previous image.
 
 use control_core::Config;
 use control_core::excitation::{Excitation, Servo, Signal};
@@ -191,7 +191,7 @@ fn nothing_masks_the_tick_for_longer_than_the_latch_waits() {
     assert!(3 * (masked + to_dac) / 2 < LATCH, "{masked} masked and {to_dac} to the converter");
 }
 
-/// What was asked for before the PC went is not done after.
+/// A request made before the PC left is not carried out afterwards.
 #[test]
 fn a_start_without_a_session_is_refused() {
     let mut rig = connected(Wiring::default());

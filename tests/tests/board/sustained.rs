@@ -1,4 +1,4 @@
-//! What protects against too much for too long, on the board: the heat of the winding and the energy of a stiff wall.
+//! The protections against sustained overload, on the board: the heat of the winding and the energy of a stiff wall.
 //! Either takes torque back and says so as a limit in force; neither is a fault.
 
 use std::sync::{Arc, Mutex};
@@ -55,7 +55,7 @@ fn stiff_wall() -> Config {
     config
 }
 
-/// Whether a limit was told, and when first; a fault ends the test.
+/// Returns the time at which a limit was first reported; a fault ends the test.
 fn first_told(pc: &Pc, limit: Limits) -> Option<u64> {
     let fault = pc.heard.events.iter().find(|event| matches!(event.kind, EventKind::Fault { .. }));
     assert_eq!(fault, None, "a limit in force is no fault");
@@ -131,7 +131,7 @@ struct Needle {
     leans_from: Nanos,
     position_m: f64,
     speed_m_per_s: f64,
-    /// Where it was at every step with torque on, in µm.
+    /// The needle's position at every step with torque on, in µm.
     track: Arc<Mutex<Vec<f64>>>,
 }
 
@@ -169,7 +169,7 @@ impl Needle {
 struct Ringing {
     /// Deviation of the needle at the end, in µm: in the last half second, or in 50 ms before a fault.
     deviation: f64,
-    /// When the observer was told to be in force.
+    /// The time at which the observer was reported to be active.
     told: Option<u64>,
     fault: Option<Fault>,
 }

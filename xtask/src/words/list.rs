@@ -32,5 +32,14 @@ pub(super) const PHRASES: [Phrase; 9] = [
 pub(super) const OPENINGS: [&str; 5] = ["What", "Whether", "How", "Where", "Of"];
 
 /// Folders and files whose doc comments still open otherwise; a clean one leaves this list.
-pub(super) const STILL_TO_CLEAN: [&str; 6] =
-    ["control-core/", "diagnosis/", "firmware/", "host-sim/", "proof/", "tests/"];
+pub(super) const STILL_TO_CLEAN: [&str; 9] = [
+    "control-core/",
+    "diagnosis/",
+    "firmware/",
+    "host-sim/src/force_fit/",
+    "host-sim/src/import/",
+    "host-sim/src/practice.rs",
+    "host-sim/src/procedure.rs",
+    "host-sim/src/reproduce/",
+    "host-sim/src/score/",
+];

@@ -8,9 +8,9 @@ use crc::{CRC_64_ECMA_182, Crc};
 pub(super) const HEADER: usize = 58;
 /// Longest STRING taken, in bytes.
 const LONGEST_STRING: u64 = 512;
-/// What the transform is called in Slicer.
+/// The transform's name in Slicer.
 const NEEDLE: &str = "Needle";
-/// What the status is called: some clients keep one message a name.
+/// The status's name: some clients keep one message per name.
 const DEVICE: &str = "NeedleDevice";
 
 const CRC: Crc<u64> = Crc::<u64>::new(&CRC_64_ECMA_182);

@@ -69,7 +69,7 @@ async fn client(stream: TcpStream, newest: watch::Receiver<Snapshot>, token: Opt
     }
 }
 
-/// Whether the first message is a STRING with the token.
+/// True if the first message is a STRING with the token.
 async fn says(reader: &mut OwnedReadHalf, token: &Token) -> io::Result<bool> {
     let mut header = [0; message::HEADER];
     reader.read_exact(&mut header).await?;

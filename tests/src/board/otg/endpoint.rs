@@ -5,7 +5,7 @@ use super::registers::device::*;
 /// The bits of a control register that a write sets as written; the others act or are read only.
 const STORED: u32 = 0x7FF | USBAEP | 0b11 << 18 | STALL | 0xF << 22;
 
-/// What both directions do with a written control register: the stored bits, NAK, data toggle,
+/// Applies a write to a control register, for both directions: the stored bits, NAK, data toggle,
 /// enable and disable. Answers whether a disable took effect.
 fn write_control(control: &mut u32, toggle: &mut bool, value: u32, kept: u32) -> bool {
     let mut next = (*control & !STORED) | (value & STORED) | kept;
@@ -43,7 +43,7 @@ pub(super) struct InEndpoint {
     number: usize,
     pub(super) control: u32,
     pub(super) interrupts: u32,
-    /// Whether the next packet goes out as DATA1.
+    /// True if the next packet is sent as DATA1.
     pub(super) toggle: bool,
     bytes_left: u32,
     packets_left: u32,
@@ -100,7 +100,7 @@ pub(super) struct OutEndpoint {
     number: usize,
     pub(super) control: u32,
     pub(super) interrupts: u32,
-    /// Whether the next packet has to be DATA1.
+    /// True if the next packet must be DATA1.
     pub(super) toggle: bool,
     pub(super) size: u32,
 }

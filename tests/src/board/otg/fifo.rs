@@ -15,7 +15,7 @@ enum Word {
     Data(u32),
 }
 
-/// What a status word announces once the firmware has taken it.
+/// The announcement of a status word once the firmware has taken it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Announced {
     /// Data follows, or nothing of interest.
@@ -64,7 +64,7 @@ impl ReceiveFifo {
         (self.depth as usize).saturating_sub(self.words.len())
     }
 
-    /// Whether a packet of `bytes` fits, its status word and the one that ends a transfer included.
+    /// True if a packet of `bytes` fits, its status word and the one that ends a transfer included.
     pub(super) fn fits(&self, bytes: usize) -> bool {
         self.room() >= bytes.div_ceil(4) + 2
     }

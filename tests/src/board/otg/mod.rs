@@ -46,7 +46,7 @@ pub struct Core {
     address_before: u8,
     suspended: bool,
     frame: u16,
-    /// Whether the SETUP stage of endpoint 0 still has to be announced as over.
+    /// True if the end of endpoint 0's SETUP stage has not been announced yet.
     setup_open: bool,
 }
 
