@@ -1,10 +1,10 @@
-//! Where the layers lie along the needle and what the tip has done to them so far: touched, pushed in, given way, left. It
-//! stands before the laws of force, which all ask here, and knows none of them.
+//! The positions of the layers along the needle and their states: touched, pushed in, given way, left. It
+//! serves the laws of force, which all ask here, and knows none of them.
 //!
 //! A layer has its depth perpendicular to the skin and stays there. Along the needle it is met at depth / sin(angle to the
 //! skin), which changes when the needle turns. A wall that has not given way is pushed in and carries what lies under it
 //! along: the next layer is touched only once the wall above it has given way. Then the wall springs back to a stated part
-//! of how far it was pushed in, and that part goes as its relief goes: the next layer lies deeper by what is left where the tip
+//! of its indentation, and that part vanishes with its relief: the next layer lies deeper by the remaining indentation where the tip
 //! comes to it, or is met where the wall gave way, if that is further in. So the order of events is the order of the anatomy, and where
 //! a wall is met does not depend on when a tick falls.
 //!
@@ -45,27 +45,27 @@ pub(crate) struct Layer {
     pub(crate) has_wall: bool,
 }
 
-/// How far a wall is pushed in before it gives way, and how it springs back.
+/// The travel at which a wall gives way, and its springing back.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wall {
-    /// Which layer begins with it.
+    /// The layer that begins with it.
     pub(crate) layer: usize,
     /// Travel past contact, along the needle.
     pub(crate) puncture: I16F16,
     /// Travel past contact at which nothing is left of it.
     pub(crate) relieved: I16F16,
-    /// What is left of its indentation when it has just given way.
+    /// The remaining indentation when it has just given way.
     pub(crate) left: I16F16,
     /// `left / (left + relieved − puncture)`, below 1: see [`Insertion::carried_along`].
     pub(crate) share: I2F30,
 }
 
-/// What has to have happened for the tip to be past the wall of a layer, or in the layer where it has none.
+/// The condition for the tip to be past the wall of a layer, or in the layer if it has none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Passage {
     /// The layer.
     pub(crate) layer: usize,
-    /// How many walls have given way.
+    /// The number of walls that have given way.
     pub(crate) given: usize,
 }
 
@@ -91,7 +91,7 @@ pub(crate) struct Anatomy {
     pub(crate) layers: Vec<Layer, MAX_LAYERS>,
     pub(crate) walls: Vec<Wall, MAX_LAYERS>,
     pub(crate) vessel: Option<Vessel>,
-    /// What the tilt reads with the needle laid on the skin.
+    /// The sensor's tilt with the needle laid on the skin.
     pub(crate) skin_tilt: i16,
 }
 
@@ -121,7 +121,7 @@ enum Turning {
     Placed(Angle),
 }
 
-/// Where the tip is among the layers. It comes through layers and walls in their order, so that two numbers say which it has
+/// The tip's place among the layers. It comes through layers and walls in their order, so that two numbers say which it has
 /// touched and which have given way; it meets or leaves at most one layer a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Insertion {
@@ -132,11 +132,11 @@ pub(crate) struct Insertion {
     smoothed: i32,
     turning: Turning,
     next_tops: [I16F16; MAX_LAYERS],
-    /// Of each layer, where it begins along the needle.
+    /// The depth of each layer along the needle.
     tops: [I16F16; MAX_LAYERS],
-    /// Of each wall, where the tip began to push it in.
+    /// The depth at which the tip began to push in each wall.
     origins: [I16F16; MAX_LAYERS],
-    /// How much later than at its top that was, because it was carried along.
+    /// The distance of that from the layer's top, because the wall was carried along.
     carried: [I16F16; MAX_LAYERS],
     touched: usize,
     given: usize,
@@ -188,27 +188,27 @@ impl Insertion {
         self.angle.depth_per_path
     }
 
-    /// Where the tip is as seen from the vessel.
+    /// Returns the tip's place relative to the vessel.
     pub(crate) fn vessel(&self) -> VesselState {
         self.vessel
     }
 
-    /// Whether the tip is in the layer of the wall that gives way next, and that wall is pushed in.
+    /// True if the tip is in the layer of the wall that gives way next, and that wall is pushed in.
     pub(crate) fn presses(&self) -> bool {
         self.is_pressing
     }
 
-    /// How many walls have given way.
+    /// Returns the number of walls that have given way.
     pub(crate) fn given(&self) -> usize {
         self.given
     }
 
-    /// Where layer `index` begins along the needle; of one that there is not, nowhere.
+    /// Returns the depth of layer `index` along the needle; the largest number if there is no such layer.
     pub(crate) fn top(&self, index: usize) -> I16F16 {
         self.tops.get(index).copied().unwrap_or(I16F16::MAX)
     }
 
-    /// How far the tip at `depth` is past where it met wall `index`.
+    /// Returns the travel of the tip at `depth` since it met wall `index`.
     pub(crate) fn travel(&self, index: usize, depth: Millimetres) -> I16F16 {
         depth.0.saturating_sub(self.origins.get(index).copied().unwrap_or(I16F16::MAX))
     }
@@ -232,7 +232,7 @@ impl Insertion {
         self.turning = Turning::Done;
     }
 
-    /// Whether the tilt is to be looked at without waiting for its turn.
+    /// True if the tilt must be read without waiting for its turn.
     pub(crate) fn is_new(&self) -> bool {
         self.is_new
     }
@@ -311,10 +311,9 @@ impl Insertion {
         }
     }
 
-    /// How much deeper than at rest the next layer lies where the tip comes to it, for what is left there of the last wall's
-    /// indentation.
+    /// Returns the extra depth of the next layer where the tip comes to it, due to the remaining indentation of the last wall.
     ///
-    /// With l left at the puncture and none from R on, l·(R − x)/ρ is left at x, ρ the way from the puncture to R. The tip comes to a
+    /// With l left at the puncture and none from R on, l·(R − x)/ρ remains at x, ρ the way from the puncture to R. The tip comes to a
     /// layer at T, which lies at `T + l·(R − x)/ρ` then, at `x = T + (R − T)·l/(l + ρ)`.
     fn carried_along(&self, anatomy: &Anatomy) -> I16F16 {
         let Some((wall, origin)) = self.last_given(anatomy) else { return I16F16::ZERO };
@@ -421,7 +420,7 @@ impl Anatomy {
     }
 }
 
-/// Whether the tissue is a wall of a vessel.
+/// True if the tissue is a wall of a vessel.
 pub(crate) fn is_vessel_wall(tissue: Tissue) -> bool {
     matches!(tissue, Tissue::Vessel | Tissue::FarWall)
 }

@@ -29,7 +29,7 @@ pub(crate) enum Law {
 /// count) therefore counts as at rest from one count to the next.
 const STICKS_AFTER: u16 = 200;
 
-/// Where the needle is held.
+/// The point at which the needle is held.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
     anchor: Anchor,

@@ -1,4 +1,4 @@
-//! What keeps the device from being started, and what ends a run that is under way: conditions that last, as against a
+//! The conditions that prevent a start and that end a run: they last, unlike a
 //! fault, which happens. Whoever sees the condition sets it and takes it back; nobody else does.
 
 use crate::event::Fault;
@@ -83,7 +83,7 @@ impl Interlocks {
         Self(1 << interlock as u8)
     }
 
-    /// Whether `interlock` is among them.
+    /// True if `interlock` is among them.
     pub const fn contains(self, interlock: Interlock) -> bool {
         self.0 & Self::of(interlock).0 != 0
     }

@@ -26,7 +26,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Of counts of this length, at most 0.62 mm.
+    /// For counts of this length, at most 0.62 mm.
     pub(crate) fn new(mm_per_count: I2F30) -> Self {
         let per_tick_q30 = i64::from(mm_per_count.to_bits()) * i64::from(TICK_HZ);
         let per_window_q30 = per_tick_q30 / i64::from(WINDOW_TICKS);
@@ -62,11 +62,11 @@ impl Scale {
 /// Slower than this the needle rests. 1 mm/s.
 pub(crate) const REST_SPEED: I16F16 = I16F16::from_bits(1 << 16);
 
-/// Whether the needle is being drawn out: fast enough, and by at least two counts. The speed alone says less, for one count in a
+/// Detects that the needle is being drawn out: fast enough, and by at least two counts. The speed alone says less, for one count in a
 /// window is faster than [`REST_SPEED`] already, and a needle at rest between two counts shows now one and now the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Withdrawal {
-    /// Where it last rested or went inwards.
+    /// The place where it last rested or went inwards.
     deepest: Counts,
     is_on: bool,
 }
@@ -107,7 +107,7 @@ pub(crate) struct SpeedEstimator {
     latest: Edge,
     /// Ticks and counts from where the window begins to `latest`.
     span: Edge,
-    /// When the latest of them was stored.
+    /// The tick in which the latest of them was stored.
     stored_tick: u32,
     /// Number of the next edge that is stored.
     next_edge: usize,
@@ -212,7 +212,7 @@ impl SpeedEstimator {
     }
 }
 
-/// How far the needle may have moved in a tick: the wrapped difference of two absolute counts.
+/// Returns the needle's motion: the wrapped difference of two absolute counts.
 pub(crate) fn moved(from: Counts, to: Counts) -> Counts {
     Counts(to.0.wrapping_sub(from.0))
 }

@@ -26,7 +26,7 @@ pub(crate) fn exp(x: I16F16) -> I16F16 {
 pub(crate) fn sine(angle: Milliradians) -> I2F30 {
     /// A milliradian in Q29.
     const MRAD_Q29: i32 = 536_870;
-    /// What is left of it in Q45.
+    /// Its remainder in Q45.
     const REST_Q45: i32 = 59_768;
     /// 1/(2k(2k + 1)) of x·(1 − x²/6·(1 − x²/20·(1 − …))), innermost first, in Q32.
     const SHARES_Q32: [i32; 5] = [39_045_157, 59_652_324, 102_261_126, 214_748_365, 715_827_883];

@@ -58,14 +58,14 @@ impl Energy {
 /// The force of the tissue by what makes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Elements {
-    /// Of walls, which give back what they have stored.
+    /// The force of walls, which return the energy that they store.
     pub(crate) walls: Newtons,
-    /// Of friction, cutting and damping.
+    /// The force of friction, cutting and damping.
     pub(crate) friction: Newtons,
 }
 
 impl Elements {
-    /// Of nothing.
+    /// No force.
     pub(crate) const NONE: Self = Self { walls: Newtons(I16F16::ZERO), friction: Newtons(I16F16::ZERO) };
 
     /// All together.
@@ -77,7 +77,7 @@ impl Elements {
 /// The observer with its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observer {
-    /// What went into the walls and has not come out.
+    /// The energy that went into the walls and has not come out.
     walls: Energy,
     /// The same of friction, at most [`FRICTION_STORE`].
     friction: Energy,
@@ -121,7 +121,7 @@ impl Observer {
         self.given.walls = Newtons(left.clamp(least, most));
     }
 
-    /// What the forces of the tick before did over the way since then.
+    /// Counts the energy of the forces of the tick before over the way since then.
     fn count_energy(&mut self, depth: Millimetres, wanted: Elements, has_given_way: bool) {
         let way = depth.0.saturating_sub(self.depth.0).to_bits().clamp(-LARGEST_WAY - 1, LARGEST_WAY);
         self.depth = depth;
@@ -165,9 +165,9 @@ fn counted(energy: Energy, given: Newtons, wanted: Newtons, way: i32) -> Energy 
     if is_nothing { Energy::default() } else { energy.with_work(given, way) }
 }
 
-/// What the compensation has put into the mechanism, less what the friction that was found there has taken out of it, in
-/// mN·m·counts in Q16. Waves by angle give back what they took, up to what they store; friction gives back less than it is
-/// there to take. What is more than that store is a surplus that makes the needle ring: then nothing is given along the way of
+/// The energy that the compensation has put into the mechanism, less the energy that the found friction has dissipated, in
+/// mN·m·counts in Q16. Waves by angle return what they took, up to what they store; friction compensation puts in less than friction
+/// dissipates. An excess over that store is a surplus that makes the needle ring: then nothing is given along the way of
 /// the needle until friction has taken it. A weight does not count: it is the same on the way in and out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Account {
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(observer.walls, Energy::default());
     }
 
-    /// Where the needle is `tick` ticks into its way from `from`.
+    /// Returns the needle's depth at `tick` of its way from `from`.
     #[expect(clippy::float_arithmetic, reason = "a test")]
     fn at(from: f64, step: f64, tick: i32) -> Millimetres {
         mm(from + step * f64::from(tick))

@@ -4,7 +4,7 @@
 use crate::units::Millimetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
-/// Where the needle is held to. P_curr_f of Paper 001's eq. 2, the tracking wall of Paper 002.
+/// The point that the needle is held to: P_curr_f of Paper 001's eq. 2, the tracking wall of Paper 002.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Anchor {
     /// Finer than a depth: an anchor that comes after the needle does so by shares of a thousandth and less.
@@ -51,7 +51,7 @@ fn fine(length: I16F16) -> I32F32 {
     I32F32::from_bits(i64::from(length.to_bits()) << 16)
 }
 
-/// Of a position that began as a depth and never left the range of one.
+/// Rounds a position that began as a depth and never left the range of one.
 fn coarse(position: I32F32) -> I16F16 {
     I16F16::from_bits((position.to_bits() >> 16) as i32)
 }

@@ -1,17 +1,17 @@
-//! Why a configuration may not run, in words that say what to do.
+//! The reasons why a configuration may not run, in words that say what to do.
 
 use core::fmt;
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
-/// Why a configuration may not run. `layer` counts from 0, the outermost.
+/// The reason why a configuration may not run. `layer` counts from 0, the outermost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
     /// A value lies outside its range.
     OutOfRange {
-        /// Which value.
+        /// The field.
         field: Field,
-        /// What was asked for.
+        /// The requested value.
         value: I16F16,
         /// The least it may be.
         low: I16F16,
@@ -20,7 +20,7 @@ pub enum Refusal {
     },
     /// A wall is steeper than the largest stiffness.
     TooStiff {
-        /// Which layer; for friction, the number of layers.
+        /// The layer; for friction, the number of layers.
         layer: u8,
         /// Its largest slope in N/mm.
         slope: I16F16,
@@ -29,11 +29,11 @@ pub enum Refusal {
     },
     /// A wall and the friction up to it ask for more force than the motor has.
     TooStrong {
-        /// Which layer.
+        /// The layer.
         layer: u8,
         /// The force in N.
         force: I16F16,
-        /// What the torque limit gives at the roller, in N.
+        /// The force of the torque limit at the roller, in N.
         limit: I16F16,
     },
     /// A layer does not begin below the one above it.
@@ -43,24 +43,24 @@ pub enum Refusal {
     },
     /// A wall's force jumps at contact.
     ContactStep {
-        /// Which layer.
+        /// The layer.
         layer: u8,
         /// The jump in N.
         force: I16F16,
     },
     /// A rising parabola's vertex lies past contact, or a relief's before its puncture: the force would pull.
     WrongWay {
-        /// Which layer.
+        /// The layer.
         layer: u8,
     },
     /// The relief begins above the force at which the wall gave way.
     ReliefAboveElastic {
-        /// Which layer.
+        /// The layer.
         layer: u8,
     },
     /// A layer lies beyond the travel.
     BeyondTravel {
-        /// Which layer.
+        /// The layer.
         layer: u8,
     },
     /// The far wall of a vessel does not lie right below its near one, or there are two vessels, or none for what is said of
@@ -71,11 +71,11 @@ pub enum Refusal {
     },
     /// There are more or fewer of something than there must be.
     Count {
-        /// What.
+        /// The field.
         field: Field,
-        /// How many there are.
+        /// The number found.
         found: u16,
-        /// How many there must be.
+        /// The required number.
         wanted: u16,
     },
     /// There is no layer.
@@ -84,28 +84,28 @@ pub enum Refusal {
     AboveCeiling {
         /// The force in N.
         force: I16F16,
-        /// What the ceiling gives at the roller, in N.
+        /// The force of the ceiling at the roller, in N.
         ceiling: I16F16,
     },
     /// The parts of a compensation ask together for more than its share of the torque ceiling.
     CompensationTooStrong {
-        /// What they ask for, in mN·m.
+        /// The requested torque, in mN·m.
         torque: I16F16,
-        /// What they may ask for, in mN·m.
+        /// The largest allowed torque, in mN·m.
         limit: I16F16,
     },
     /// With the friction that a compensation leaves, the stiffness that the device allows would ring.
     CompensationUnstable {
-        /// What the device allows, in N/mm.
+        /// The stiffness that the device allows, in N/mm.
         stiffness: I16F16,
-        /// What is stable, in N/mm.
+        /// The largest stable stiffness, in N/mm.
         limit: I16F16,
     },
     /// The stiffness that the device allows would ring with its friction, mass and delay.
     WouldRing {
-        /// What the device allows, in N/mm.
+        /// The stiffness that the device allows, in N/mm.
         stiffness: I16F16,
-        /// What is stable, in N/mm.
+        /// The largest stable stiffness, in N/mm.
         limit: I16F16,
     },
 }

@@ -1,5 +1,5 @@
-//! Whether the needle moves as a hand and a motor that is wired as it should be move it. Three looks, each every 0.8 ms,
-//! none at the force law: what a fault of the wiring does shows in the counts alone.
+//! Checks that the needle moves as a hand and a correctly wired motor move it. Three checks, each every 0.8 ms,
+//! none of the force law: a fault of the wiring shows in the counts alone.
 //!
 //! **Against the motor.** Where the motor's leads or the encoder's channels are swapped, what should hold the needle back
 //! drives it on: a needle that nobody holds speeds up against the torque by `torque/(radius·mass)`. That is looked for, with
@@ -12,7 +12,7 @@
 //!
 //! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again. So does a needle
 //! that a stiff wall throws to and fro over one edge, as fast as any: the wall's force steps with the count, and the less the
-//! needle moves the sooner it is back. The two are told apart by taking the step away: when counts go to and fro, the torque is
+//! needle moves the sooner it is back. Removing the step distinguishes the two: when counts go to and fro, the torque is
 //! held for 10 ms at the mean of both sides. A chatter then has nothing that throws it, and ends; a hand that moves on past a
 //! dead channel does not.
 
@@ -90,7 +90,7 @@ impl Bounds {
         }
     }
 
-    /// Whether `against`, counts that a span has gained against `torque`, are what a needle without a hand gains.
+    /// True if `against`, the counts that a span has gained against `torque`, are those of a needle without a hand.
     fn is_driven(&self, against: i32, torque: U16F16) -> bool {
         // Torques stay below 512 mN·m, counts of them below 2^24.
         let counts = |per_mnm_q8: i32| ((i64::from(torque.to_bits()) * i64::from(per_mnm_q8)) >> 24) as i32;
@@ -198,7 +198,7 @@ impl Watch {
         (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)
     }
 
-    /// Whether the last 3.2 ms go on with what the spans gained. A motor that drives goes on; a knock is over.
+    /// True if the motion of the spans continues in the last 3.2 ms. A motor that drives continues; a knock is over.
     fn still_gains(&self) -> bool {
         let middle = self.count(2);
         let latest = self.count(0).wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(self.count(4)));
@@ -212,7 +212,7 @@ impl Watch {
         I16F16::from_bits((early >> 2) + (middle >> 1) + (late >> 2))
     }
 
-    /// What the needle gained against the motor, and under which torque; [`Self::judge`] says what comes of it.
+    /// Compares the needle's gain against the motor with the torque; [`Self::judge`] decides.
     pub(crate) fn compare(&mut self) {
         let gained = self.gained;
         let torque = self.mean_torque();

@@ -68,7 +68,7 @@ impl Winding {
         self.squared += given.0.wide_mul(given.0);
     }
 
-    /// What the torques of the last [`WARM_TICKS`] have done.
+    /// Adds the heat of the torques of the last [`WARM_TICKS`].
     pub(crate) fn warm(&mut self, limits: &ThermalLimits) {
         const { assert!(WARM_TICKS == 8, "three places") };
         let mean: I32F32 = core::mem::take(&mut self.squared) >> 3_u32;

@@ -4,7 +4,7 @@ use crate::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, S
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
-/// What is left of an indentation when a wall gives way, where nobody knows better: 0.3, an assumption.
+/// The share of an indentation that remains when a wall gives way, if unknown: 0.3, an assumption.
 pub const SPRING_BACK: I16F16 = I16F16::from_bits(19_661);
 
 /// The most layers of a tissue.
@@ -17,14 +17,14 @@ pub const MAX_LAYERS: usize = 6;
 pub struct Vessel {
     /// Horizontal diameter, 0.2–30 mm.
     pub width: Millimetres,
-    /// How far the needle's plane passes beside the axis; half the width and more is past the vessel.
+    /// The distance of the needle's plane from the axis; half the width and more is past the vessel.
     pub offset: Millimetres,
 }
 
 /// One layer of tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Layer {
-    /// What it is, for events and pictures.
+    /// Its tissue, for events and pictures.
     pub tissue: Tissue,
     /// Depth of its outer face, perpendicular to the skin.
     pub depth: Millimetres,
@@ -34,7 +34,7 @@ pub struct Layer {
     pub friction: FrictionPerMillimetre,
 }
 
-/// What a layer is made of.
+/// The tissue of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Tissue {

@@ -75,7 +75,7 @@ quantity!(
     "mrad"
 );
 quantity!(
-    /// What is written to the converter; mid-scale is zero torque.
+    /// The code for the converter; mid-scale is zero torque.
     DacCode(u16),
     "DAC code"
 );

@@ -61,19 +61,19 @@ pub(crate) struct Wall {
     unload_q28: i32,
 }
 
-/// What the needle has done to a wall that has given way.
+/// The needle's cut through a wall that has given way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cut {
     /// The furthest travel past contact since then.
     frontier: I16F16,
-    /// How far that is past the relief parabola's vertex; before it, the force still falls.
+    /// The distance of that past the relief parabola's vertex; before it, the force still falls.
     pub(crate) past_vertex: I16F16,
     /// Force while the tip cuts on there, never below zero.
     force: Newtons,
 }
 
 impl Cut {
-    /// Of a wall that has not given way.
+    /// The cut of a wall that has not given way.
     pub(crate) const NONE: Self =
         Self { frontier: I16F16::MIN, past_vertex: I16F16::ZERO, force: Newtons(I16F16::ZERO) };
 }

@@ -1,4 +1,4 @@
-//! Whether a compensation may be fed forward on a device, and what the tick needs of it.
+//! Checks that a compensation may be fed forward on a device, and prepares the values for the tick.
 
 use super::feedforward::Ready;
 use super::{Friction, Gains, VERSION, Wave};
@@ -14,7 +14,7 @@ const TORQUE_SHARE: i32 = 4;
 /// Waves a turn: no more than one in so many counts.
 const COUNTS_PER_WAVE: u16 = 8;
 
-/// Whether `device` may feed its compensation forward at `gains`.
+/// Checks that `device` may feed its compensation forward at `gains`.
 pub fn check(device: &Device, gains: Gains) -> Result<(), Refusal> {
     let found = &device.compensation;
     if !found.is_some() {

@@ -10,7 +10,7 @@ use crate::passivity::Account;
 use crate::units::{MillimetresPerSecond, Milliradians};
 use fixed::types::{I2F30, I16F16};
 
-/// Of sixteen ticks, the one in which weight and gains are renewed; the controller's other turns leave it free.
+/// The turn, of sixteen ticks, in which weight and gains are renewed; the controller's other turns leave it free.
 const RENEW_TURN: u32 = 1;
 /// By how much a gain moves at each renewal: from 0 to 1 in 0.2 s, so that no change of it is a step.
 const GAIN_STEP: I16F16 = I16F16::from_bits(512);
@@ -21,9 +21,9 @@ const RELEASE_PLACES: u32 = 11;
 /// A compensation ready for the tick: every division done. [`super::check::prepare`] makes it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ready {
-    /// Whether there is anything to feed forward.
+    /// True if there is anything to feed forward.
     pub(super) is_some: bool,
-    /// Of which 2^32 are a turn.
+    /// The phase of a count; 2^32 are a turn.
     pub(super) phase_per_count: u32,
     /// mN·m·s/mm, inwards and outwards.
     pub(super) viscous: [I2F30; 2],
@@ -31,11 +31,11 @@ pub(crate) struct Ready {
     pub(super) per_blend: I2F30,
     /// 1/(2 · half width of the deadband), 1/(mN·m).
     pub(super) per_deadband: I16F16,
-    /// What waves by angle may store, mN·m·counts in Q16.
+    /// The energy that waves by angle may store, mN·m·counts in Q16.
     pub(super) store: i64,
 }
 
-/// Where the rotor is and how fast the needle.
+/// The rotor's angle and the needle's speed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Here {
     /// The encoder's absolute count, in the direction of insertion.
@@ -46,7 +46,7 @@ pub(crate) struct Here {
     pub(crate) turn: u32,
 }
 
-/// What is fed forward, with its memory.
+/// The feedforward with its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Feedforward {
     is_on: bool,
@@ -63,9 +63,9 @@ pub(crate) struct Feedforward {
     ripple: I16F16,
     /// Friction that is given back at a gain of 1, mN·m.
     rubbing: I16F16,
-    /// What was added to the torque in the tick before.
+    /// The torque that was added in the tick before.
     fed: I16F16,
-    /// What was given in the tick before, without weight and offset, and where.
+    /// The compensation of the tick before, without weight and offset, and its place.
     given: I16F16,
     count: i32,
     account: Account,
@@ -105,12 +105,12 @@ impl Feedforward {
         *self = Self { is_on: ready.is_some && is_wanted, wanted, index, count, ..Self::default() };
     }
 
-    /// Whether [`Self::tick`] has anything to do.
+    /// True if [`Self::tick`] has anything to do.
     pub(crate) fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// What it added to the torque in the tick before.
+    /// Returns the torque that was added in the tick before.
     pub(crate) fn fed(&self) -> I16F16 {
         self.fed
     }
@@ -163,8 +163,8 @@ impl Feedforward {
         self.steady = -at_gain(pulls, weight) - at_gain(found.offset.0, drive);
     }
 
-    /// What lifts a torque over the drive's deadband: all of it from twice its half width on, less below, so that there is no
-    /// step at zero.
+    /// Returns the addition that lifts a torque over the drive's deadband: the half width for torques of at least twice that, less
+    /// below, so that there is no step at zero.
     fn over_deadband(&self, found: &Compensation, ready: &Ready, asked: I16F16, drive: I16F16) -> I16F16 {
         let width = found.deadband.0;
         if width == I16F16::ZERO {
@@ -181,9 +181,9 @@ impl Feedforward {
 struct Rubbing {
     /// As found, against the needle's way.
     found: I16F16,
-    /// What to give back at a gain of 1, in the needle's way: nothing at rest, all of it from the full speed on.
+    /// The friction compensation at a gain of 1, along the motion: zero at rest, the whole friction from the full speed on.
     given_back: I16F16,
-    /// Which way the needle moves, where it does.
+    /// The direction of the needle, if it moves.
     moves_outwards: Option<bool>,
 }
 

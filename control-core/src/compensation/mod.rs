@@ -1,9 +1,9 @@
-//! What the device feeds forward so that the hand does not feel the mechanism: cogging and an off-centre mass by the rotor's
-//! angle, dry and viscous friction by direction, weight by tilt, the drive's offset, ripple and deadband. Forces as a
-//! diagnosis found them stand here; [`check`] says whether they may be fed forward and `feedforward` does it, tick by tick.
+//! The device's feedforward, by which the hand does not feel the mechanism: cogging and an off-centre mass by the rotor's
+//! angle, dry and viscous friction by direction, weight by tilt, the drive's offset, ripple and deadband. The forces as a
+//! diagnosis found them are here; [`check`] says whether they may be fed forward and `feedforward` does it, tick by tick.
 //!
-//! Only what was found is given back, each part at a gain below 1, so that some of the mechanism's own friction is always left:
-//! what is injected is less than what the mechanism takes. It may not know a force law, and no force law knows it.
+//! Each part is fed forward at a gain below 1, so that some of the mechanism's own friction always remains:
+//! the injected energy is less than the dissipated one. It may not know a force law, and no force law knows it.
 
 pub mod check;
 pub(crate) mod feedforward;
@@ -27,7 +27,7 @@ pub struct Compensation {
     pub version: u8,
     /// Torque by the rotor's angle in mN·m; the first wave of order 0 ends them.
     pub angle: [Wave; MAX_WAVES],
-    /// What the drive's torque is more than what was asked for, by the rotor's angle, as a share of it; as `angle`.
+    /// The excess of the drive's torque over the requested one, by the rotor's angle, as a share of it; as `angle`.
     pub ripple: [Wave; MAX_RIPPLES],
     /// Friction on the way in.
     pub inwards: Friction,
@@ -55,7 +55,7 @@ pub struct Wave {
     pub order: u16,
     /// In the unit of the force.
     pub amplitude: I16F16,
-    /// Of which 65,536 are a period.
+    /// The phase; 65,536 are a period.
     pub phase: u16,
 }
 
@@ -82,13 +82,13 @@ impl Gain {
 /// The gain of each part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Gains {
-    /// Of the waves by angle.
+    /// The gain of the waves by angle.
     pub angle: Gain,
-    /// Of friction.
+    /// The gain of friction.
     pub friction: Gain,
-    /// Of the weight.
+    /// The gain of the weight.
     pub weight: Gain,
-    /// Of the drive's offset, ripple and deadband.
+    /// The gain of the drive's offset, ripple and deadband.
     pub drive: Gain,
 }
 
@@ -124,7 +124,7 @@ impl Compensation {
         gains: Gains::OFF,
     };
 
-    /// Whether there is anything to feed forward, at whatever gain.
+    /// True if there is anything to feed forward, at whatever gain.
     pub fn is_some(&self) -> bool {
         Self {
             gains: Gains::OFF,
@@ -134,7 +134,7 @@ impl Compensation {
         } != Self::NONE
     }
 
-    /// Whether any of it depends on the rotor's angle, which has to be found after each reset.
+    /// True if any part depends on the rotor's angle, which has to be found after each reset.
     pub fn needs_angle(&self) -> bool {
         self.angle[0].order != 0 || self.ripple[0].order != 0
     }

@@ -15,13 +15,13 @@ const LARGEST_CONTACT_STEP: I16F16 = I16F16::from_bits(3_277);
 /// A vessel that the needle would see less of is passed beside: 0.2 mm.
 const LEAST_LUMEN: I16F16 = I16F16::from_bits(13_107);
 
-/// What the needle meets: its layers, and how it comes to the vessel.
+/// The layers that the needle meets, and its way to the vessel.
 pub(super) struct Meeting {
     pub(super) layers: Vec<Met, MAX_LAYERS>,
     way: Option<Way>,
 }
 
-/// How the needle comes to the vessel.
+/// The needle's way to the vessel.
 #[derive(Clone, Copy)]
 enum Way {
     /// Through the walls in these layers.
@@ -96,7 +96,7 @@ fn gives_way(layer: &Layer) -> I16F16 {
     layer.depth.0.saturating_add(layer.wall.map_or(I16F16::ZERO, |wall| wall.puncture_travel.0))
 }
 
-/// Where the vessel is among the layers: its near and its far wall.
+/// Returns the layers of the vessel's near and far wall.
 fn vessel_walls(config: &Config) -> Result<Option<(usize, Option<usize>)>, Refusal> {
     let layers = &config.patient.layers;
     let near = layers.iter().position(|layer| layer.tissue == Tissue::Vessel);
@@ -146,7 +146,7 @@ pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     Ok(Meeting { layers: met, way: Some(through) })
 }
 
-/// How much of its height a needle sees that passes beside the axis, √(1 − (2·offset/width)²).
+/// Returns the share of the vessel's height that a needle beside the axis passes, √(1 − (2·offset/width)²).
 fn chord(shape: &Vessel) -> Result<I16F16, Refusal> {
     within(Field::VesselWidth, shape.width.0, milli(200), milli(30_000))?;
     within(Field::VesselOffset, shape.offset.0, milli(-100_000), milli(100_000))?;

@@ -5,18 +5,18 @@ use control_core::TickOutput;
 use control_core::config::{Config, FrictionLaw, Law, Parabola, SpeedMethod};
 use control_core::event::{State, Transitions};
 
-/// What the fixed-point lengths along a slanted needle may be off by, in mm: within it, the twin takes the core's word for
+/// The largest error of fixed-point lengths along a slanted needle, in mm: within it, the twin takes the core's word for
 /// which side of a threshold the tip is.
 const LENGTH_DOUBT_MM: f64 = 3e-4;
 /// The tip has left a layer when it is this far outside, in mm.
 const EXIT_MM: f64 = 13_107.0 / 65_536.0;
 
-/// Whether a tip that is this far past a threshold (mm) is past it for the core, too.
+/// True if a tip that is this far past a threshold (mm) is past it for the core, too.
 fn is(margin: f64, told: bool) -> bool {
     if margin.abs() < LENGTH_DOUBT_MM { told } else { margin >= 0.0 }
 }
 
-/// What the twin remembers from tick to tick.
+/// The twin's memory from tick to tick.
 pub(crate) struct Twin {
     config: Config,
     mm_per_count: f64,
@@ -28,7 +28,7 @@ pub(crate) struct Twin {
     squared: f64,
     /// The largest torque that the heat allowed when it was last asked.
     allowed: f64,
-    /// What of the heat the places make that forces lose: half of the last one of each wall, of friction and of damping.
+    /// The error of the heat by rounded forces: half of the last place of each wall, of friction and of damping.
     heat_doubt: f64,
     /// A wall gave way in this tick, or in one since which a layer was touched in each.
     springing_back: bool,
@@ -38,12 +38,12 @@ pub(crate) struct Twin {
     last_edge: (usize, i32),
 }
 
-/// What the needle has done to one layer; the next one is met only once its wall has given way.
+/// The state of one layer; the next one is met only once its wall has given way.
 #[derive(Clone, Copy, Default)]
 struct LayerState {
     touched: bool,
     open: bool,
-    /// How much later than at its top the wall was met, because it was carried along.
+    /// The distance from its top at which the wall was met, because it was carried along.
     carried: f64,
     frontier: f64,
 }
@@ -135,7 +135,7 @@ impl Twin {
         continuous + (most - continuous) * ((allowed - self.heat) / (allowed / 5.0)).clamp(0.0, 1.0)
     }
 
-    /// Where layer `index` begins along the needle.
+    /// Returns the depth of layer `index` along the needle.
     fn top(&self, index: usize, stretch: f64) -> f64 {
         self.config
             .patient
@@ -144,7 +144,7 @@ impl Twin {
             .map_or(f64::INFINITY, |layer| layer.depth.0.to_num::<f64>() * stretch)
     }
 
-    /// Where the tip began to push in the wall of layer `index`.
+    /// Returns the depth at which the tip began to push in the wall of layer `index`.
     fn origin(&self, index: usize, stretch: f64) -> f64 {
         self.top(index, stretch) + self.layers[index].carried
     }
@@ -196,7 +196,7 @@ impl Twin {
         assert_eq!((contact, exit), (told.contact, told.exit), "at {depth} mm");
     }
 
-    /// How much deeper than at rest layer `next` lies where the tip comes to it: there, what is left of the indentation of the wall
+    /// Returns the extra depth of layer `next` where the tip comes to it: there, the remaining indentation of the wall
     /// that gave way last is as long as the tip is past the layer's place at rest.
     fn carried_along(&self, next: usize, stretch: f64) -> f64 {
         let Some(last) = self.layers.iter().rposition(|layer| layer.open) else { return 0.0 };
@@ -209,7 +209,7 @@ impl Twin {
         (before_relief * per_mm / (1.0 + per_mm)).clamp(0.0, left)
     }
 
-    /// Where the tip was when the last wall gave way.
+    /// Returns the tip's place when the last wall gave way.
     fn gave_way(&self, stretch: f64) -> f64 {
         let last = self.layers.iter().rposition(|layer| layer.open).expect("one has");
         let wall = self.config.patient.layers[last].wall.expect("it has given way");
