@@ -1,4 +1,4 @@
-//! Signals that separate one physical effect from another (`characterise`). The device plays them with nobody's hand on
+//! Signals that separate one physical effect from another (`characterise`). The device plays them with no hand on
 //! the needle: a reference that a soft position servo follows, a torque on top, or both. The safety limits stay in force.
 //!
 //! The reference is a pure function of the signal and the tick, so the PC can write down what the servo was asked to

@@ -197,7 +197,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Refusal::OutOfRange { field, value, low, high } => {
-                write!(f, "{field:?} is {value:.4}; it must lie from {low:.4} to {high:.4}")
+                write!(f, "{field:?} is {value:.4}; it must be from {low:.4} to {high:.4}")
             }
             Refusal::TooStiff { layer, slope, limit } => {
                 write!(

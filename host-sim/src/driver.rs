@@ -29,7 +29,7 @@ pub enum Request {
     Stop,
     /// The needle is at depth 0 now.
     Zero,
-    /// Play an excitation, with nobody's hand on the needle.
+    /// Play an excitation, with no hand on the needle.
     Excite(Excitation),
     /// Another patient; torque goes off for it.
     Patient(Box<Patient>),

@@ -1,7 +1,7 @@
 //! The command line of the needle device's PC side. It parses, calls the library, prints, and turns failures into one line
-//! and an exit status: 1 when what was asked for did not work out, 2 for unusable input.
+//! and an exit status: 1 if the request failed, 2 for unusable input.
 
-/// Prints a line. A pipe that nobody reads any longer is no reason to fail.
+/// Prints a line. A closed pipe is not a failure.
 macro_rules! say {
     ($($text:tt)*) => {{
         use std::io::Write as _;
@@ -9,7 +9,7 @@ macro_rules! say {
     }};
 }
 
-/// Prints a line that is no result: an address, advice. Not with `--quiet`.
+/// Prints a line that is not a result, such as an address or advice, unless `--quiet` is given.
 macro_rules! note {
     ($($text:tt)*) => {
         if !$crate::cli::output::is_quiet() {
@@ -18,10 +18,10 @@ macro_rules! note {
     };
 }
 
-/// Examples at the end of a help, and how to type them where nothing is installed.
+/// Examples at the end of a help text, and how to type them without an installation.
 macro_rules! examples {
     ($text:literal) => {
-        concat!($text, "\n\nIn the source folder `cargo run --release --` stands for `host-sim`.")
+        concat!($text, "\n\nIn the source folder, write `cargo run --release --` instead of `host-sim`.")
     };
 }
 
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     let result = match cli::Cli::try_parse() {
         Ok(cli) => cli.run(),
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
-            // Help that goes into a closed pipe is nobody's loss.
+            // Help may go into a closed pipe.
             let _ = error.print();
             return ExitCode::SUCCESS;
         }

@@ -237,7 +237,7 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
     if (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(format!("{key} is {value}; it must lie from {low} to {high}"))
+        Err(format!("{key} is {value}; it must be from {low} to {high}"))
     }
 }
 

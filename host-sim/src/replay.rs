@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_shows_that_place_and_what_came_before_and_nothing_else() {
+    fn a_jump_shows_only_that_place_and_what_came_before() {
         let recording = recording();
         let (session, publisher) = session::open(crate::visualizer::test_scene());
         let mut looker = session.subscribe();

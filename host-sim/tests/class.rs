@@ -81,7 +81,7 @@ fn ended_well(child: Child) -> String {
 }
 
 #[test]
-fn whoever_goes_is_gone_and_comes_back_and_no_recording_loses_a_sample() {
+fn members_leave_and_return_and_recordings_lose_no_sample() {
     let dir = folder("class");
     let meeting = meeting("ward-3", None);
     let recording = dir.join("steady.mcap");
@@ -141,7 +141,7 @@ fn a_wrong_token_or_none_is_not_let_in() {
 }
 
 #[test]
-fn other_computers_need_a_token_and_a_used_port_is_one_clear_line() {
+fn other_computers_need_a_token_and_a_used_port_is_reported() {
     for arguments in [
         &["class", "c", "--listen", "0.0.0.0:7447"][..],
         &["run", "--headless", "--class", "c", "--class-at", "192.0.2.1:7447"][..],

@@ -108,7 +108,7 @@ fn bad_input_is_one_line_and_status_two() {
 }
 
 #[test]
-fn what_is_misspelt_missing_or_empty_is_named_with_what_to_do() {
+fn misspelt_missing_and_empty_input_is_named_with_a_remedy() {
     let dir = folder("words");
     refused(&run(&["import", "a.csv", "--inertai", "0.1", "--out", "o"]), 2, &["--inertai", "--inertia"]);
     refused(&run(&["compensate", "--report", "r"]), 2, &["--out <DIR> is missing", "compensate --help"]);
@@ -147,7 +147,7 @@ fn every_command_has_help_with_an_example() {
 /// A limit on the size of files stands in for a full disk: the write fails in the same place.
 #[cfg(unix)]
 #[test]
-fn a_full_disk_is_one_line_and_the_recording_up_to_there_can_be_read() {
+fn after_a_full_disk_the_recording_so_far_can_be_read() {
     let dir = folder("full");
     let mcap = dir.join("a.mcap");
     let program = env!("CARGO_BIN_EXE_host-sim");
@@ -178,7 +178,7 @@ fn a_full_disk_is_one_line_and_the_recording_up_to_there_can_be_read() {
 
 #[cfg(unix)]
 #[test]
-fn a_killed_recording_can_be_read_and_an_interrupted_one_is_whole() {
+fn killed_recordings_are_readable_interrupted_ones_complete() {
     let dir = folder("killed");
     for (signal, is_whole) in [("KILL", false), ("INT", true)] {
         let mcap = dir.join(format!("{signal}.mcap"));

@@ -144,7 +144,7 @@ fn an_offset_above_the_friction_is_named() {
 }
 
 #[test]
-fn what_is_written_is_read_again() {
+fn a_written_record_is_read_back() {
     let found = commissioned(Wiring { leads_reversed: true, ..Wiring::default() });
     let text = found.to_toml("bench 3").expect("it can be written");
     let source = host_sim::library::Text { origin: "device.toml".into(), text };

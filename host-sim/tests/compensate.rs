@@ -21,7 +21,7 @@ fn line(hidden: &Rig) -> VirtualLine {
 }
 
 #[test]
-fn what_the_diagnosis_found_is_felt_by_a_quarter_only() {
+fn compensation_leaves_a_quarter_of_the_found_force() {
     let mut steps = Vec::new();
     let mut line = line(&rig("hidden.toml"));
     let outcome = compensate::compensate(&mut line, &rig("hidden-found.toml"), 1.0, |step| {
@@ -81,7 +81,7 @@ fn a_weight_that_the_report_does_not_have_is_measured() {
 }
 
 #[test]
-fn what_makes_the_hand_feel_more_is_taken_back() {
+fn parts_that_the_hand_feels_more_are_undone() {
     let mut wrong = rig("hidden-found.toml");
     // hidden.toml has no offset.
     wrong.model.offset = Some(1.0e-3);
@@ -159,7 +159,7 @@ fn rig_hidden() -> &'static Rig {
 }
 
 #[test]
-fn a_mechanism_that_is_not_the_diagnosed_one_is_told_by_its_turn() {
+fn the_slow_turn_detects_a_different_mechanism() {
     let mut other = rig("hidden.toml");
     other.effects.clear();
     let why = compensate::compensate(&mut line(&other), &rig("hidden-found.toml"), 1.0, |_| Ok(()));

@@ -100,7 +100,7 @@ impl Twin {
 }
 
 #[test]
-fn exported_torque_is_the_profiles_curve_within_a_converter_step() {
+fn exported_torque_follows_the_profile_within_a_dac_step() {
     for name in ["adult", "thin-elderly", "high-body-mass", "firm-skin"] {
         let dir = folder(&format!("force-depth-{name}"));
         let mcap = dir.join("a.mcap");

@@ -19,7 +19,7 @@ fn rows(heading: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn every_fault_rejection_and_failure_to_save_stands_in_the_glossary_word_for_word() {
+fn the_glossary_quotes_every_fault_and_rejection_exactly() {
     let faults = rows("Faults");
     assert_eq!(faults.len(), 1 + Fault::ALL.len(), "a head and a row each");
     for fault in Fault::ALL {
@@ -69,7 +69,7 @@ fn called(refusal: Refusal) -> &'static str {
 }
 
 #[test]
-fn every_refusal_and_verdict_stands_in_the_glossary() {
+fn the_glossary_has_every_refusal_and_verdict() {
     let (layer, x) = (0, I16F16::ONE);
     let refusals = [
         Refusal::OutOfRange { field: Field::Travel, value: x, low: x, high: x },

@@ -102,7 +102,7 @@ fn the_first_commands_run_as_they_stand() {
 
 #[cfg(unix)]
 #[test]
-fn the_worked_example_finds_what_was_hidden_and_prints_what_the_guide_says() {
+fn the_worked_example_finds_the_effect_and_prints_as_quoted() {
     let dir = folder("guide-example");
     let blocks = blocks(GUIDE, "## A complete example");
     let [commands, printed] = &blocks[..] else { panic!("{blocks:?}") };

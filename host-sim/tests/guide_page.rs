@@ -83,7 +83,7 @@ fn the_program_ends_a_guide_that_nobody_looks_at() {
 }
 
 #[test]
-fn what_came_of_it_stays_until_it_has_been_read() {
+fn the_result_stays_until_it_has_been_read() {
     let (guide, _stop) = guide();
     let ending = {
         let guide = guide.clone();

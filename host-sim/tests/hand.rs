@@ -29,7 +29,7 @@ fn resistance_n(device: &VirtualDevice) -> f64 {
 }
 
 #[test]
-fn a_dragged_needle_meets_the_skins_parabola_and_stays_where_it_is_let_go() {
+fn a_dragged_needle_meets_the_parabola_and_stays_when_released() {
     let mut device = started();
     device.control(Control::Drag { depth_mm: 2.6 });
     run(&mut device, 1.0);
@@ -46,7 +46,7 @@ fn a_dragged_needle_meets_the_skins_parabola_and_stays_where_it_is_let_go() {
 }
 
 #[test]
-fn a_wild_drag_does_not_trip_the_device_and_the_script_takes_over_again() {
+fn a_wild_drag_trips_nothing_and_the_script_resumes() {
     let mut device = started();
     for depth_mm in [1e9, -1e9, f64::NAN, 55.0, -40.0, f64::INFINITY, 0.0] {
         device.control(Control::Drag { depth_mm });

@@ -72,7 +72,7 @@ impl Bench {
 }
 
 #[test]
-fn a_device_is_off_until_somebody_starts_it_and_heartbeats_keep_it_on() {
+fn a_device_stays_off_until_started_and_on_with_heartbeats() {
     let mut bench = Bench::new();
     bench.run(1_000, |_| {});
     assert!(bench.driver.is_ready(bench.now()) && !bench.device.is_enabled());
@@ -86,7 +86,7 @@ fn a_device_is_off_until_somebody_starts_it_and_heartbeats_keep_it_on() {
 }
 
 #[test]
-fn a_pc_that_dies_takes_the_torque_with_it_and_one_that_comes_back_does_not_bring_it() {
+fn torque_ends_with_the_pc_and_does_not_return_with_it() {
     let mut bench = Bench::new();
     bench.start();
     // Into the skin, so that there is torque to lose.

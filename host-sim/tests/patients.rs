@@ -77,7 +77,7 @@ fn another_patient_is_taken_whole_and_the_run_goes_on_with_it() {
 }
 
 #[test]
-fn what_the_device_refuses_changes_nothing_and_the_reason_is_told() {
+fn a_refused_patient_changes_nothing_and_gives_its_reason() {
     let file = folder("patient-refused").join("a.mcap");
     // A motor that gives 1.7 N at the roller: enough for an adult, not for firm skin.
     let mut weak = Device::default();

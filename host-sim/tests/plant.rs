@@ -37,7 +37,7 @@ fn without_friction_energy_is_kept_and_with_it_never_gained() {
 }
 
 #[test]
-fn a_free_roller_settles_at_the_speed_where_friction_takes_all_torque() {
+fn a_free_roller_settles_where_friction_balances_the_torque() {
     let light = PlantConfig { needle_mass: 1e-3, ..config() };
     let mut plant = Plant::new(light, NO_HAND, 0.0);
     let share = 0.02;

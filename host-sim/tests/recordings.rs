@@ -84,7 +84,7 @@ fn a_cut_at_any_place_and_any_flipped_byte_is_survived() {
 }
 
 #[test]
-fn events_belong_to_their_own_session_even_where_ticks_begin_again() {
+fn events_stay_in_their_session_when_ticks_restart() {
     let mut file = Cursor::new(Vec::new());
     let mut recorder = Recorder::begin("two.mcap".into(), &mut file, &setup()).expect("memory is enough");
     for session in 0..2 {
@@ -149,7 +149,7 @@ impl Seek for Disk {
 }
 
 #[test]
-fn a_disk_that_fills_anywhere_is_one_line_and_loses_a_chunk_at_the_most() {
+fn a_full_disk_is_reported_and_loses_at_most_one_chunk() {
     for room in [0, 100, 5_000, 20_000, 100_000, 250_001] {
         let mut disk = Disk { file: Cursor::new(Vec::new()), room };
         let mut kept = 0;

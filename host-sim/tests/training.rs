@@ -115,7 +115,7 @@ fn patients_are_listed_with_their_layers() {
 }
 
 #[test]
-fn insertions_on_the_virtual_device_become_a_table_that_tells_others() {
+fn a_table_from_virtual_insertions_predicts_others() {
     let dir = folder("fit-device");
     let record = |speed: &str, angle: &str| {
         let file = dir.join(format!("{speed}-{angle}.mcap"));

@@ -300,7 +300,7 @@ pub enum Command {
     Zero,
     /// Still here.
     Heartbeat,
-    /// Play an excitation, with nobody's hand on the needle; only while torque is off.
+    /// Play an excitation, with no hand on the needle; only while torque is off.
     Excite(Excitation),
     /// The device's part of the configuration; taken whole or refused with the reason, and only while torque is off. One that
     /// calls itself commissioned is taken by a device that is, where it exchanges nothing that commissioning found and raises

@@ -154,7 +154,7 @@ fn a_motor_that_drives_the_other_way_is_not_commissioned() {
 }
 
 #[test]
-fn a_commissioned_device_is_lowered_by_a_command_and_raised_by_its_own_record_alone() {
+fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
     let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
     let whole = bench.record();
     let half = with(|device| device.limits.torque.0 /= 2);

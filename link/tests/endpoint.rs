@@ -222,7 +222,7 @@ fn a_configuration_is_known_by_its_hash() {
 }
 
 #[test]
-fn what_fits_the_longest_frame_is_encoded_and_a_byte_more_is_not() {
+fn the_longest_frame_is_encoded_and_a_longer_one_is_not() {
     let bytes = |length: usize| heapless::Vec::<u8, MAX_FRAME>::from_iter((0..length).map(|_| 1));
     // 1,024 bytes: the delimiter, five of COBS, four of CRC, and two that say how many follow.
     let mut out = [0; MAX_FRAME];
@@ -274,7 +274,7 @@ fn a_needle_that_goes_in_and_out_is_told_layer_by_layer() {
 }
 
 #[test]
-fn limits_in_force_are_told_when_they_change_and_the_slew_limit_is_not() {
+fn limit_changes_are_reported_except_the_slew_limit() {
     let mut device = Device::in_session();
     device.controller.order(Order::Start);
     // A puncture at 157 mm/s changes force faster than torque may change; 0.3 s later torque has faded in.
@@ -291,7 +291,7 @@ fn limits_in_force_are_told_when_they_change_and_the_slew_limit_is_not() {
 }
 
 #[test]
-fn what_waits_is_forgotten_with_the_pc_that_is_gone() {
+fn waiting_messages_are_forgotten_when_the_pc_leaves() {
     let mut device = Device::in_session();
     let output = device.controller.tick(TickInput::default());
     (0..200).for_each(|tick| device.endpoint.record(tick, &output));

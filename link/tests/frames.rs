@@ -189,7 +189,7 @@ fn a_session_begins_with_a_hello_and_loses_nothing() {
 }
 
 #[test]
-fn what_the_pc_does_not_take_is_counted() {
+fn frames_that_the_pc_misses_are_counted() {
     let mut bench = Bench::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     bench.run(3_200, |_| 0);
@@ -237,7 +237,7 @@ fn torque_and_configuration_exclude_each_other() {
 }
 
 #[test]
-fn a_patient_leaves_the_device_alone_and_a_device_that_does_not_suit_one_sends_one_away() {
+fn a_patient_never_changes_the_device_but_may_be_dismissed() {
     let mut bench = Bench::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     let ask = |bench: &mut Bench, command: Command| {

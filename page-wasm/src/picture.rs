@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_follows_the_device_s_punctures_and_shows_the_needle_in_its_plane() {
+    fn the_picture_follows_the_devices_punctures_and_needle() {
         let mut picture = Picture::new(&ADULT).expect("it can be built");
         let drive = |picture: &mut Picture, from: f32, to: f32| {
             for step in 0..=60 {
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn the_vessel_s_walls_in_the_needle_s_plane_are_those_of_the_profile() {
+    fn vessel_walls_in_the_needles_plane_match_the_profile() {
         let picture = Picture::new(&ADULT).expect("it can be built");
         for [upper, lower] in picture.lumen() {
             assert!((upper - 4.8).abs() < 0.15 && (lower - 7.8).abs() < 0.15, "{upper} to {lower} mm");

@@ -1,8 +1,9 @@
-//! One run of the benchmark: build a case, show its files to the tool, ask the rivals, keep the record, forget the rest.
+//! One run of the benchmark: build a case, show its files to the tool, ask the baselines, keep the record, forget the rest.
 
 use std::path::Path;
 use std::time::Instant;
 
+use crate::baselines;
 use crate::dynamics::Bench;
 use crate::generator::case::{Spec, build};
 use crate::generator::files;
@@ -10,8 +11,7 @@ use crate::judge::Record;
 use crate::options::Options;
 use crate::pool;
 use crate::report::Timed;
-use crate::reported;
-use crate::rivals;
+use crate::report_residuals;
 use crate::scratch::Scratch;
 use crate::tool::{Tool, ask};
 
@@ -48,11 +48,14 @@ fn run_case(
     let seconds = start.elapsed().as_secs_f64();
     let key = files::key(&case);
     let bench = Bench::new(&paths, &key);
-    let left = reported::judged(&bench, &out);
-    let reported = reported::reported(&paths, &out, &key);
+    let left = report_residuals::judged(&bench, &out);
+    let reported = report_residuals::reported(&paths, &out, &key);
     let record = Record {
         id: spec.name(),
-        opinions: rivals::known_structure(&bench, &key).into_iter().chain(rivals::judge(&case)).collect(),
+        opinions: baselines::known_structure(&bench, &key)
+            .into_iter()
+            .chain(baselines::judge(&case))
+            .collect(),
         key,
         answer,
         left,
@@ -95,8 +98,8 @@ mod tests {
     use super::*;
     use crate::cases::{Amounts, list};
     use crate::key::Category;
+    use crate::metrics::sum;
     use crate::report;
-    use crate::sums::sum;
     use crate::tool::Paths;
 
     /// Names cogging whatever it is shown, and checks that it is shown nothing else.
@@ -128,8 +131,8 @@ mod tests {
         });
         specs.truncate(5);
         let (records, unbuilt) = run_cases(&options, &specs, &AlwaysCogging).unwrap();
-        let sums = sum(&records);
-        assert_eq!(sums.null_alarms.hits, sums.null_alarms.trials);
+        let metrics = sum(&records);
+        assert_eq!(metrics.null_alarms.hits, metrics.null_alarms.trials);
         let false_names = records.iter().filter(|r| !r.none_false()).count();
         assert!(false_names >= 3, "{false_names}");
         // It improves nothing: its patched rig is the nominal one, which a refit betters.
@@ -144,10 +147,10 @@ mod tests {
             planned: 5,
             unbuilt,
         };
-        let text = report::markdown(&records, &sums, &run);
+        let text = report::markdown(&records, &metrics, &run);
         assert!(text.contains("| nulls named | ≤ 1 % | 100.0 %"), "{text}");
         // What goes to the tool's author holds no single case.
-        assert!(!report::aggregate(&records, &sums, &run).contains("Every miss"));
+        assert!(!report::aggregate(&records, &metrics, &run).contains("Every miss"));
     }
 
     #[test]

@@ -6,8 +6,8 @@ use crate::generator::effects::{EFFECTS, go_together};
 use crate::generator::excite::Kind;
 use crate::generator::outside::FOREIGN;
 use crate::key::Category;
+use crate::metrics::STRENGTHS;
 use crate::rng::Rng;
-use crate::sums::STRENGTHS;
 
 /// So many effects by chance that may be hidden together.
 fn draw_together(count: usize, rng: &mut Rng) -> Vec<&'static str> {

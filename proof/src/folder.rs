@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::belief::{self, Belief};
+use crate::expected_answer::{self, ExpectedAnswer};
 use crate::key::Key;
 use crate::tool::Paths;
 
@@ -13,7 +13,7 @@ use crate::tool::Paths;
 #[derive(Clone, Debug)]
 pub(crate) enum Truth {
     Known(Key),
-    Believed(Belief),
+    Believed(ExpectedAnswer),
 }
 
 /// One case of a folder.
@@ -100,7 +100,8 @@ fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
         return cases.iter().map(one).collect();
     }
     if believed.is_file() {
-        let list = belief::parse(&read(&believed)?).map_err(|e| format!("{}, {e}", believed.display()))?;
+        let list =
+            expected_answer::parse(&read(&believed)?).map_err(|e| format!("{}, {e}", believed.display()))?;
         return Ok(list.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
     }
     Err(format!(

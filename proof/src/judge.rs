@@ -1,8 +1,8 @@
 //! Opens the key: one answer against what was hidden. The rules stand in `docs/benchmark.md`.
 
+use crate::baselines::Opinion;
 use crate::key::{Category, Key};
-use crate::reported::Left;
-use crate::rivals::Opinion;
+use crate::report_residuals::Left;
 use crate::tool::{Answer, Named, Weighed};
 
 /// From this confidence on a wrong name is confidently wrong.
@@ -14,7 +14,7 @@ const WEAK: f64 = 1.0;
 /// Effect over noise below which anything may be taken for noise.
 const INVISIBLE: f64 = 0.7;
 
-/// One case after the tool and the rivals have answered; the recordings are gone.
+/// One case after the tool and the baselines have answered; the recordings are gone.
 #[derive(Clone, Debug)]
 pub(crate) struct Record {
     pub(crate) id: String,
@@ -313,7 +313,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_class_counts_up_to_three_names_and_one_name_finds_one_effect() {
+    fn classes_count_up_to_three_names_and_find_one_effect_each() {
         let mut answer = says(&[("quadratic_drag", 0.9)]);
         answer.effects[0].class = ["quadratic_drag", S, C].map(String::from).to_vec();
         let r = record(key(Category::Single, &[S], 3.0), answer.clone());

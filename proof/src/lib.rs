@@ -3,28 +3,28 @@
 //! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
 //! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
 
-mod belief;
+mod baselines;
 mod bench;
-mod brought;
 mod calibrate;
 mod cases;
 mod dynamics;
+mod expected_answer;
+mod external_cases;
 mod folder;
 mod generator;
 mod inject;
 mod judge;
 mod key;
 mod machines;
+mod metrics;
 mod options;
 mod pool;
 mod report;
-mod reported;
-mod rivals;
+mod report_residuals;
 mod rng;
 mod scratch;
 mod signal;
 mod stats;
-mod sums;
 mod tool;
 
 use std::path::Path;
@@ -78,7 +78,7 @@ fn tool_name(options: &Options) -> String {
 
 fn judge_folder(options: &Options, top: &Path, tool: &dyn Tool) -> Result<(), String> {
     let start = Instant::now();
-    let judged = brought::run(options, top, tool)?;
+    let judged = external_cases::run(options, top, tool)?;
     let run = report::Run {
         options: options.clone(),
         tool: tool_name(options),
@@ -91,18 +91,18 @@ fn judge_folder(options: &Options, top: &Path, tool: &dyn Tool) -> Result<(), St
     let name = top.canonicalize().ok().and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
     let name = format!("proof-{}", name.unwrap_or_else(|| "cases".into()));
     let (text, markdown, value) = if judged.machines.is_empty() {
-        let sums = sums::sum(&judged.records);
+        let metrics = metrics::sum(&judged.records);
         (
-            report::terminal(&judged.records, &sums, &run),
-            report::markdown(&judged.records, &sums, &run),
-            report::json(&judged.records, &sums, &run),
+            report::terminal(&judged.records, &metrics, &run),
+            report::markdown(&judged.records, &metrics, &run),
+            report::json(&judged.records, &metrics, &run),
         )
     } else {
-        let sums = machines::sum(&judged.machines);
+        let metrics = machines::sum(&judged.machines);
         (
-            report::machines_terminal(&judged.machines, &sums, &run),
-            report::machines_markdown(&judged.machines, &sums, &run),
-            report::machines_json(&judged.machines, &sums, &run),
+            report::machines_terminal(&judged.machines, &metrics, &run),
+            report::machines_markdown(&judged.machines, &metrics, &run),
+            report::machines_json(&judged.machines, &metrics, &run),
         )
     };
     print!("{text}");
@@ -139,28 +139,28 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<(), Strin
         planned: specs.len(),
         unbuilt,
     };
-    let sums = sums::sum(&records);
-    print!("{}", report::terminal(&records, &sums, &run));
-    write_out(options, "proof.json", &pretty(&report::json(&records, &sums, &run))?)?;
-    write_out(options, "proof.md", &report::markdown(&records, &sums, &run))?;
-    write_out(options, "proof-aggregate.md", &report::aggregate(&records, &sums, &run))?;
-    if options.quick && options.only.is_none() { gate(&sums) } else { Ok(()) }
+    let metrics = metrics::sum(&records);
+    print!("{}", report::terminal(&records, &metrics, &run));
+    write_out(options, "proof.json", &pretty(&report::json(&records, &metrics, &run))?)?;
+    write_out(options, "proof.md", &report::markdown(&records, &metrics, &run))?;
+    write_out(options, "proof-aggregate.md", &report::aggregate(&records, &metrics, &run))?;
+    if options.quick && options.only.is_none() { gate(&metrics) } else { Ok(()) }
 }
 
 /// The requirements of the small run, so that it can fail in CI: far below the goals, above chance.
-fn gate(sums: &sums::Sums) -> Result<(), String> {
-    let right = sums.strong;
-    if sums.failures > 0 {
+fn gate(metrics: &metrics::Metrics) -> Result<(), String> {
+    let right = metrics.strong;
+    if metrics.failures > 0 {
         return Err(format!(
             "the tool gave no report in {} cases; the table above lists them",
-            sums.failures
+            metrics.failures
         ));
     }
     // Wanted is one in a hundred: two of eight is no luck.
-    if sums.null_alarms.hits > 1 {
+    if metrics.null_alarms.hits > 1 {
         return Err(format!(
             "the tool named physics in {} of {} nulls; the misses above list them",
-            sums.null_alarms.hits, sums.null_alarms.trials
+            metrics.null_alarms.hits, metrics.null_alarms.trials
         ));
     }
     if right.hits * 10 < right.trials * 7 {
@@ -206,18 +206,18 @@ fn write_all(options: &Options, specs: &[Spec], dir: &Path) -> Result<(), String
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metrics::Metrics;
     use stats::Rate;
-    use sums::Sums;
 
     #[test]
     fn the_small_run_can_fail() {
-        let good = Sums { strong: Rate { hits: 20, trials: 25 }, ..Sums::default() };
+        let good = Metrics { strong: Rate { hits: 20, trials: 25 }, ..Metrics::default() };
         assert_eq!(gate(&good), Ok(()));
-        let poor = Sums { strong: Rate { hits: 17, trials: 25 }, ..Sums::default() };
+        let poor = Metrics { strong: Rate { hits: 17, trials: 25 }, ..Metrics::default() };
         assert!(gate(&poor).unwrap_err().contains("17 of 25"));
-        let alarm = Sums { null_alarms: Rate { hits: 2, trials: 8 }, ..good.clone() };
+        let alarm = Metrics { null_alarms: Rate { hits: 2, trials: 8 }, ..good.clone() };
         assert!(gate(&alarm).unwrap_err().contains("2 of 8 nulls"));
-        let silent = Sums { failures: 2, ..good };
+        let silent = Metrics { failures: 2, ..good };
         assert!(gate(&silent).unwrap_err().contains("no report in 2"));
     }
 }

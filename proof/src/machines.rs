@@ -1,17 +1,17 @@
-//! Sums over real machines, judged by what is believed of them.
+//! Metrics over real machines, judged by what is believed of them.
 
 use serde_json::{Value, json};
 
-use crate::belief::{Belief, Outcome};
+use crate::expected_answer::{ExpectedAnswer, Outcome};
 use crate::judge::Record;
+use crate::metrics::{BELIEVED, Reliability};
 use crate::stats::Rate;
-use crate::sums::{BELIEVED, Reliability};
 
 /// One machine with the answer to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Machine {
     pub(crate) record: Record,
-    pub(crate) belief: Belief,
+    pub(crate) belief: ExpectedAnswer,
 }
 
 impl Machine {
@@ -32,7 +32,7 @@ pub(crate) struct MachineSums {
     pub(crate) reliability: Reliability,
 }
 
-/// Sums over all machines.
+/// Metrics over all machines.
 pub(crate) fn sum(machines: &[Machine]) -> MachineSums {
     let mut s = MachineSums {
         outcomes: [0; 7],

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use crate::judge::Record;
 use crate::machines::{Machine, MachineSums};
+use crate::metrics::{Metrics, Reliability, share_text};
 use crate::options::Options;
 use crate::stats::{Rate, quantile};
-use crate::sums::{Reliability, Sums, share_text};
 use crate::tool::Weighed;
 
 /// The tool's time for 60 s at 10 kHz of some hidden physics.
@@ -41,7 +41,7 @@ pub(crate) struct Run {
 }
 
 /// (measure, wanted, measured).
-fn rows(s: &Sums, run: &Run) -> Vec<[String; 3]> {
+fn rows(s: &Metrics, run: &Run) -> Vec<[String; 3]> {
     let mut list: Vec<[String; 3]> =
         s.lines.iter().map(|l| [l.measure.clone(), l.wanted.to_string(), l.figure.text()]).collect();
     if let Some(times) = &run.speed {
@@ -87,7 +87,7 @@ struct Section {
 }
 
 /// Returns the sections below the main table, for every output.
-fn sections(s: &Sums) -> Vec<Section> {
+fn sections(s: &Metrics) -> Vec<Section> {
     let mut list = vec![
         Section {
             title: "By effect: right at 10 / 3 / 1 times the noise",
@@ -150,7 +150,7 @@ fn reliability(r: &Reliability) -> Section {
     }
 }
 
-fn rivals(s: &Sums) -> Section {
+fn rivals(s: &Metrics) -> Section {
     let rows = s.rivals.iter().map(|r| {
         let or = |text: String| if r.names_something { text } else { "names nothing".into() };
         vec![
@@ -193,7 +193,7 @@ fn miss(r: &Record) -> Vec<String> {
 const MISS: [&str; 7] = ["case", "kind", "hidden", "strength", "reached", "machine", "answer (confidence)"];
 
 /// The whole report as markdown.
-pub(crate) fn markdown(records: &[Record], s: &Sums, run: &Run) -> String {
+pub(crate) fn markdown(records: &[Record], s: &Metrics, run: &Run) -> String {
     let mut out = head(records.len(), run) + "\n\n";
     table(&mut out, &["measure", "wanted", "measured"], rows(s, run).into_iter().map(|r| r.to_vec()));
     for section in sections(s) {
@@ -229,7 +229,7 @@ fn columns(out: &mut String, rows: &[Vec<String>]) {
 }
 
 /// Returns the output for the terminal: the table, the sections, the confusion matrix, the misses.
-pub(crate) fn terminal(records: &[Record], s: &Sums, run: &Run) -> String {
+pub(crate) fn terminal(records: &[Record], s: &Metrics, run: &Run) -> String {
     let mut out = head(records.len(), run) + "\n\n";
     columns(&mut out, &rows(s, run).iter().map(|r| r.to_vec()).collect::<Vec<_>>());
     for section in sections(s) {
@@ -245,7 +245,7 @@ pub(crate) fn terminal(records: &[Record], s: &Sums, run: &Run) -> String {
 }
 
 /// The confusion as a matrix with numbered columns.
-fn matrix(s: &Sums) -> String {
+fn matrix(s: &Metrics) -> String {
     let answers: Vec<&String> =
         s.confusion.keys().map(|k| &k.1).collect::<BTreeSet<_>>().into_iter().collect();
     let hidden: Vec<&String> =
@@ -298,7 +298,7 @@ fn case_json(r: &Record) -> Value {
 }
 
 /// The whole result as JSON: sums, and one entry for every case.
-pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
+pub(crate) fn json(records: &[Record], s: &Metrics, run: &Run) -> Value {
     let lines: serde_json::Map<String, Value> =
         s.lines.iter().map(|l| (l.key.clone(), l.figure.json())).collect();
     let by = |rates: &[Rate]| json!(rates.iter().map(Rate::json).collect::<Vec<_>>());
@@ -349,7 +349,7 @@ pub(crate) fn json(records: &[Record], s: &Sums, run: &Run) -> Value {
 }
 
 /// Returns the part that the tool's author may see: sums and confusion, nothing of single cases.
-pub(crate) fn aggregate(records: &[Record], s: &Sums, run: &Run) -> String {
+pub(crate) fn aggregate(records: &[Record], s: &Metrics, run: &Run) -> String {
     let full = markdown(records, s, run);
     let end = full.find("### Every miss").unwrap_or(full.len());
     let mut out = full[..end].to_string();

@@ -1,4 +1,4 @@
-//! The little numerics that strengths and rivals share: a zero-phase low-pass, differences, least squares.
+//! The little numerics that strengths and baselines share: a zero-phase low-pass, differences, least squares.
 
 use std::f64::consts::PI;
 

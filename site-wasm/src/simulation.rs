@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_is_told_scene_device_and_a_needle_that_goes_in_and_may_move_it() {
+    fn the_page_receives_scene_and_device_and_moves_the_needle() {
         let mut simulation = Simulation::new("adult").expect("it is built in");
         simulation.advance(30_000);
         let told = simulation.tell();

@@ -211,10 +211,10 @@ impl Configuration {
             return refuse("limb_radius_mm must be larger than 1.2 times half_width_mm".into());
         }
         if !within(self.density, 1e-4, 10.0) || !within(self.damping, 0.0, 1e4) {
-            return refuse("density must lie from 0.0001 to 10 g/mm³ and damping from 0 to 10000 1/s".into());
+            return refuse("density must be from 0.0001 to 10 g/mm³ and damping from 0 to 10000 1/s".into());
         }
         if !(1..=64).contains(&self.substeps) || !(1..=64).contains(&self.iterations) {
-            return refuse("substeps and iterations must lie from 1 to 64".into());
+            return refuse("substeps and iterations must be from 1 to 64".into());
         }
         let mut particles = 0.0;
         let mut top = self.layers[0].top_mm;
@@ -233,9 +233,7 @@ impl Configuration {
             if let Some((value, low, high, name)) =
                 numbers.into_iter().find(|(v, low, high, _)| !within(*v, *low, *high))
             {
-                return refuse(format!(
-                    "layer {number}: {name} is {value}; it must lie from {low} to {high}"
-                ));
+                return refuse(format!("layer {number}: {name} is {value}; it must be from {low} to {high}"));
             }
             if (layer.top_mm - top).abs() > 1e-3 {
                 return refuse(format!(
@@ -244,7 +242,7 @@ impl Configuration {
                 ));
             }
             if !(1..=64).contains(&layer.rows) {
-                return refuse(format!("layer {number}: rows is {}; it must lie from 1 to 64", layer.rows));
+                return refuse(format!("layer {number}: rows is {}; it must be from 1 to 64", layer.rows));
             }
             top += layer.thickness_mm;
             particles += (span / layer.spacing_mm + 2.0)
@@ -273,7 +271,7 @@ impl Configuration {
         ];
         match numbers.into_iter().find(|(value, low, high, _)| !within(*value, *low, *high)) {
             Some((value, low, high, name)) => {
-                refuse(format!("the vessel's {name} is {value}; it must lie from {low} to {high}"))
+                refuse(format!("the vessel's {name} is {value}; it must be from {low} to {high}"))
             }
             None => Ok(()),
         }

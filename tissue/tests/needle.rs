@@ -55,7 +55,7 @@ fn at_rest_it_stays_at_rest() {
 }
 
 #[test]
-fn pushed_in_before_the_puncture_springs_back_after_and_is_dragged_out_on_withdrawal() {
+fn skin_is_pushed_in_springs_back_and_is_dragged_on_withdrawal() {
     let mut tissue = limb();
     drive(&mut tissue, -2.0, 2.5);
     assert_eq!(state(&tissue, WallName::Layer(0)), PunctureState::Touching);
@@ -85,7 +85,7 @@ fn pushed_in_before_the_puncture_springs_back_after_and_is_dragged_out_on_withdr
 }
 
 #[test]
-fn layers_and_vessel_walls_are_passed_in_the_order_of_the_anatomy() {
+fn layers_and_vessel_walls_are_passed_in_anatomical_order() {
     let mut tissue = limb();
     let mut order = vec![];
     for step in 0..300 {
@@ -152,7 +152,7 @@ fn a_wall_waits_for_the_device_where_the_device_decides() {
 }
 
 #[test]
-fn table_1_of_paper_000_is_a_configuration_that_holds_its_values_and_is_pierced_layer_by_layer() {
+fn table_1_of_paper_000_is_pierced_layer_by_layer() {
     let configuration = Configuration::paper_000();
     let table: Vec<_> =
         configuration.layers.iter().map(|l| (l.spacing_mm, l.volume_ratio, l.bending_deg)).collect();
@@ -179,7 +179,7 @@ fn table_1_of_paper_000_is_a_configuration_that_holds_its_values_and_is_pierced_
 }
 
 #[test]
-fn what_cannot_be_built_is_refused_by_layer_and_value() {
+fn unbuildable_tissue_is_refused_with_layer_and_value() {
     let mut configuration = Configuration::default();
     configuration.layers[1].stiffness_kpa = f32::NAN;
     let said = Tissue::new(&configuration).expect_err("NaN is no stiffness").to_string();

@@ -48,7 +48,7 @@ fn interfaces_reflect_what_the_table_says() {
 }
 
 #[test]
-fn brightness_falls_with_depth_as_attenuation_there_and_back_says() {
+fn brightness_falls_with_two_way_attenuation() {
     for (medium, mhz) in [(MUSCLE, 5.0), (FAT, 8.0), (BLOOD, 10.0)] {
         let probe = Probe { depth_mm: 30.0, mhz, ..Probe::default() };
         let profile = by_depth(&homogeneous(medium, &probe));
@@ -85,7 +85,7 @@ fn speckle_is_fully_developed() {
 }
 
 #[test]
-fn a_stronger_contrast_echoes_as_much_brighter_as_its_reflection() {
+fn echoes_brighten_with_the_reflection_coefficient() {
     let peak = |below: Medium| {
         let profile = by_depth(&two_layers(FAT, below, 5.0));
         profile.into_iter().fold(f32::MIN, f32::max)
@@ -166,7 +166,7 @@ fn contrast(shaft: Shaft) -> f32 {
 }
 
 #[test]
-fn the_needle_is_bright_in_the_plane_fades_beside_it_and_is_lost() {
+fn the_needle_fades_with_its_distance_from_the_plane() {
     let [on, near, off] = [0.0, 0.8, 4.0].map(|beside| contrast(needle(beside)));
     assert!(on > 15.0, "in the plane {on} dB");
     assert!(near < on - 2.0, "0.8 mm beside it {near} dB");

@@ -1,4 +1,4 @@
-//! The virtual device with nobody's hand on it: the control core on the plant of a rig file, whatever effects that file has.
+//! The virtual device with no hand on it: the control core on the plant of a rig file, whatever effects that file has.
 //! The plant's laws are the ones that the diagnosis names, so a patched rig runs here as it stands.
 
 use control_core::units::{Counts, Milliradians};

@@ -1,4 +1,4 @@
-//! `characterise`: makes a device run excitations that separate one physical effect from another, with nobody's hand on the
+//! `characterise`: makes a device run excitations that separate one physical effect from another, with no hand on the
 //! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
 
 pub mod conductor;

@@ -24,7 +24,7 @@ pub struct Track {
 
 /// The nominal rig of a bare device: what the data sheets say, without a needle.
 pub fn nominal_rig(hello: &Hello) -> Rig {
-    let mut rig = export::rig("the device with nobody's hand on it, nominal", hello);
+    let mut rig = export::rig("the device with no hand on it, nominal", hello);
     // Without a needle nothing hangs on the roller.
     rig.model.inertia = export::mechanism(hello).inertia;
     rig.model.weight = None;

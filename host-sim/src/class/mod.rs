@@ -1,7 +1,7 @@
 //! A class: many devices, one instructor. Each device publishes its pose, events and scores over Zenoh; the instructor's
 //! program gathers them and shows them in a page.
 //!
-//! [`telling`] turns what a session brings into messages, [`board`] keeps the newest of every device, `network` carries the
+//! [`publisher`] turns what a session brings into messages, [`board`] keeps the newest of every device, `network` carries the
 //! messages. Only `network` needs the feature `class`: without it, [`join`] and [`listen`] say which build has it.
 //!
 //! A device only publishes: it subscribes to nothing and answers nothing, so that nobody on the network can start torque.
@@ -12,8 +12,8 @@ pub mod board;
 pub mod message;
 #[cfg(feature = "class")]
 mod network;
+pub mod publisher;
 pub mod scoring;
-pub mod telling;
 
 use crate::streams::Token;
 use std::fmt;

@@ -4,7 +4,7 @@
 
 use super::board::Board;
 use super::message::Kind;
-use super::telling::Telling;
+use super::publisher::ClassPublisher;
 use super::{ClassError, Meeting, Name};
 use crate::session::Session as NeedleSession;
 use control_core::Device;
@@ -139,10 +139,10 @@ impl Publishers {
 
 fn publish(session: &NeedleSession, device: Device, publishers: &Publishers, stop: &AtomicBool) {
     let mut subscription = session.subscribe();
-    let mut telling = Telling::new(device);
+    let mut publisher = ClassPublisher::new(device);
     let begin = Instant::now();
     while !stop.load(Ordering::Relaxed) {
-        for (kind, bytes) in telling.take(subscription.drain(), begin.elapsed()) {
+        for (kind, bytes) in publisher.take(subscription.drain(), begin.elapsed()) {
             publishers.put(kind, bytes);
         }
         std::thread::sleep(PERIOD);

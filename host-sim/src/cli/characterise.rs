@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Make the device run its excitations, with nobody's hand on the needle, and record them at 10 kHz.
+/// Make the device run its excitations, with no hand on the needle, and record them at 10 kHz.
 ///
 /// Writes rig.toml (the nominal simulation), fit.csv, fit2.csv and holdout.csv, which `diagnose` reads.
 #[derive(Args)]
@@ -29,7 +29,7 @@ pub(crate) struct Characterise {
     /// The true mechanism of the virtual device: a rig file, with effects that the written rig.toml does not know
     #[arg(long, value_name = "RIG.toml")]
     plant: Option<PathBuf>,
-    /// Ask nothing: the needle is out
+    /// The needle is out: do not ask
     #[arg(long)]
     yes: bool,
     /// Folder for the files

@@ -15,12 +15,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Between two looks at the signals.
+/// The period of looking at the signals.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Show a class of devices: everyone's needle, live scores, who is stuck, who is gone.
 ///
-/// Devices join with `run --class NAME`. The page only looks: nothing can be started from it. Needs a build with
+/// Devices join with `run --class NAME`. The page only shows: it cannot start anything. Needs a build with
 /// `--features class`.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
@@ -35,7 +35,7 @@ pub(crate) struct Class {
     /// Token that every device must know; at least 12 characters
     #[arg(long, value_name = "TOKEN")]
     class_token: Option<Token>,
-    /// Port of the page on this computer; 0 takes any free one
+    /// Port of the page on this computer; 0 for any free port
     #[arg(long, default_value_t = 8720, value_name = "N")]
     port: u16,
 }
@@ -55,7 +55,7 @@ impl Class {
             Box::new(move || board.text(&name, address, Instant::now(), &mut sent))
         };
         let server = visualizer::serve_watched(Arc::new(watch), self.port).map_err(Failure::failed)?;
-        note!("class {name} listens at {address}");
+        note!("class {name} listens on {address}");
         output::page("class page", &server.url());
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(PAUSE);
@@ -87,7 +87,7 @@ impl ClassFlags {
         self.meeting().map_or(Ok(()), |meeting| meeting.check("--class-at")).map_err(Failure::input)
     }
 
-    /// Joins where that was asked for, and says so.
+    /// Joins the class if one was given, and says so.
     pub(crate) fn join(&self, session: &Session, device: Device) -> Result<Option<Membership>, Failure> {
         let Some(meeting) = self.meeting() else { return Ok(None) };
         let name = self.class_as.clone().unwrap_or_else(computer);

@@ -17,8 +17,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Find out how a device is wired and built, and give it its part of the configuration.
 ///
-/// Says each step before it is done. The motor moves in the last one only, by pulses of at most 2 mN·m. Until this has
-/// passed, a device refuses to start.
+/// Announces each step. The motor moves only in the last one, by pulses of at most 2 mN·m. A device refuses to start until
+/// this has passed.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim commission
@@ -28,18 +28,18 @@ pub(crate) struct Commission {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// Length of the strip of paper that is drawn through under the roller, 10 to 1,000 mm
+    /// Length of the paper strip that is pulled through under the roller, 10 to 1,000 mm
     #[arg(long, default_value_t = 100.0, value_name = "MM")]
     pull_mm: f64,
     /// Turns of the roller by hand, 1 to 20
     #[arg(long, default_value_t = 5, value_name = "N")]
     turns: u32,
-    /// Counts a turn after quadrature, where the encoder's are known
+    /// Counts per turn after quadrature, if known for the encoder
     #[arg(long, value_name = "N")]
     counts_per_turn: Option<u16>,
     #[command(flatten)]
     consent: ConsentFlags,
-    /// Write the device's part to this file too
+    /// Also write the device's part to this file
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
 }
@@ -76,15 +76,15 @@ impl Commission {
     fn wish(&self) -> Result<Wish, Failure> {
         if !(10.0..=1000.0).contains(&self.pull_mm) {
             return Err(Failure::input(format_args!(
-                "--pull-mm is {}; it must lie from 10 to 1000",
+                "--pull-mm is {}; it must be from 10 to 1000",
                 self.pull_mm
             )));
         }
         if !(1..=20).contains(&self.turns) {
-            return Err(Failure::input(format_args!("--turns is {}; it must lie from 1 to 20", self.turns)));
+            return Err(Failure::input(format_args!("--turns is {}; it must be from 1 to 20", self.turns)));
         }
         if self.counts_per_turn.is_some_and(|counts| counts < 256) {
-            return Err(Failure::input("--counts-per-turn must lie from 256 to 65535"));
+            return Err(Failure::input("--counts-per-turn must be from 256 to 65535"));
         }
         Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
     }

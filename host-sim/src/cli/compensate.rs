@@ -16,11 +16,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Take away from the hand what a diagnosis found of the device's own forces.
+/// Cancel the device's own forces, as a diagnosis found them, by feedforward.
 ///
-/// Cogging, friction, weight, offset, ripple and deadband of the report are stored on the device and fed forward, each below
-/// 100 %. The roller turns slowly before and after; what would be felt more than before is taken back, and compensation.html
-/// shows what a hand would feel of the mechanism. A weight that the report does not have is measured first.
+/// Stores cogging, friction, weight, offset, ripple and deadband of the report on the device, which feeds them forward, each
+/// below 100 %. The roller turns slowly before and after; parts that a hand would feel more than before are undone, and
+/// compensation.html shows the mechanism's force on a hand. A weight that the report lacks is measured first.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim characterise --device /dev/ttyACM0 --out bench
@@ -53,7 +53,7 @@ pub(crate) struct Compensate {
 impl Compensate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if !(0.0..=1.0).contains(&self.gain) {
-            return Err(Failure::input(format_args!("--gain is {}; it must lie from 0 to 1", self.gain)));
+            return Err(Failure::input(format_args!("--gain is {}; it must be from 0 to 1", self.gain)));
         }
         let rig = compensate::read_report(&self.report)?;
         let stop = Arc::new(AtomicBool::new(false));
@@ -120,12 +120,12 @@ impl Compensate {
         )))
     }
 
-    /// Writes the page and the device's part; the files' names.
+    /// Writes the page and the device's part; returns the files' names.
     fn write(&self, outcome: &Outcome) -> Result<Vec<String>, Failure> {
         let Some(out) = &self.out else { return Ok(Vec::new()) };
         let refuse = |cause: std::io::Error| {
             Failure::input(format_args!(
-                "{}: cannot be written ({cause}); what the device feeds forward stays; choose another --out",
+                "{}: cannot be written ({cause}); the device keeps its compensation; choose another --out",
                 out.display()
             ))
         };

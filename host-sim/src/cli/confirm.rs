@@ -13,13 +13,13 @@ use std::sync::atomic::AtomicBool;
 /// The options for a person's consent.
 #[derive(Args)]
 pub(crate) struct ConsentFlags {
-    /// Ask nothing: the needle is out
+    /// The needle is out: do not ask
     #[arg(long)]
     yes: bool,
-    /// Show the steps in a page and ask there
+    /// Show the steps on a page and ask there
     #[arg(long, conflicts_with = "yes")]
     page: bool,
-    /// Port of the page on this computer; 0 takes any free one
+    /// Port of the page on this computer; 0 for any free port
     #[arg(long, default_value_t = 8710, value_name = "N", requires = "page")]
     port: u16,
 }
@@ -41,7 +41,7 @@ impl ConsentFlags {
     }
 }
 
-/// A person who is asked.
+/// The person who confirms.
 pub(crate) struct Consent {
     yes: bool,
     guide: Option<(Guide, Server)>,
@@ -53,7 +53,7 @@ impl Consent {
         self.guide.as_ref().map(|(guide, _)| guide.clone())
     }
 
-    /// Says what comes next. Waits until a person agrees where the motor `moves`, and always in a page.
+    /// Announces the next step. Waits for a person to agree if the motor `moves`, and always on a page.
     pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Failure> {
         match &self.guide {
             Some((guide, _)) => guide.ask(step, moves),
@@ -65,14 +65,14 @@ impl Consent {
         }
     }
 
-    /// Shows in the page what came of it.
+    /// Shows the result on the page.
     pub(crate) fn end(&self, outcome: Result<Vec<String>, &Failure>) {
         if let Some((guide, _)) = &self.guide {
             guide.end(outcome);
         }
     }
 
-    /// The motor will move by itself: asks that the needle is out.
+    /// Asks that the needle is out, because the motor will move on its own.
     pub(crate) fn needle_is_out(&self) -> Result<(), Failure> {
         match &self.guide {
             // Nothing moves before the next step.
@@ -82,19 +82,19 @@ impl Consent {
     }
 }
 
-const NEEDLE_OUT: &str = "the roller will move by itself: take the needle out of the device, and keep hands off unless a step asks for them";
+const NEEDLE_OUT: &str = "the roller will move on its own: take the needle out of the device, and keep hands off unless a step asks for them";
 
-/// Says `what` comes and waits for Enter; with `yes`, only says it.
+/// Announces `what` and waits for Enter; with `yes`, only announces it.
 fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
     eprintln!("{what}");
     if yes {
         return Ok(());
     }
-    eprintln!("press Enter to go on, Ctrl-C to end");
+    eprintln!("press Enter to continue, Ctrl-C to stop");
     let mut line = String::new();
     match std::io::stdin().lock().read_line(&mut line) {
         Ok(read) if read > 0 => Ok(()),
-        _ => Err(Failure::input("nobody agreed to the movement; add --yes where a script runs this")),
+        _ => Err(Failure::input("the movement was not confirmed; in a script, add --yes")),
     }
 }
 

@@ -7,7 +7,7 @@ use host_sim::failure::Failure;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// Say where a simulation and its recordings differ and which physics was left out, and prove it on held-out recordings.
+/// Find where a simulation and its recordings differ and which physics is missing, and prove it on held-out recordings.
 ///
 /// Writes diagnosis.json, report.html, patched-rig.toml and residuals.csv, and prints the same in ten lines.
 #[derive(Args)]
@@ -17,19 +17,19 @@ pub(crate) struct Diagnose {
     /// The simulation as its author believes it
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// A recording that may be used to choose and to fit; again for more
+    /// A recording to fit and to choose with; may be repeated
     #[arg(long, required = true, value_name = "FILE.csv")]
     fit: Vec<PathBuf>,
-    /// A recording that only judges; again for more
+    /// A recording only to judge with; may be repeated
     #[arg(long, required = true, value_name = "FILE.csv")]
     holdout: Vec<PathBuf>,
-    /// Formulas of your own that are searched too
+    /// Your own formulas to search too
     #[arg(long, value_name = "F.toml")]
     effects: Option<PathBuf>,
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Write the patched rig for another simulator too: mjcf (MuJoCo), urdf or json; again for more
+    /// Also write the patched rig for another simulator: mjcf (MuJoCo), urdf or json; may be repeated
     #[arg(long, value_name = "mjcf|urdf|json")]
     export: Vec<String>,
 }

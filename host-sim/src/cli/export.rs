@@ -9,7 +9,7 @@ use std::path::Path;
 pub(super) fn formats(names: &[String]) -> Result<Vec<Format>, Failure> {
     let find = |name: &String| {
         Format::find(name).ok_or_else(|| {
-            Failure::input(format_args!("--export {name}: no format that is written; use mjcf, urdf or json"))
+            Failure::input(format_args!("--export {name}: unknown format; use mjcf, urdf or json"))
         })
     };
     names.iter().map(find).collect()

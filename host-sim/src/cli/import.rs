@@ -16,29 +16,29 @@ use std::path::PathBuf;
   host-sim import log.csv --column position=theta:deg --column command=-tau:mNm --out imported
   host-sim import log.npz --rate 1000 --split 0.6 --inertia 0.17 --gain 1 --out imported"))]
 pub(crate) struct Import {
-    /// Recordings; several files of one run in the order of their time, or with different columns of it
+    /// Recordings; several files of one run in chronological order, or with different columns
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Folder to write to; made where there is none
+    /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The column of the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
-    /// turns the sign
+    /// changes the sign
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,
-    /// Rows a second, where no column tells the time
+    /// Rows per second, if no column has the time
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// Nothing drives the axis: the command is zero
     #[arg(long)]
     undriven: bool,
-    /// Encoder counts a turn of the coordinate
+    /// Encoder counts per turn of the coordinate
     #[arg(long, value_name = "N")]
     counts_per_turn: Option<f64>,
     /// Encoder counts per rad or m
     #[arg(long, value_name = "N", conflicts_with = "counts_per_turn")]
     counts_per_unit: Option<f64>,
-    /// A rig file that exists already: its resolution is used, and no other is written
+    /// An existing rig file: its resolution is used, and no new one is written
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
     /// Inertia for rig.toml, kg·m² or kg
@@ -47,10 +47,10 @@ pub(crate) struct Import {
     /// Force for one unit of command, for rig.toml, N·m or N
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     gain: Option<f64>,
-    /// Cut every run at this part of its length: fit.csv and holdout.csv
+    /// Cut every run at this fraction of its length, into fit.csv and holdout.csv
     #[arg(long, value_name = "PART")]
     split: Option<f64>,
-    /// Keep what is recorded at rest
+    /// Keep the rows at rest
     #[arg(long)]
     keep_idle: bool,
     /// Keep positions that jump by a turn
@@ -75,7 +75,7 @@ impl Import {
             return Err(Failure::input("--gain must be a number other than zero; correct it"));
         }
         if self.split.is_some_and(|x| !(0.1..=0.9).contains(&x)) {
-            return Err(Failure::input("--split must lie between 0.1 and 0.9; 0.6 is usual"));
+            return Err(Failure::input("--split must be between 0.1 and 0.9; 0.6 is usual"));
         }
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let done = import::import(&Request {

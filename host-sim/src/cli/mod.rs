@@ -21,7 +21,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Parser, Subcommand};
 use host_sim::failure::Failure;
 
-/// The needle insertion device on the PC: run it (virtual or real), look at it, record it, export and score recordings.
+/// The PC side of the needle insertion device: run it (virtual or real), watch it, record it, export and score recordings.
 ///
 /// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
 #[derive(Parser)]
@@ -30,7 +30,7 @@ pub(crate) struct Cli {
     /// Print results and errors only: no progress, no addresses, no advice
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Open no browser by itself, as a program from `cargo xtask dist` does when it serves a page
+    /// Do not open a browser when serving a page
     #[arg(long, global = true)]
     no_browser: bool,
     #[command(subcommand)]
@@ -81,7 +81,7 @@ impl Cli {
     }
 }
 
-/// Returns what the parser has to say, in one sentence.
+/// Returns the parser's message, in one sentence.
 pub(crate) fn usage(error: &clap::Error) -> Failure {
     let drawn = error.to_string();
     // The last line of help that the parser names: of the command that was asked for.

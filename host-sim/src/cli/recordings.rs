@@ -11,41 +11,41 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Show a recording in the visualizer, again and again; Stop and Start in the page pause it, a slider under the picture moves it.
+/// Play a recording in the visualizer, in a loop; Stop and Start on the page pause and resume it, a slider moves it.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim replay session.mcap --port 8711"))]
 pub(crate) struct Replay {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
-    /// Port of the page on this computer; 0 takes any free one
+    /// Port of the page on this computer; 0 for any free port
     #[arg(long, default_value_t = 8710, value_name = "N")]
     port: u16,
-    /// Play it once and end
+    /// Play it once and exit
     #[arg(long)]
     once: bool,
 }
 
 /// Write rig.toml and CSV files, which `diagnose` reads, from a recording.
 ///
-/// One CSV file (recording.csv), or one for every stretch without a gap (recording-1.csv and so on). Older files of these
-/// names are replaced.
+/// One CSV file (recording.csv), or one for every stretch without a gap (recording-1.csv and so on). Existing files with
+/// these names are replaced.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim export session.mcap --out exported"))]
 pub(crate) struct Export {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
-    /// Folder to write to; made where there is none
+    /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
-/// Reads a recording and says where it is cut.
+/// Reads a recording and warns if it is cut off.
 pub(super) fn read(file: &Path) -> Result<Recording, Failure> {
     let recording = Recording::read(file)?;
     if let Some(why) = &recording.cut {
-        eprintln!("host-sim: {} ends early ({why}); going on with what is there", recording.file);
+        eprintln!("host-sim: {} ends early ({why}); continuing with the complete part", recording.file);
     }
     Ok(recording)
 }

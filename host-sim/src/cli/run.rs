@@ -26,11 +26,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Run a device, virtual or real: show it, record it.
+/// Run a virtual or real device, show it and record it.
 ///
-/// A scripted hand performs the procedure on a virtual device until a person takes the needle in the page; the torque of a
-/// real one stays off until a person presses Start there.
-/// The last line on standard output sums the run up.
+/// On a virtual device a scripted hand performs the procedure until a person takes the needle on the page. On a real
+/// device the torque stays off until a person presses Start there.
+/// The last line on standard output summarises the run.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim run --profile firm-skin
@@ -42,38 +42,38 @@ pub(crate) struct Run {
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
     /// Procedure of the scripted hand: venepuncture, slow, shoulder-straight, insertion-5mms-60deg …, or a TOML file like those in
-    /// host-sim/procedures; without it, what the patient's file says
+    /// host-sim/procedures; without it, the one in the patient's file
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
     /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom, or a TOML file like those in
-    /// host-sim/profiles; without it, adult, or the one that is made for --model
+    /// host-sim/profiles; without it, adult, or the default one of --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
     /// The device's construction: a TOML file as commissioning writes it; without it, a real device keeps its own
     #[arg(long, value_name = "FILE")]
     device_config: Option<PathBuf>,
-    /// The law of force; the patient's must be the same
+    /// The force law; the patient must use the same
     #[arg(long, value_enum)]
     model: Option<ModelName>,
     /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the patient's
     #[arg(long, value_name = "DEG")]
     angle: Option<f64>,
-    /// Serve no page; a real device is then powered up at once
+    /// Serve no page; a real device is then started at once
     #[arg(long)]
     headless: bool,
-    /// With --headless: the tip is on the skin now, depth 0 is here
+    /// With --headless: the tip is on the skin now, so set depth 0 here
     #[arg(long, requires = "headless")]
     zero: bool,
-    /// End after this many seconds of samples; without it, Ctrl-C ends the run in good order
+    /// Stop after this many seconds of samples; without it, Ctrl-C ends the run cleanly
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Run a virtual device as fast as it goes
+    /// Run a virtual device as fast as possible
     #[arg(long)]
     fast: bool,
-    /// Record to this MCAP file; an older one of this name is replaced
+    /// Record to this MCAP file, replacing an existing one
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
-    /// Port of the page on this computer; 0 takes any free one
+    /// Port of the page on this computer; 0 for any free port
     #[arg(long, default_value_t = 8710, value_name = "N")]
     port: u16,
     #[command(flatten)]
@@ -177,7 +177,7 @@ impl Run {
         Ok(())
     }
 
-    /// The patient that was asked for, or the one that is made for the law that was.
+    /// Returns the requested patient, or the default one of the requested law.
     fn find_profile(&self, device: &Device) -> Result<Profile, Failure> {
         let model = self.model.map(Model::from);
         let usual = model.unwrap_or(Model::Jog).patient();
@@ -186,7 +186,7 @@ impl Run {
         match model.filter(|model| *model != its) {
             None => Ok(profile),
             Some(model) => Err(Failure::input(format_args!(
-                "{}: law.model is {} and --model asks for {}; leave --model out, or choose a patient with that law, such as {}",
+                "{}: law.model is {}, but --model is {}; omit --model, or choose a patient with that law, such as {}",
                 profile.source.origin,
                 its.name(),
                 model.name(),
@@ -200,16 +200,14 @@ impl Run {
         self.streams.check()?;
         self.class.check()?;
         if self.angle.is_some() && self.device != "virtual" {
-            return Err(Failure::input(
-                "--angle is for the virtual device: a real needle is turned by a hand",
-            ));
+            return Err(Failure::input("--angle is for the virtual device: a hand turns a real needle"));
         }
         if self.fast && self.device != "virtual" {
-            return Err(Failure::input("--fast is for the virtual device: a real one keeps its own time"));
+            return Err(Failure::input("--fast is for the virtual device: a real one runs in real time"));
         }
         match self.seconds {
             Some(s) if !(s.is_finite() && (1e-4..=1e7).contains(&s)) => {
-                Err(Failure::input(format_args!("--seconds is {s}; it must lie from 0.0001 to 10000000")))
+                Err(Failure::input(format_args!("--seconds is {s}; it must be from 0.0001 to 10000000")))
             }
             None if self.headless && self.fast => {
                 Err(Failure::input("--headless --fast without --seconds would never end; add --seconds 60"))
@@ -238,19 +236,20 @@ impl Run {
     }
 }
 
-/// Serves the page and says where.
+/// Serves the page and prints its address.
 pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
     let server = visualizer::serve(session, port).map_err(Failure::failed)?;
     output::page("visualizer", &server.url());
     Ok(server)
 }
 
-/// Ctrl-C and a polite kill end the run in good order: torque off, recording closed, last line printed.
+/// Ends the run cleanly on Ctrl-C and SIGTERM: torque off, recording closed, last line printed.
 pub(crate) fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // Not more: some send a signal twice, and the first must be able to close the recording.
-        signal_hook::flag::register(signal, stop.clone())
-            .map_err(|cause| Failure::failed(format_args!("signals cannot be listened for ({cause})")))?;
+        signal_hook::flag::register(signal, stop.clone()).map_err(|cause| {
+            Failure::failed(format_args!("signal handlers cannot be installed ({cause})"))
+        })?;
     }
     Ok(())
 }

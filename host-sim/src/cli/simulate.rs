@@ -11,13 +11,13 @@ use host_sim::failure::Failure;
 use host_sim::recording::simulated;
 use std::path::{Path, PathBuf};
 
-/// Run the nominal, refitted and patched simulation beside a recording: free run, windows of 0.05 to 5 s, and under the recorded
-/// reference.
+/// Run the nominal, refitted and patched simulation and compare them with a recording: free run, windows of 0.05 to 5 s, and
+/// under the recorded reference.
 ///
-/// Writes simulation.html, simulation.json, and a CSV and an MCAP for each recording (for Foxglove, Rerun and PlotJuggler: recorded,
-/// simulated and what is left). Give a rig, or the patched-rig.toml of a report: the
-/// nominal and refitted rigs beside it are simulated too. With --fit the values of the last of them are fitted once more, by
-/// what its free run is off on these recordings, which serves trajectories and is no evidence of physics.
+/// Writes simulation.html, simulation.json, and a CSV and an MCAP for each recording (for Foxglove, Rerun and PlotJuggler: the
+/// recording, the simulations and the residuals). Give a rig, or the patched-rig.toml of a report: the
+/// nominal and refitted rigs in the same folder are simulated too. With --fit the values of the last of them are fitted again
+/// to the error of its free run on these recordings, which serves trajectories and is not evidence of physics.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim simulate --rig rig.toml --recording holdout.csv --out /tmp/simulated
@@ -26,13 +26,13 @@ pub(crate) struct Simulate {
     /// A rig, or the patched rig of a report
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// A recording to simulate beside; again for more
+    /// A recording to compare with; may be repeated
     #[arg(long, required = true, value_name = "FILE.csv")]
     recording: Vec<PathBuf>,
-    /// A recording on which values are fitted by what the free run is off; again for more
+    /// A recording to fit values to the error of the free run on; may be repeated
     #[arg(long, value_name = "FILE.csv")]
     fit: Vec<PathBuf>,
-    /// Write the last of the rigs for another simulator too: mjcf (MuJoCo), urdf or json; again for more
+    /// Also write the last of the rigs for another simulator: mjcf (MuJoCo), urdf or json; may be repeated
     #[arg(long, value_name = "mjcf|urdf|json")]
     export: Vec<String>,
     /// Folder for the files
@@ -40,7 +40,7 @@ pub(crate) struct Simulate {
     out: PathBuf,
 }
 
-/// The rigs to simulate: of a report's patched rig those beside it too.
+/// Returns the rigs to simulate: with a report's patched rig, also the others in its folder.
 fn models(path: &Path) -> Result<Vec<(String, Rig)>, Failure> {
     let rig = Rig::read(path).map_err(Failure::input)?;
     if path.file_name().is_none_or(|name| name != "patched-rig.toml") {

@@ -7,8 +7,8 @@ use host_sim::streams::{self, Spec, Streams, Token};
 
 #[derive(Args)]
 pub(crate) struct StreamFlags {
-    /// Stream poses live, as often as wanted: openigtlink (3D Slicer, port 18944), websocket (JSON, 8711), udp (JSON for
-    /// PlotJuggler, 9870), foxglove (8765); on this computer unless an address says otherwise
+    /// Stream poses live; may be repeated: openigtlink (3D Slicer, port 18944), websocket (JSON, 8711), udp (JSON for
+    /// PlotJuggler, 9870), foxglove (8765); on this computer unless an address is given
     #[arg(long = "stream", value_name = "KIND[=ADDRESS:PORT]")]
     streams: Vec<Spec>,
     /// Token that a client on another computer must send first; at least 12 characters
@@ -22,7 +22,7 @@ impl StreamFlags {
         self.streams.iter().try_for_each(|spec| spec.check(self.token.as_ref())).map_err(Failure::input)
     }
 
-    /// Serves what was asked for and says where.
+    /// Serves the requested streams and prints their addresses.
     pub(crate) fn serve(&self, session: &Session) -> Result<Option<Streams>, Failure> {
         if self.streams.is_empty() {
             return Ok(None);

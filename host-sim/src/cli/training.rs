@@ -10,16 +10,16 @@ use host_sim::reproduce::{PAPERS, Paper, reproduce};
 use host_sim::score::{Insertion, score};
 use std::path::{Path, PathBuf};
 
-/// Print a trainee's figures for every insertion and in all: time, path, force, the vessel, angle, smoothness.
+/// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle, smoothness.
 ///
-/// What each figure means stands in docs/training.md.
+/// docs/training.md explains each figure.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim score session.mcap --profile adult"))]
 pub(crate) struct Score {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
-    /// The patient to judge by, instead of the one that was recorded
+    /// The patient to judge by, instead of the recorded one
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
     /// Print JSON
@@ -34,10 +34,10 @@ pub(crate) struct Debrief {
     /// Recordings, in the order of the attempts
     #[arg(value_name = "FILE.mcap", required = true)]
     files: Vec<PathBuf>,
-    /// The patient to judge by, instead of the one that was recorded
+    /// The patient to judge by, instead of the recorded one
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// Folder to write debrief.html to; made where there is none
+    /// Folder to write debrief.html to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -46,19 +46,19 @@ pub(crate) struct Debrief {
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim profiles my-patient.toml"))]
 pub(crate) struct Profiles {
-    /// Patients to show, by name or as files; without any, all that come with the program
+    /// Patients to show, by name or as files; without any, all built-in ones
     #[arg(value_name = "NAME|FILE")]
     wanted: Vec<String>,
 }
 
-/// Run the papers' procedures on the virtual device and write a page for each, with every number of its text beside ours.
+/// Run the papers' procedures on the virtual device and write a page for each, with the paper's numbers and ours.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim reproduce --paper 001 --out papers"))]
 pub(crate) struct Reproduce {
     /// One paper by its number: 000, 001 or 002; without it, all three
     #[arg(long, value_name = "N")]
     paper: Option<String>,
-    /// Folder to write the pages and their recordings to; made where there is none
+    /// Folder to write the pages and their recordings to; created if missing
     #[arg(long, value_name = "DIR", default_value = "papers")]
     out: PathBuf,
 }
@@ -85,14 +85,14 @@ impl Score {
     }
 }
 
-/// Refuses a recording in which there is nothing to judge.
+/// Refuses a recording without an insertion.
 fn check(insertions: &[Insertion], file: &Path) -> Result<(), Failure> {
     if insertions.is_empty() { Err(without_insertion(file)) } else { Ok(()) }
 }
 
 fn without_insertion(file: &Path) -> Failure {
     Failure::input(format_args!(
-        "{}: no insertion in it: the needle never touched the skin; record one first",
+        "{}: it has no insertion: the needle never touched the skin; record one first",
         file.display()
     ))
 }

@@ -73,7 +73,7 @@ impl fmt::Display for Trouble {
             }
             Trouble::Radius(mm) => write!(
                 f,
-                "the pull makes a roller of {mm:.1} mm radius, and it must lie from 4 to 25: measure again and give --pull-mm"
+                "the pull makes a roller of {mm:.1} mm radius, and it must be from 4 to 25: measure again and give --pull-mm"
             ),
             Trouble::TiltBackwards => f.write_str(
                 "the tilt falls when the needle points down: the tilt sensor is mounted the wrong way round; turn the board by 180°",

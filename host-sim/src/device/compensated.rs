@@ -115,7 +115,7 @@ impl Compensated {
         };
         let share = |key: &str, share: f64| {
             let held = (0.0..1.0).contains(&share).then(|| gain(share));
-            held.ok_or_else(|| format!("gains.{key} is {share}; it must lie from 0 to below 1"))
+            held.ok_or_else(|| format!("gains.{key} is {share}; it must be from 0 to below 1"))
         };
         Ok(Compensation {
             version: self.version,

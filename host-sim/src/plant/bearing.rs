@@ -60,7 +60,7 @@ mod tests {
     const DT: f64 = 1e-5;
 
     #[test]
-    fn it_sticks_below_breakaway_turns_above_and_settles_at_its_terminal_speed() {
+    fn sticks_below_breakaway_and_reaches_its_terminal_speed_above() {
         let bearing = BEARING.steps(INERTIA, DT);
         let run = |torque: f64, from: f64, seconds: f64| {
             (0..(seconds / DT) as u32).fold(from, |speed, _| bearing.step(speed, torque))

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn tremor_has_the_asked_size_lies_in_its_band_and_follows_its_seed() {
+    fn tremor_has_its_size_and_band_and_follows_its_seed() {
         for seed in 0..8 {
             let all = tremor(seed, 20);
             let rms = (all.iter().map(|t| t.0 * t.0).sum::<f64>() / all.len() as f64).sqrt();

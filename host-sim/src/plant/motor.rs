@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_small_step_follows_the_electrical_pole_and_a_large_one_the_supply() {
+    fn small_steps_follow_the_electrical_pole_large_ones_the_supply() {
         let motor = Motor::re25(0.0288);
         let mut amplifier = Amplifier::default();
         let pole = motor.inductance / motor.current_gain;
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn without_enable_there_is_no_torque_and_with_it_no_more_than_the_limit() {
+    fn torque_is_zero_when_disabled_and_limited_when_enabled() {
         let motor = Motor::re25(0.0288);
         let mut amplifier = Amplifier::default();
         for _ in 0..100 {

@@ -211,7 +211,7 @@ fn mrad(key: &str, degrees: f64) -> Result<Milliradians, String> {
     if (0.0..=180.0).contains(&degrees) {
         Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
     } else {
-        Err(format!("{key} is {degrees}; it must lie from 0 to 180"))
+        Err(format!("{key} is {degrees}; it must be from 0 to 180"))
     }
 }
 
@@ -248,7 +248,7 @@ impl Forces {
             for row in &self.force_n {
                 let millinewtons = (row[depth] * 1e3).round();
                 if !(0.0..=f64::from(i16::MAX)).contains(&millinewtons) {
-                    return Err(format!("force_n holds {}; a force must lie from 0 to 32.767", row[depth]));
+                    return Err(format!("force_n holds {}; a force must be from 0 to 32.767", row[depth]));
                 }
                 forces.push(millinewtons as i16);
             }

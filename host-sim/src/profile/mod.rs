@@ -162,7 +162,7 @@ fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
     if (5.0..=90.0).contains(&degrees) {
         Ok(())
     } else {
-        Err(format!("{key} is {degrees}; it must lie from 5 to 90, the angle to the skin"))
+        Err(format!("{key} is {degrees}; it must be from 5 to 90, the angle to the skin"))
     }
 }
 

@@ -114,7 +114,7 @@ impl Person {
             ("patient.height_cm", self.height_cm, 30.0, 250.0),
         ] {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                return Err(format!("{key} is {value}; it must lie from {low} to {high}"));
+                return Err(format!("{key} is {value}; it must be from {low} to {high}"));
             }
         }
         match &self.pathology {

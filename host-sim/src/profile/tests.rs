@@ -7,7 +7,7 @@ fn text(text: impl Into<String>) -> Text {
 }
 
 #[test]
-fn built_in_profiles_give_way_at_the_forces_and_depths_of_the_design_notes() {
+fn built_in_profiles_puncture_at_their_stated_forces_and_depths() {
     let table = [
         ("adult", 1.0, 0.5, 4.8, 0.02),
         ("thin-elderly", 0.7, 0.35, 3.0, 0.015),
@@ -28,7 +28,7 @@ fn built_in_profiles_give_way_at_the_forces_and_depths_of_the_design_notes() {
 }
 
 #[test]
-fn what_the_control_law_refuses_is_refused_by_file_layer_and_reason() {
+fn a_refusal_names_the_file_the_layer_and_the_reason() {
     let stiff = BUILT_IN[0].1.replacen("compliance_mm2_per_n = 9.0", "compliance_mm2_per_n = 0.1", 1);
     let said = Profile::parse(text(stiff)).expect_err("60 N/mm would ring").to_string();
     assert!(said.contains("test.toml") && said.contains("N/mm") && said.contains("skin"), "{said}");
@@ -47,7 +47,7 @@ fn friction_may_have_a_static_and_a_dynamic_level() {
         ("stiffness_n_per_mm = 1.0", "missing field `sliding`"),
         (
             "stiffness_n_per_mm = 1.0\nsliding = -0.5",
-            "SlidingShare is -0.5000; it must lie from 0.2000 to 1.0000",
+            "SlidingShare is -0.5000; it must be from 0.2000 to 1.0000",
         ),
         ("stiffness_n_per_mm = 1.0\nsliding = 0.1", "SlidingShare is 0.1000"),
         ("stiffness_n_per_mm = -1.0\nsliding = 0.5", "FrictionStiffness is -1.0000"),

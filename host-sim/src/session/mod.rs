@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_looker_is_told_the_same_as_an_early_one_and_a_dropped_one_is_forgotten() {
+    fn late_subscribers_get_the_same_state_and_dropped_ones_go() {
         let (session, publisher) = open(scene());
         let mut early = session.subscribe();
         let pose = |tick| publisher.pose(Pose { tick, ..Pose::default() });
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_of_a_device_that_starts_anew_do_not_rewrite_what_happened_before() {
+    fn poses_of_a_restarted_device_do_not_change_earlier_events() {
         let (session, publisher) = open(scene());
         publisher.pose(Pose { tick: 490, ..Pose::default() });
         publisher.event(Event { tick: 500, kind: EventKind::Stopped });

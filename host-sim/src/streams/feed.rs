@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn events_of_the_same_look_are_all_told_and_the_oldest_are_lost_first() {
+    fn all_events_of_one_look_are_sent_and_the_oldest_lost_first() {
         let event = |t_s| messages::Event { t_s, ..messages::Event::default() };
         let mut events = Events::default();
         (0..3).for_each(|n| events.add(event(f64::from(n))));

@@ -14,7 +14,7 @@ fn profile(name: &str) -> Profile {
 
 /// Paper 001, 2.2, condition 1: "Eliminate loss or distortion of haptic feedback".
 #[test]
-fn seed_001_condition_1_no_loss_or_distortion() {
+fn paper_001_condition_1_no_loss_or_distortion() {
     let mut bench = Bench::of("adult");
     let begin = bench.seen.len();
     bench.go(14.0, 8.0);
@@ -34,7 +34,7 @@ fn seed_001_condition_1_no_loss_or_distortion() {
 
 /// Paper 001, 2.2, condition 2: "Minimize primitive friction".
 #[test]
-fn seed_001_condition_2_no_force_of_its_own_outside_tissue() {
+fn paper_001_condition_2_no_own_force_outside_tissue() {
     let mut bench = Bench::of("adult");
     bench.go(-0.2, 10.0);
     bench.go(-2.0, 10.0);
@@ -49,7 +49,7 @@ fn seed_001_condition_2_no_force_of_its_own_outside_tissue() {
 
 /// Paper 001, 2.2, condition 3: "Minimize slipping of the needle".
 #[test]
-fn seed_001_condition_3_the_needle_does_not_slip_at_the_largest_force() {
+fn paper_001_condition_3_no_slip_at_the_largest_force() {
     let slipped_mm = |grip_n: f64| {
         let mut bench = Bench::new(&profile("firm-skin"), 30.0, grip_n);
         bench.go(12.0, 8.0);
@@ -62,7 +62,7 @@ fn seed_001_condition_3_the_needle_does_not_slip_at_the_largest_force() {
 
 /// Paper 001, 2.2, condition 4: "Two degrees of freedom": "back, forth, up and down".
 #[test]
-fn seed_001_condition_4_two_degrees_of_freedom() {
+fn paper_001_condition_4_two_degrees_of_freedom() {
     let vein_mm = |angle_deg: f64| {
         let adult = profile("adult");
         let mut bench = Bench::new(&adult, angle_deg, 4.0);
@@ -75,7 +75,7 @@ fn seed_001_condition_4_two_degrees_of_freedom() {
 
 /// Paper 001, 2.2, condition 5: "Initial insertion slope and variation range of the slope".
 #[test]
-fn seed_001_condition_5_initial_slope_and_its_range() {
+fn paper_001_condition_5_initial_slope_and_its_range() {
     let shoulder = profile("shoulder");
     assert_eq!(shoulder.entry_rad.to_degrees(), 45.0, "the initial slope is the patient's");
     let barriers = |turned_deg: f64| {
@@ -89,7 +89,7 @@ fn seed_001_condition_5_initial_slope_and_its_range() {
 
 /// Paper 002, II, need 1: "To allow the doctor to choose a needle insertion point in any place on the joint."
 #[test]
-fn seed_002_need_1_any_insertion_point() {
+fn paper_002_need_1_any_insertion_point() {
     // The point is chosen by zeroing the device there, in the direction that the needle then has.
     let shoulder = profile("shoulder");
     let bursa = number(&shoulder, Tissue::Bursa);
@@ -111,7 +111,7 @@ fn seed_002_need_1_any_insertion_point() {
 /// Paper 002, II, need 2: "Once the insertion point is selected, the haptic interface must keep the same direction, and if it is
 /// necessary, the trajectory can be modified within the body if a prefixed maximum angle is not exceeded".
 #[test]
-fn seed_002_need_2_direction_held_up_to_a_largest_angle() {
+fn paper_002_need_2_direction_held_up_to_a_largest_angle() {
     let mut bench = Bench::of("shoulder");
     bench.go(12.0, 8.0);
     assert!(bench.now().lateral_n.abs() < 0.02, "no force across in the direction of entry");
@@ -128,7 +128,7 @@ fn seed_002_need_2_direction_held_up_to_a_largest_angle() {
 /// Paper 002, II, need 3: "When the needle tip is penetrating the body, different body stiffness must be rendered, according to
 /// patient's profiles and pathologists."
 #[test]
-fn seed_002_need_3_stiffness_by_tissue_and_patient() {
+fn paper_002_need_3_stiffness_by_tissue_and_patient() {
     let skin_n = |name: &str| {
         let mut bench = Bench::of(name);
         bench.go(5.0, 4.0);
@@ -151,7 +151,7 @@ fn seed_002_need_3_stiffness_by_tissue_and_patient() {
 
 /// Paper 002, II, need 4: "If the doctor stops his movement within the body, the needle must remain in the same position."
 #[test]
-fn seed_002_need_4_a_needle_that_is_left_stays() {
+fn paper_002_need_4_a_released_needle_stays() {
     for (name, depth_mm) in [("adult", 8.0), ("shoulder", 20.0), ("phantom", 7.0)] {
         let mut bench = Bench::of(name);
         bench.go(depth_mm, 6.0);
@@ -168,7 +168,7 @@ fn seed_002_need_4_a_needle_that_is_left_stays() {
 /// Paper 002, II, need 5: "The simulator must have support for the hand, as doctors lay his/her hand in the patient's limb during the
 /// injection, to stabilize himself during the puncture." It is mechanical: the building instructions have it.
 #[test]
-fn seed_002_need_5_the_build_has_a_support_for_the_hand() {
+fn paper_002_need_5_the_build_has_a_support_for_the_hand() {
     let build = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/hardware.md"));
     assert!(build.expect("it is there").contains("**Support for the hand.**"));
 }
@@ -176,7 +176,7 @@ fn seed_002_need_5_the_build_has_a_support_for_the_hand() {
 /// Paper 000, conclusion: "The ability to model and detect layer transitions also provides haptic cues that help guide users during
 /// needle insertion."
 #[test]
-fn seed_000_layer_transitions_are_detected_and_felt() {
+fn paper_000_layer_transitions_are_detected_and_felt() {
     let phantom = profile("phantom");
     for angle_deg in [30.0, 45.0, 60.0_f64] {
         let mut bench = Bench::new(&phantom, angle_deg, 4.0);
@@ -198,7 +198,7 @@ fn seed_000_layer_transitions_are_detected_and_felt() {
 /// Paper 000, II C: "The simulation also detects and displays whether the needle intersects the vessel." (The page's tests look at
 /// what is displayed.)
 #[test]
-fn seed_000_whether_the_needle_intersects_the_vessel() {
+fn paper_000_vessel_intersection_is_detected() {
     let mut bench = Bench::of("phantom");
     bench.go(10.0, 5.0);
     bench.go(-1.0, 5.0);

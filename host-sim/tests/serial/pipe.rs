@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_arrive_in_order_and_a_pulled_cable_is_noticed_after_the_last_of_them() {
+    fn bytes_arrive_in_order_before_a_pulled_cable_is_noticed() {
         let (mut near, mut far) = cable();
         near.write(b"one").expect("open");
         near.write(b"two").expect("open");

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_on_uneven_stamps_gives_its_derivatives_and_a_held_command_its_mean() {
+    fn uneven_stamps_give_derivatives_and_the_mean_of_held_commands() {
         let mut rng = Rng::new(3);
         let n = 4000;
         let time: Vec<f64> = (0..n).map(|i| 7.0 + (f64::from(i) + 0.3 * rng.unit()) * 1e-3).collect();

@@ -7,7 +7,7 @@ use crate::generator::case::{Case, Spec, build};
 use crate::generator::files;
 use crate::generator::machine::Stamping;
 use crate::key::Category;
-use crate::reported::Left;
+use crate::report_residuals::Left;
 
 /// A case of the effect on a machine whose stamps are true and that does not creep: of one that does, so few rows lie away
 /// from a reversal that they are not like the others.
@@ -96,7 +96,7 @@ fn the_true_delay_leaves_the_noise() {
 }
 
 #[test]
-fn the_true_cogging_leaves_the_noise_wherever_the_encoder_has_its_zero() {
+fn true_cogging_leaves_only_noise_for_any_encoder_zero() {
     let case = case("cogging");
     let (mut shape, mut coefficients) = (format!("turn = {:e}\n", case.plant.turn), String::new());
     for (i, h) in case.plant.cogging.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the key.
 
-use super::draft::{Draft, Plan};
+use super::case_builder::{CaseBuilder, Plan};
 use super::effects;
 use super::excite::{self, Kind};
 use super::machine::{Machine, Needs};
@@ -204,32 +204,36 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         })
         .collect();
     let clips = spec.hidden.contains(&"command_saturation");
-    let mut draft = Draft { spec, rng, machine, declared, base: place, plans };
+    let mut builder = CaseBuilder { spec, rng, machine, declared, base: place, plans };
 
     if clips {
-        draft.machine.peak_command = draft.peak_command().ok()?;
+        builder.machine.peak_command = builder.peak_command().ok()?;
     }
     let mut scales: Vec<(usize, f64)> = Vec::new();
     for i in 0..spec.hidden.len() {
         let s = if spec.category == Category::CannotTell {
-            let (low, high, guess) = effects::bounds(spec.hidden[i], &draft.machine);
+            let (low, high, guess) = effects::bounds(spec.hidden[i], &builder.machine);
             (2.0 * guess).clamp(low, high)
         } else {
-            draft.calibrate(i, spec.strength, &scales).ok()?
+            builder.calibrate(i, spec.strength, &scales).ok()?
         };
         scales.push((i, s));
     }
     // Beside the others each is measured again, alone, as it is.
     let mut alone = Vec::new();
     for scale in &scales {
-        let now = draft.measured(scale.0, scale.1, &scales, 40e-6).ok()?;
+        let now = builder.measured(scale.0, scale.1, &scales, 40e-6).ok()?;
         alone.push(now.effect / now.noise);
     }
-    let plant = draft.plant(&scales);
-    let believed = draft.believed(&plant, &scales);
-    let mut recordings: Vec<Vec<Row>> =
-        draft.plans.iter().map(|p| draft.play(&plant, &believed, p, STEP)).collect::<Result<_, _>>().ok()?;
-    let m = &draft.machine;
+    let plant = builder.plant(&scales);
+    let believed = builder.believed(&plant, &scales);
+    let mut recordings: Vec<Vec<Row>> = builder
+        .plans
+        .iter()
+        .map(|p| builder.play(&plant, &believed, p, STEP))
+        .collect::<Result<_, _>>()
+        .ok()?;
+    let m = &builder.machine;
     for (k, recording) in recordings.iter_mut().enumerate() {
         let times: Vec<f64> = recording.iter().map(|r| r.time).collect();
         let stamps = m.stamping.of(&times, &mut rng.fork(&format!("stamps/{k}")));
@@ -250,16 +254,16 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         alone[0] = together.effect / together.noise;
     }
     let (category, level) = settle(spec, &alone);
-    let cold = draft.plans[..2].iter().all(|p| p.warm == 0.0);
+    let cold = builder.plans[..2].iter().all(|p| p.warm == 0.0);
     let truths = if spec.category == Category::Outside {
         Vec::new()
     } else {
         spec.hidden.iter().flat_map(|name| effects::truth(name, &plant, &rows[..2], cold)).collect()
     };
-    let nominal = draw_nominal(spec, &draft.machine, &plant, &declared, &mut rng.fork("nominal"));
+    let nominal = draw_nominal(spec, &builder.machine, &plant, &declared, &mut rng.fork("nominal"));
     Some(Case {
         spec: spec.clone(),
-        machine: draft.machine,
+        machine: builder.machine,
         plant,
         believed,
         declared,

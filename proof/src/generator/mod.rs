@@ -1,7 +1,7 @@
 //! The plant that the tool has never seen, and the recordings made with it.
 
 pub(crate) mod case;
-mod draft;
+mod case_builder;
 pub(crate) mod drive;
 pub(crate) mod effects;
 pub(crate) mod excite;

@@ -88,7 +88,7 @@ fn constant_force_gives_the_parabola() {
 }
 
 #[test]
-fn stick_holds_below_the_friction_and_slides_at_the_difference_above() {
+fn stick_holds_below_friction_and_slides_by_the_excess_above() {
     let mut plant = bare(1.0);
     plant.dry.coulomb = 2.0;
     let rows = play(&plant, &open(1000.0, 4.0, levels(&[(1.999, 2.0), (3.0, 1.0), (0.0, 5.0)])));
@@ -168,7 +168,7 @@ fn cogging_amplitude_is_found_by_a_fourier_sum_over_the_angle() {
 }
 
 #[test]
-fn lugre_returns_elastically_for_small_moves_and_slides_at_the_coulomb_level() {
+fn lugre_is_elastic_for_small_moves_and_slides_at_coulomb_level() {
     let mut plant = bare(1.0);
     plant.dry.coulomb = 2.0;
     plant.dry.presliding = Some(Presliding::LuGre { stiffness: 1000.0, damping: 20.0 });
@@ -250,7 +250,7 @@ fn a_seed_gives_the_same_files_and_another_seed_others() {
 }
 
 #[test]
-fn a_case_has_the_level_that_its_recordings_show_and_a_null_has_none() {
+fn a_case_has_the_level_of_its_recordings_and_a_null_none() {
     for (name, strength) in [
         ("stribeck_friction", 3.0),
         ("command_delay", 10.0),
@@ -273,7 +273,7 @@ fn a_case_has_the_level_that_its_recordings_show_and_a_null_has_none() {
 }
 
 #[test]
-fn a_loop_that_begins_elsewhere_comes_back_and_an_open_stretch_follows_nothing() {
+fn loops_return_from_another_start_open_stretches_do_not() {
     let m = Machine::draw(&mut Rng::new(3), Needs { rotary: Some(true), ..Needs::default() }, true);
     let kinds = [super::excite::Kind::Multisine, super::excite::Kind::Triangle];
     let segments = super::excite::programme(&kinds, &m, &mut Rng::new(7));
@@ -317,7 +317,7 @@ fn counts_are_lost_one_way_or_both() {
 }
 
 #[test]
-fn a_reading_has_the_noise_asked_for_and_a_warm_machine_has_drifted_already() {
+fn readings_have_the_given_noise_and_warm_machines_drift() {
     let mut plant = bare(1.0);
     plant.counts_per_unit = 1000.0;
     let mut run = open(500.0, 8.0, Drive::default());

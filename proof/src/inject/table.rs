@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 
 use super::PLAIN_SHARES;
 use super::judge::{Case, Said};
+use crate::metrics::{BELIEVED, Reliability};
 use crate::stats::Rate;
-use crate::sums::{BELIEVED, Reliability};
 
 fn row(out: &mut String, cells: &[String]) {
     let _ = writeln!(out, "| {} |", cells.join(" | "));
@@ -139,13 +139,13 @@ fn reliability(out: &mut String, cases: &[Case]) {
         "Reliability: of the tool's names given with a confidence, right",
         &["confidence", "mean", "right"],
     );
-    let sums = Reliability::of(&names);
-    for (i, bin) in sums.bins.iter().enumerate() {
+    let metrics = Reliability::of(&names);
+    for (i, bin) in metrics.bins.iter().enumerate() {
         let Some(mean) = bin.mean() else { continue };
         let range = format!("{:.1}–{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
         row(out, &[range, format!("{mean:.2}"), bin.right.text()]);
     }
-    row(out, &[format!("{BELIEVED} or more"), "–".into(), sums.believed.text()]);
+    row(out, &[format!("{BELIEVED} or more"), "–".into(), metrics.believed.text()]);
 }
 
 /// A reason without its figures, so that like reasons count together.

@@ -28,7 +28,7 @@ pub(super) struct Plan {
 }
 
 /// A case before its strengths are found.
-pub(super) struct Draft<'a> {
+pub(super) struct CaseBuilder<'a> {
     pub(super) spec: &'a Spec,
     pub(super) rng: &'a Rng,
     pub(super) machine: Machine,
@@ -37,7 +37,7 @@ pub(super) struct Draft<'a> {
     pub(super) plans: Vec<Plan>,
 }
 
-impl Draft<'_> {
+impl CaseBuilder<'_> {
     pub(super) fn plant(&self, scales: &[(usize, f64)]) -> Plant {
         let mut plant = self.machine.plant.clone();
         for &(i, s) in scales {

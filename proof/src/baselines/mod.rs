@@ -14,33 +14,33 @@ use crate::signal::Normal;
 use estimate::Table;
 use features::Feature;
 
-/// The answer of a rival to a case.
+/// The answer of a baseline to a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Opinion {
-    /// Whose it is, in [`RIVALS`].
+    /// Whose it is, in [`BASELINES`].
     pub(crate) rival: usize,
-    /// Names in the contract's words, three at most; empty for rivals that name nothing.
+    /// Names in the contract's words, three at most; empty for baselines that name nothing.
     pub(crate) names: Vec<&'static str>,
-    /// Held-out gain over an oracle's at the rivals' bandwidth; `None` where there is nothing to gain.
+    /// Held-out gain over an oracle's at the baselines' bandwidth; `None` where there is nothing to gain.
     pub(crate) share: Option<f64>,
 }
 
 /// A method that the tool is compared with.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rival {
+pub(crate) struct Baseline {
     pub(crate) name: &'static str,
     /// It gives effects names.
     pub(crate) names: bool,
 }
 
-/// The rivals.
-pub(crate) const RIVALS: [Rival; 6] = [
-    Rival { name: "told the structure, least squares", names: false },
-    Rival { name: "refit only", names: false },
-    Rival { name: "forward selection by BIC", names: true },
-    Rival { name: "sparse regression", names: true },
-    Rival { name: "score test without opponents", names: true },
-    Rival { name: "unstructured", names: false },
+/// The baselines.
+pub(crate) const BASELINES: [Baseline; 6] = [
+    Baseline { name: "told the structure, least squares", names: false },
+    Baseline { name: "refit only", names: false },
+    Baseline { name: "forward selection by BIC", names: true },
+    Baseline { name: "sparse regression", names: true },
+    Baseline { name: "score test without opponents", names: true },
+    Baseline { name: "unstructured", names: false },
 ];
 
 /// The fit that has been told the whole structure, by the judge's inverse dynamics; none where there is nothing to gain, or

@@ -1,4 +1,4 @@
-//! The library of the rivals that select: columns linear in their coefficients, each with the contract's name for it.
+//! The library of the baselines that select: columns linear in their coefficients, each with the contract's name for it.
 
 use std::f64::consts::TAU;
 

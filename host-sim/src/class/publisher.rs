@@ -25,7 +25,7 @@ pub type Message = (Kind, Vec<u8>);
 
 /// Remembers between batches what the next messages need.
 #[derive(Debug, Default)]
-pub struct Telling {
+pub struct ClassPublisher {
     device: Device,
     condenser: Condenser,
     scoring: LiveScore,
@@ -38,7 +38,7 @@ pub struct Telling {
     told: Option<Duration>,
 }
 
-impl Telling {
+impl ClassPublisher {
     /// For a device that is built like `device`, which says whether a patient fits.
     pub fn new(device: Device) -> Self {
         Self { device, ..Self::default() }
@@ -150,7 +150,7 @@ mod tests {
     fn recorded() -> (Recording, Profile) {
         let profile = Profile::find("adult").unwrap();
         let procedure = Procedure::find("venepuncture", &profile).unwrap();
-        let file = std::env::temp_dir().join(format!("needle-telling-{}.mcap", std::process::id()));
+        let file = std::env::temp_dir().join(format!("needle-publisher-{}.mcap", std::process::id()));
         let recording = crate::rehearsal::record(&profile, procedure, &file).unwrap();
         std::fs::remove_file(&file).unwrap();
         (recording, profile)
@@ -176,10 +176,10 @@ mod tests {
     }
 
     #[test]
-    fn the_live_score_is_that_of_the_recording_and_no_pose_is_left_out() {
+    fn live_score_equals_the_recordings_and_no_pose_is_lost() {
         let (recording, profile) = recorded();
         let (session, publisher) = open(&profile);
-        let (mut subscription, mut telling) = (session.subscribe(), Telling::new(Device::default()));
+        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::new(Device::default()));
         let (mut messages, mut poses) = (Vec::new(), 0);
         for (number, message) in recording.messages.iter().enumerate() {
             match message {
@@ -197,10 +197,10 @@ mod tests {
             }
             // As often as in a run: every few frames.
             if number % 7 == 0 {
-                messages.extend(telling.take(subscription.drain(), Duration::from_millis(number as u64)));
+                messages.extend(to_class.take(subscription.drain(), Duration::from_millis(number as u64)));
             }
         }
-        messages.extend(telling.take(subscription.drain(), Duration::from_secs(100)));
+        messages.extend(to_class.take(subscription.drain(), Duration::from_secs(100)));
         // Through JSON too, which costs the last digit.
         let expected =
             serde_json::to_vec(&crate::score::score(&recording, None).unwrap().insertions).unwrap();
@@ -226,11 +226,11 @@ mod tests {
     #[test]
     fn a_needle_that_stands_still_in_the_body_and_a_fault_are_told() {
         let (session, publisher) = open(&Profile::find("adult").unwrap());
-        let (mut subscription, mut telling) = (session.subscribe(), Telling::new(Device::default()));
+        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::new(Device::default()));
         let mut about_after = |seconds: u64, depth_mm: f64| {
             let depth = Millimetres(I16F16::from_num(depth_mm));
             publisher.pose(Pose { tick: seconds * 10_000, depth, ..Pose::default() });
-            let messages = telling.take(subscription.drain(), Duration::from_secs(seconds));
+            let messages = to_class.take(subscription.drain(), Duration::from_secs(seconds));
             read(&messages, Kind::About).next_back().unwrap()
         };
         assert_eq!(about_after(1, -5.0)["still_s"], 0.0);

@@ -5,12 +5,12 @@ use crate::judge::Record;
 
 /// The expected answer to a case.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Belief {
+pub(crate) struct ExpectedAnswer {
     /// The first name has to be one of these.
     right: Vec<String>,
     /// May stand beside it, or alone.
     acceptable: Vec<String>,
-    /// Belief and source, in words.
+    /// ExpectedAnswer and source, in words.
     pub(crate) source: String,
 }
 
@@ -67,7 +67,7 @@ impl Outcome {
 ///
 /// # Errors
 /// The line that has too few columns.
-pub(crate) fn parse(text: &str) -> Result<Vec<(String, Belief)>, String> {
+pub(crate) fn parse(text: &str) -> Result<Vec<(String, ExpectedAnswer)>, String> {
     let mut list = Vec::new();
     for (index, line) in text.lines().enumerate() {
         if line.trim().is_empty() || line.starts_with('#') {
@@ -86,7 +86,7 @@ pub(crate) fn parse(text: &str) -> Result<Vec<(String, Belief)>, String> {
         };
         list.push((
             (*case).to_string(),
-            Belief {
+            ExpectedAnswer {
                 right: names(right),
                 acceptable: names(acceptable),
                 source: rest.first().unwrap_or(&"").to_string(),
@@ -96,7 +96,7 @@ pub(crate) fn parse(text: &str) -> Result<Vec<(String, Belief)>, String> {
     Ok(list)
 }
 
-impl Belief {
+impl ExpectedAnswer {
     /// The names that would be right, for tables.
     pub(crate) fn wanted(&self) -> String {
         self.right.join(" or ")
@@ -148,11 +148,11 @@ mod tests {
     use crate::judge::tests::{record, says};
     use crate::key::{Category, Key};
 
-    fn belief(right: &str, acceptable: &str) -> Belief {
+    fn belief(right: &str, acceptable: &str) -> ExpectedAnswer {
         parse(&format!("# case\tright\nx\t{right}\t{acceptable}\tsomebody\n")).unwrap().remove(0).1
     }
 
-    fn judged(belief: &Belief, names: &[(&str, f64)], verdict: &str) -> Outcome {
+    fn judged(belief: &ExpectedAnswer, names: &[(&str, f64)], verdict: &str) -> Outcome {
         let mut answer = says(names);
         if names.is_empty() {
             answer.verdict = verdict.into();

@@ -1,4 +1,4 @@
-//! One estimate for all rivals: position on an even grid, low-passed without phase, differenced twice. Every column of a
+//! One estimate for all baselines: position on an even grid, low-passed without phase, differenced twice. Every column of a
 //! rival's library goes through the same low-pass, so that both sides of an equation see the same filter.
 
 use crate::generator::case::Case;

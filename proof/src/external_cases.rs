@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use crate::baselines;
 use crate::dynamics::Bench;
 use crate::folder::{self, Brought, Truth};
 use crate::judge::Record;
@@ -10,8 +11,7 @@ use crate::key::{Category, Key};
 use crate::machines::Machine;
 use crate::options::Options;
 use crate::pool;
-use crate::reported;
-use crate::rivals;
+use crate::report_residuals;
 use crate::scratch::Scratch;
 use crate::tool::{self, Tool, ask};
 
@@ -78,11 +78,11 @@ fn run_case(case: &Brought, options: &Options, tool: &dyn Tool, scratch: &Path) 
         Truth::Believed(_) => Key::of(Category::Null),
     };
     let bench = Bench::new(&paths, &key);
-    let left = reported::judged(&bench, &out);
-    let reported = reported::reported(&paths, &out, &key);
+    let left = report_residuals::judged(&bench, &out);
+    let reported = report_residuals::reported(&paths, &out, &key);
     let record = Record {
         id: case.id.clone(),
-        opinions: rivals::known_structure(&bench, &key).into_iter().collect(),
+        opinions: baselines::known_structure(&bench, &key).into_iter().collect(),
         key,
         answer,
         left,

@@ -1,4 +1,4 @@
-//! Sums over all cases of a generator: the lines of the tables.
+//! Metrics over all cases of a generator: the lines of the tables.
 
 use std::collections::BTreeMap;
 
@@ -99,23 +99,23 @@ pub(crate) struct Reliability {
 impl Reliability {
     /// From (confidence, right).
     pub(crate) fn of(names: &[(f64, bool)]) -> Self {
-        let mut sums = Self::default();
+        let mut metrics = Self::default();
         let mut brier = 0.0;
         for &(confidence, right) in names {
-            let bin = &mut sums.bins[((confidence * 10.0).max(0.0) as usize).min(9)];
+            let bin = &mut metrics.bins[((confidence * 10.0).max(0.0) as usize).min(9)];
             bin.confidence += confidence;
             bin.right.add(right);
             brier += (confidence - f64::from(u8::from(right))).powi(2);
             if confidence >= BELIEVED {
-                sums.believed.add(right);
+                metrics.believed.add(right);
             }
         }
         if !names.is_empty() {
             let n = names.len() as f64;
-            let off = sums.bins.iter().map(|b| (b.confidence - b.right.hits as f64).abs()).sum::<f64>();
-            sums.errors = Some((off / n, brier / n));
+            let off = metrics.bins.iter().map(|b| (b.confidence - b.right.hits as f64).abs()).sum::<f64>();
+            metrics.errors = Some((off / n, brier / n));
         }
-        sums
+        metrics
     }
 
     pub(crate) fn json(&self) -> Value {
@@ -132,9 +132,9 @@ impl Reliability {
     }
 }
 
-/// The results of one rival.
+/// The results of one baseline.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct RivalSums {
+pub(crate) struct BaselineMetrics {
     pub(crate) name: &'static str,
     /// By strength, as [`STRENGTHS`].
     pub(crate) right: [Rate; 3],
@@ -148,7 +148,7 @@ pub(crate) struct RivalSums {
 
 /// Everything that the report prints.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sums {
+pub(crate) struct Metrics {
     pub(crate) lines: Vec<Line>,
     /// By strength, as [`STRENGTHS`].
     pub(crate) by_effect: BTreeMap<String, [Rate; 3]>,
@@ -162,21 +162,21 @@ pub(crate) struct Sums {
     pub(crate) reliability: Reliability,
     /// (what was hidden, what was answered first) → how often; single effects at strengths 10 and 3 only.
     pub(crate) confusion: BTreeMap<(String, String), usize>,
-    pub(crate) rivals: Vec<RivalSums>,
+    pub(crate) rivals: Vec<BaselineMetrics>,
     pub(crate) failures: usize,
     pub(crate) null_alarms: Rate,
     pub(crate) strong: Rate,
 }
 
-/// Sums over all records.
-pub(crate) fn sum(records: &[Record]) -> Sums {
-    let mut s = Sums {
+/// Metrics over all records.
+pub(crate) fn sum(records: &[Record]) -> Metrics {
+    let mut s = Metrics {
         failures: records.iter().filter(|r| r.answer.is_err()).count(),
         lines: lines(records),
         null_alarms: rate(of(records, &[Category::Null]), Record::names_physics),
         strong: rate(of(records, &[Category::Single]).filter(|r| r.key.strength == 10.0), Record::classy),
         reliability: Reliability::of(&names(records)),
-        ..Sums::default()
+        ..Metrics::default()
     };
     for r in records {
         match r.key.category {
@@ -215,7 +215,7 @@ pub(crate) fn sum(records: &[Record]) -> Sums {
             *s.confusion.entry((hidden, first)).or_default() += 1;
         }
     }
-    s.rivals = crate::rivals::RIVALS
+    s.rivals = crate::baselines::BASELINES
         .iter()
         .enumerate()
         .filter(|(i, _)| records.iter().any(|r| r.opinions.iter().any(|o| o.rival == *i)))
@@ -416,8 +416,9 @@ fn parameter_family(name: &str) -> String {
     }
 }
 
-fn sum_rival(records: &[Record], i: usize, rival: &crate::rivals::Rival) -> RivalSums {
-    let mut s = RivalSums { name: rival.name, names_something: rival.names, ..RivalSums::default() };
+fn sum_rival(records: &[Record], i: usize, rival: &crate::baselines::Baseline) -> BaselineMetrics {
+    let mut s =
+        BaselineMetrics { name: rival.name, names_something: rival.names, ..BaselineMetrics::default() };
     for r in records {
         let Some(o) = r.opinions.iter().find(|o| o.rival == i) else { continue };
         let silent = o.names.is_empty();
@@ -444,8 +445,8 @@ mod tests {
     use super::*;
     use crate::judge::tests::{key, record, says};
 
-    fn figure(sums: &Sums, key: &str) -> Rate {
-        match &sums.lines.iter().find(|l| l.key == key).expect("the line is there").figure {
+    fn figure(metrics: &Metrics, key: &str) -> Rate {
+        match &metrics.lines.iter().find(|l| l.key == key).expect("the line is there").figure {
             Figure::Rate(rate) => *rate,
             other => panic!("{key} is {other:?}"),
         }
@@ -466,19 +467,19 @@ mod tests {
             record(key(Category::Outside, &[], 10.0), says(&[("cogging", 0.7)])),
             record(detected, told),
         ];
-        let sums = sum(&records);
-        assert_eq!(figure(&sums, "right_10"), Rate { hits: 1, trials: 1 });
-        assert_eq!(figure(&sums, "clean_10"), Rate { hits: 0, trials: 1 });
-        assert_eq!(figure(&sums, "right_1"), Rate { hits: 0, trials: 1 });
-        assert_eq!(figure(&sums, "null_alarms"), Rate { hits: 1, trials: 2 });
-        assert_eq!(figure(&sums, "false_names"), Rate { hits: 3, trials: 4 });
-        assert_eq!(figure(&sums, "believed"), Rate { hits: 1, trials: 2 });
-        assert_eq!(figure(&sums, "outside_confident"), Rate { hits: 0, trials: 1 });
-        assert_eq!(figure(&sums, "outside_likely"), Rate { hits: 1, trials: 1 });
-        assert_eq!(figure(&sums, "outside_abstains"), Rate { hits: 0, trials: 1 });
-        assert_eq!(figure(&sums, "detector_abstains"), Rate { hits: 1, trials: 1 }, "counted apart");
-        assert_eq!(sums.reliability.bins[9].right, Rate { hits: 1, trials: 2 });
-        assert_eq!(sums.confusion[&("null".to_string(), "cogging".to_string())], 1);
+        let metrics = sum(&records);
+        assert_eq!(figure(&metrics, "right_10"), Rate { hits: 1, trials: 1 });
+        assert_eq!(figure(&metrics, "clean_10"), Rate { hits: 0, trials: 1 });
+        assert_eq!(figure(&metrics, "right_1"), Rate { hits: 0, trials: 1 });
+        assert_eq!(figure(&metrics, "null_alarms"), Rate { hits: 1, trials: 2 });
+        assert_eq!(figure(&metrics, "false_names"), Rate { hits: 3, trials: 4 });
+        assert_eq!(figure(&metrics, "believed"), Rate { hits: 1, trials: 2 });
+        assert_eq!(figure(&metrics, "outside_confident"), Rate { hits: 0, trials: 1 });
+        assert_eq!(figure(&metrics, "outside_likely"), Rate { hits: 1, trials: 1 });
+        assert_eq!(figure(&metrics, "outside_abstains"), Rate { hits: 0, trials: 1 });
+        assert_eq!(figure(&metrics, "detector_abstains"), Rate { hits: 1, trials: 1 }, "counted apart");
+        assert_eq!(metrics.reliability.bins[9].right, Rate { hits: 1, trials: 2 });
+        assert_eq!(metrics.confusion[&("null".to_string(), "cogging".to_string())], 1);
     }
 
     #[test]
