@@ -58,17 +58,17 @@ impl fmt::Display for Interlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Supply => "the supply is too low; check the board's power",
-            Self::EmergencyStop => "the emergency stop is open; release it, or fit its jumper where there is none",
+            Self::EmergencyStop => "the emergency stop is open; release it, or fit its jumper if there is none",
             Self::AmplifierNotReady => {
-                "the amplifier is not ready; check its supply, or fit the jumper where it has no such output"
+                "the amplifier is not ready; check its supply, or fit the jumper if it has no such output"
             }
             Self::AmplifierStuckOn => {
-                "the amplifier is on although it was switched off; switch its supply off and check the enable line"
+                "the amplifier is on although it was switched off; switch off its supply and check the enable line"
             }
             Self::EncoderWire => "an encoder wire is off; check the encoder's plug",
             Self::Saving => "the configuration is being saved; try again in two seconds",
-            Self::NotCommissioned => "nobody knows how this device is wired; run host-sim commission with it first",
-            Self::NotZeroed => "depth is not known since the device was switched on; hold the tip on the skin and press Zero depth here",
+            Self::NotCommissioned => "the device has not been commissioned; run host-sim commission first",
+            Self::NotZeroed => "the depth is unknown since the device was switched on; hold the tip on the skin and press Zero depth here",
         })
     }
 }

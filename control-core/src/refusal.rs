@@ -193,11 +193,93 @@ pub enum Field {
     SlidingShare,
 }
 
+/// The key in the device's or the patient's file, or words with a unit if no key holds the value in this unit.
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::RollerRadius => "roller_radius_mm",
+            Self::CountsPerTurn => "counts_per_turn",
+            Self::FullScaleTorque => "full_scale_torque_mnm",
+            Self::TorqueLimit => "torque_mnm",
+            Self::SlewPerTick => "slew_mnm_per_tick",
+            Self::FadeInMs => "fade_in_ms",
+            Self::MaxCountsPerTick => "max_counts_per_tick",
+            Self::Travel => "travel_mm",
+            Self::StiffnessLimit | Self::FrictionStiffness | Self::BristleStiffness => "stiffness_n_per_mm",
+            Self::HeartbeatMs => "heartbeat_ms",
+            Self::Damping | Self::BristleDamping => "damping_n_s_per_mm",
+            Self::LevelLength => "level_length_mm",
+            Self::LevelCap => "level_cap",
+            Self::AnchorMs => "anchor_ms",
+            Self::FrictionLimit => "limit_n",
+            Self::Compliance => "compliance_mm2_per_n",
+            Self::PunctureTravel => "puncture_mm",
+            Self::UnloadStiffness => "unload_n_per_mm",
+            Self::BaseForce => "base_n",
+            Self::Friction => "friction_n_per_mm",
+            Self::LayerDepth => "depth_mm",
+            Self::DurationSeconds => "the duration in s",
+            Self::ServoStiffness => "the servo's stiffness in N/mm",
+            Self::Speed => "the speed in mm/s",
+            Self::Ratio => "the ratio of the steps",
+            Self::Steps => "the number of steps",
+            Self::DwellMs => "the dwell in ms",
+            Self::Frequency => "the frequency in Hz",
+            Self::ContinuousTorque => "continuous_torque_mnm",
+            Self::WindingTimeS => "winding_time_s",
+            Self::PassivityDamping => "passivity_damping_n_s_per_mm",
+            Self::SkinTilt => "the tilt on the skin in mrad",
+            Self::DacZero => "dac_zero_codes",
+            Self::LargestForce => "largest_force_n",
+            Self::SpringBack => "spring_back",
+            Self::Scale => "force_scale",
+            Self::TrackingStiffness => "tracking_n_per_mm",
+            Self::RelaxMs => "relax_ms",
+            Self::ViscousFriction => "viscous_n_s_per_mm",
+            Self::SlidingFriction => "sliding_n",
+            Self::StickingFriction => "sticking_n",
+            Self::StribeckSpeed => "stribeck_mm_s",
+            Self::LateralForce => "the lateral force in N per mrad",
+            Self::LargestAngle => "the largest angle in mrad",
+            Self::CuttingForce => "cutting",
+            Self::Withdrawal => "withdrawal",
+            Self::TableDepth => "depth_step_mm",
+            Self::TableSpeed => "speeds_mm_s",
+            Self::TableAngle => "the angles in mrad",
+            Self::TableForce => "the forces in N",
+            Self::VesselWidth => "width_mm",
+            Self::VesselOffset => "offset_mm",
+            Self::CompensationVersion => "compensation.version",
+            Self::WaveOrder => "the order of a wave",
+            Self::WaveAmplitude => "the amplitude of a wave in mN·m",
+            Self::Ripple => "the ripple",
+            Self::DryFriction => "the dry friction in mN·m",
+            Self::RestSpeed => "the speed at rest in mm/s",
+            Self::FullSpeed => "the speed of full friction in mm/s",
+            Self::Weight => "the weight in mN·m",
+            Self::DriveOffset => "the drive's offset in mN·m",
+            Self::Deadband => "the deadband in mN·m",
+            Self::AngleGain => "gains.angle",
+            Self::FrictionGain => "gains.friction",
+            Self::WeightGain => "gains.weight",
+            Self::DriveGain => "gains.drive",
+            Self::SpeedCeiling => "the speed of max_counts_per_tick in mm/s",
+            Self::EncoderSign => "encoder_reversed",
+            Self::MotorSign => "motor_reversed",
+            Self::Converter => "dac_bits",
+            Self::MovingMass => "mass_g",
+            Self::MechanismFriction => "dry_friction_n",
+            Self::DriveDelayUs => "delay_us",
+            Self::SlidingShare => "sliding",
+        })
+    }
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Refusal::OutOfRange { field, value, low, high } => {
-                write!(f, "{field:?} is {value:.4}; it must be from {low:.4} to {high:.4}")
+                write!(f, "{field} is {value:.4}; it must be from {low:.4} to {high:.4}")
             }
             Refusal::TooStiff { layer, slope, limit } => {
                 write!(
@@ -208,7 +290,7 @@ impl fmt::Display for Refusal {
             Refusal::TooStrong { layer, force, limit } => {
                 write!(
                     f,
-                    "layer {layer} asks for {force:.3} N and the motor gives {limit:.3} N; weaken it or use a smaller roller"
+                    "layer {layer} demands {force:.3} N, but the motor gives only {limit:.3} N; weaken it or use a smaller roller"
                 )
             }
             Refusal::Overlap { layer } => {
@@ -227,44 +309,43 @@ impl fmt::Display for Refusal {
                 write!(f, "the relief of layer {layer} is stronger than the wall that gave way; weaken it")
             }
             Refusal::BeyondTravel { layer } => {
-                write!(f, "layer {layer} lies beyond the travel; lengthen it or move the layer")
+                write!(f, "layer {layer} is deeper than the travel; increase the travel or move the layer")
             }
             Refusal::AboveCeiling { force, ceiling } => {
                 write!(
                     f,
-                    "the patient's largest force is {force:.3} N and the device's ceiling is {ceiling:.3} N, which no patient raises; lower it"
+                    "the patient's largest force is {force:.3} N, above the device's ceiling of {ceiling:.3} N, which no patient can raise; lower it"
                 )
             }
-            Refusal::NoVessel { layer } => write!(
-                f,
-                "layer {layer} is no vessel's: let one vessel and then its far wall follow one another, and no other"
-            ),
+            Refusal::NoVessel { layer } => {
+                write!(f, "layer {layer}: a vessel needs exactly one far wall, directly below it")
+            }
             Refusal::Count { field, found, wanted } => {
-                write!(f, "there are {found} values of {field:?}; there must be {wanted}")
+                write!(f, "there are {found} values of {field}; there must be {wanted}")
             }
             Refusal::CompensationTooStrong { torque, limit } => write!(
                 f,
-                "the compensation asks for {torque:.3} mN·m and may ask for {limit:.3} mN·m, a quarter of the torque ceiling; lower its gains"
+                "the compensation demands {torque:.3} mN·m; at most {limit:.3} mN·m, a quarter of the torque ceiling, is allowed; lower its gains"
             ),
             Refusal::CompensationUnstable { stiffness, limit } => write!(
                 f,
-                "with this compensation more than {limit:.3} N/mm would ring and the device allows {stiffness:.3} N/mm; lower its gains or the device's stiffness"
+                "with this compensation more than {limit:.3} N/mm would ring, but the device allows {stiffness:.3} N/mm; lower its gains or the device's stiffness"
             ),
             Refusal::WouldRing { stiffness, limit } => write!(
                 f,
-                "with this friction, mass and delay more than {limit:.3} N/mm would ring and the device allows {stiffness:.3} N/mm; lower the device's stiffness"
+                "with this friction, mass and delay more than {limit:.3} N/mm would ring, but the device allows {stiffness:.3} N/mm; lower the device's stiffness"
             ),
             Refusal::Empty => f.write_str("there is no layer; add one"),
         }
     }
 }
 
-/// Refuses what lies outside its range.
+/// Refuses a value outside its range.
 pub(crate) fn within(field: Field, value: I16F16, low: I16F16, high: I16F16) -> Result<(), Refusal> {
     if value < low || value > high { Err(Refusal::OutOfRange { field, value, low, high }) } else { Ok(()) }
 }
 
-/// As many of something as there must be.
+/// Refuses a wrong number of values.
 pub(crate) fn count(field: Field, found: usize, wanted: usize) -> Result<(), Refusal> {
     if found == wanted {
         Ok(())

@@ -386,9 +386,9 @@ fn each_refusal_says_what_to_do() {
         Refusal::AboveCeiling { force, ceiling: limit },
     ]
     .map(|refusal| refusal.to_string());
-    assert_eq!(texts[0], "Travel is 1.5000; it must be from 3.0000 to 2.0000");
+    assert_eq!(texts[0], "travel_mm is 1.5000; it must be from 3.0000 to 2.0000");
     assert!(texts[1..10].iter().all(|text| text.contains("layer")), "{texts:?}");
-    assert!(texts[10].contains("ceiling is 2.000 N"), "{texts:?}");
+    assert!(texts[10].contains("ceiling of 2.000 N"), "{texts:?}");
     assert!(texts[3..9].iter().all(|text| text.contains("layer 1")), "{texts:?}");
 }
 

@@ -167,12 +167,12 @@ impl core::fmt::Display for SaveFailure {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             SaveFailure::Flash => {
-                "the configuration was not saved, for the flash did not keep it: send it again, or replace the board"
+                "the configuration was not saved because the flash did not keep it: send it again, or replace the board"
             }
             SaveFailure::Full => {
-                "the configuration was not saved, for there is no room: restart the device and send it again"
+                "the configuration was not saved because there is no room: restart the device and send it again"
             }
-            SaveFailure::TooLong => "the configuration was not saved, for it is too long: use fewer layers",
+            SaveFailure::TooLong => "the configuration was not saved because it is too long: use fewer layers",
         })
     }
 }
@@ -258,14 +258,14 @@ impl core::fmt::Display for Rejection {
                 write!(f, "the device speaks protocol {PROTOCOL_VERSION}; update the older side")
             }
             Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
-            Rejection::NoSession => f.write_str("nobody has said hello to the device; connect to it first"),
+            Rejection::NoSession => f.write_str("no program is connected to the device; connect first"),
             Rejection::Interlocked(interlock) => interlock.fmt(f),
             Rejection::Commissioned(field) => write!(
                 f,
-                "{field:?} of a device that has been commissioned is neither changed nor raised; run host-sim commission with it again, or give back the file that it wrote, unchanged"
+                "{field} of a commissioned device cannot be changed or raised; run host-sim commission again, or restore the file that it wrote, unchanged"
             ),
             Rejection::NotShown => f.write_str(
-                "this is not what this device was commissioned with, and its own pulses have not shown that its motor and its encoder go together; run host-sim commission with it",
+                "the device was not commissioned with this configuration, and its own pulses have not shown that motor and encoder match; run host-sim commission",
             ),
         }
     }

@@ -82,7 +82,7 @@ impl<'a> Conductor<'a> {
                 self.fail("the device did not answer; check that it runs this project's firmware");
             }
             Phase::Asked { index, since } if now.saturating_sub(since) > TO_BEGIN => {
-                self.fail(format_args!("the device did not begin step {}; start it again", index + 1));
+                self.fail(format_args!("the device did not begin step {}; restart it", index + 1));
             }
             _ => {}
         }
@@ -140,7 +140,7 @@ impl<'a> Conductor<'a> {
             return Err(failure);
         }
         let Some(hello) = self.hello else {
-            return Err(Failure::failed("the device never said who it is; start it again"));
+            return Err(Failure::failed("the device did not identify itself; restart it"));
         };
         Ok(Track { file: self.programme.file, hello, samples: self.samples, reference: self.reference })
     }

@@ -149,7 +149,7 @@ impl<'a> Bench<'a> {
 
     /// The same under the device's seal.
     pub fn record(&mut self) -> Result<Record, Failure> {
-        const SILENT: &str = "the device did not say how it is configured; start it again";
+        const SILENT: &str = "the device did not report its configuration; restart it";
         self.record = None;
         self.driver.request(Request::ReportDevice);
         self.until(SILENT, |bench| bench.record.is_some())?;
@@ -172,11 +172,11 @@ impl<'a> Bench<'a> {
         self.driver.request(request);
         let record = self.record()?;
         if record.device != *wanted {
-            return Err(Failure::failed("the device did not take its new configuration; start it again"));
+            return Err(Failure::failed("the device did not accept its new configuration; restart it"));
         }
         // An erasure of the flash takes a second or two, and what becomes of it is said afterwards.
         let until = self.now + Duration::from_millis(100);
-        self.until("the device fell silent while it saved; start it again", |bench| bench.now >= until)?;
+        self.until("the device stopped answering while it saved; restart it", |bench| bench.now >= until)?;
         self.not_saved.take().map_or(Ok(record), |why| Err(Failure::failed(why)))
     }
 
@@ -184,7 +184,7 @@ impl<'a> Bench<'a> {
     pub fn index(&mut self, count: i32) -> Result<(), Failure> {
         self.driver.request(Request::Index(count));
         let until = self.now + Duration::from_millis(100);
-        self.until("the device did not take the rotor's angle; start it again", |bench| bench.now >= until)
+        self.until("the device did not accept the rotor's angle; restart it", |bench| bench.now >= until)
     }
 
     /// Prompts the hand, and returns samples until `is_done` says so or `longest` is over.
@@ -219,10 +219,10 @@ impl<'a> Bench<'a> {
         self.fault = None;
         self.driver.request(Request::Excite(excitation.clone()));
         let is_played = |sample: &Sample| sample.state == State::Excitation as u8;
-        self.until("the device did not begin to move; start it again", |bench| {
+        self.until("the device did not begin to move; restart it", |bench| {
             bench.fault.is_some() || bench.samples.iter().any(is_played)
         })?;
-        self.until_within(longest, "the device did not end its movement; start it again", |bench| {
+        self.until_within(longest, "the device did not end its movement; restart it", |bench| {
             bench.fault.is_some() || bench.samples.last().is_some_and(|sample| !is_played(sample))
         })?;
         let played = self.samples.iter().copied().filter(is_played).collect();

@@ -187,9 +187,7 @@ pub fn compensate(
     let mut bench = Bench::open(line)?;
     let device = bench.device()?;
     if !device.commissioned {
-        return Err(Failure::failed(
-            "nobody knows how this device is wired; run host-sim commission with it first",
-        ));
+        return Err(Failure::failed("the device has not been commissioned; run host-sim commission first"));
     }
     let found = coefficients::found(rig, &device, share)?;
     plan(&Device { compensation: found.compensation, ..device })?;

@@ -45,10 +45,10 @@ impl fmt::Display for ServeError {
         match self {
             Self::PortInUse { port } => write!(
                 f,
-                "port {port} on 127.0.0.1 is in use; end what uses it or choose another one with --port"
+                "port {port} on 127.0.0.1 is in use; stop the program that uses it or choose another port with --port"
             ),
             Self::Io { port, error } => {
-                write!(f, "cannot serve the page on 127.0.0.1:{port}: {error}; try another one with --port")
+                write!(f, "cannot serve the page on 127.0.0.1:{port}: {error}; try another port with --port")
             }
         }
     }
