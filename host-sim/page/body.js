@@ -47,7 +47,7 @@ export class BodyView {
       this.picture = picture;
       if (this.scene) this.build();
     } catch (error) {
-      byId("body-note").textContent = `Not to be drawn here: ${error.message}`;
+      byId("body-note").textContent = `Cannot be drawn here: ${error.message}`;
     }
   }
 

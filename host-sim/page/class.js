@@ -124,7 +124,7 @@ function attempt(card, what) {
   try {
     what();
   } catch {
-    write(card.reason, "This device says what this page does not understand: it may run another version.");
+    write(card.reason, "The page does not understand this device's messages: it may run another version.");
   }
 }
 
@@ -138,7 +138,7 @@ function draw(nowMs) {
   const here = link.open;
   document.body.dataset.link = here ? "live" : "lost";
   byId("banner").hidden = here;
-  write(byId("banner"), here ? "" : "Program not reached. Connecting again.");
+  write(byId("banner"), here ? "" : "Program unreachable. Reconnecting.");
   requestAnimationFrame(draw);
 }
 

@@ -64,5 +64,5 @@ setInterval(() => {
   byId("leave").disabled = lost;
   const banner = byId("banner");
   banner.hidden = !lost;
-  write(banner, left || ended ? "The program has ended; this page may be closed." : "Program not reached. Connecting again.");
+  write(banner, left || ended ? "The program has ended; you can close this page." : "Program unreachable. Reconnecting.");
 }, 250);

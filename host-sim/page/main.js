@@ -179,7 +179,7 @@ function tellCondition(condition) {
   const since = `no data since ${seconds} s`;
   const notice = linkStatus?.notice ?? "";
   const owed = link.stopOwed ? " Your stop could not be sent; to be safe cut the power." : "";
-  if (condition === "lost") panel.banner(`Program not reached, ${since}. Connecting again.${owed}`);
+  if (condition === "lost") panel.banner(`Program unreachable, ${since}. Reconnecting.${owed}`);
   else if (condition === "stale") panel.banner(`Device silent, ${since}.${notice ? ` ${notice}.` : ""}`);
   else panel.banner(notice);
 }

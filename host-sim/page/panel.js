@@ -20,7 +20,7 @@ const STATES = {
   withdrawal: ["Running: withdrawing", "good"],
   excitation: ["Running: test signal", "good"],
   fault: ["Fault, torque off", "bad"],
-  unknown: ["State not known", "warn"],
+  unknown: ["State unknown", "warn"],
 };
 
 const byId = (id) => document.getElementById(id);
@@ -138,7 +138,7 @@ export class Panel {
     else chip("link", "Link: nothing lost", "good");
     const recording = link.recording;
     const name = recording ? recording.file.split(/[\\/]/).at(-1) : "";
-    if (condition === "lost") chip("recording", "Recording not known", "off");
+    if (condition === "lost") chip("recording", "Recording unknown", "off");
     else if (recording) chip("recording", `Recording ${name}, ${(recording.bytes / 1e6).toFixed(1)} MB`, "bad");
     else chip("recording", "Not recording", "off");
   }

@@ -55,7 +55,7 @@ export class PatientEditor {
 
   ask(message) {
     this.asked = this.link.send(message);
-    this.say(this.asked ? "Sent to the device." : "The program is not reached; nothing was sent.", this.asked ? "" : "bad");
+    this.say(this.asked ? "Sent to the device." : "The program is unreachable; nothing was sent.", this.asked ? "" : "bad");
   }
 
   say(text, tone) {

@@ -179,7 +179,7 @@ mod tests {
         };
         for (wish, hint) in [
             (with("/layer/0/friction_n_per_mm", serde_json::json!("much")), "friction_n_per_mm"),
-            (with("/layer/0/friction_n_per_mm", serde_json::json!(-1.0)), "Friction"),
+            (with("/layer/0/friction_n_per_mm", serde_json::json!(-1.0)), "friction_n_per_mm is -1"),
             (with("/name", serde_json::json!(7)), "string"),
             (with("/layer", serde_json::json!([])), "layer"),
             (PatientWish::Edited(serde_json::json!(null)), "patient"),

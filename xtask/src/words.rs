@@ -1,4 +1,4 @@
-//! The word check: phrases that `words/list.rs` replaces by plain ones, and doc comments that open like a question.
+//! The word check: phrases that `words/list.rs` replaces by plain ones, doc comments that open like a question, and long names of tests.
 //!
 //! Comments and string literals of Rust are read, and the whole text of Markdown, HTML, CSS, JavaScript, Python and TOML. A phrase is
 //! found in any case and across a line break, and never across punctuation.
@@ -7,7 +7,7 @@ mod list;
 mod prose;
 
 use crate::shell::{self, Failure};
-use list::{OPENINGS, Phrase, STILL_TO_CLEAN};
+use list::{OPENINGS, Phrase, STILL_TO_CLEAN, STILL_TO_RENAME};
 use prose::Word;
 use std::collections::HashMap;
 use std::fs;
@@ -16,6 +16,8 @@ use std::path::Path;
 
 /// Folders without prose of ours: what is built, and what git keeps.
 const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
+/// The longest name of a test, in characters.
+const LONGEST_NAME: usize = 60;
 /// The list names what it bans.
 const LIST: &str = "xtask/src/words/list.rs";
 
@@ -49,6 +51,11 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
             let Some(prose) = prose::reader(name) else { continue };
             let Ok(text) = fs::read_to_string(entry.path()) else { continue };
             findings.extend(phrases(&prose(&text), &list::PHRASES).iter().map(|found| found.message(&below)));
+            if name.ends_with(".rs") && !STILL_TO_RENAME.iter().any(|folder| below.starts_with(folder)) {
+                findings.extend(long_names(&text).into_iter().map(|(line, name)| {
+                    format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
+                }));
+            }
             if name.ends_with(".rs") && !STILL_TO_CLEAN.iter().any(|folder| below.starts_with(folder)) {
                 findings.extend(openings(&text).into_iter().map(|(line, word)| {
                     format!(
@@ -91,6 +98,23 @@ fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
                 found.push(Found { line: first.line, phrase });
             }
         }
+    }
+    found
+}
+
+/// Returns the lines of Rust in `text` with the name of a test that is too long, each with the name.
+fn long_names(text: &str) -> Vec<(usize, &str)> {
+    let mut found = Vec::new();
+    let mut is_test = false;
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if let Some((_, rest)) = line.split_once("fn ").filter(|_| is_test) {
+            let name = rest.split('(').next().unwrap_or(rest);
+            if name.len() > LONGEST_NAME {
+                found.push((number + 1, name));
+            }
+        }
+        is_test = line == "#[test]" || is_test && line.starts_with("#[");
     }
     found
 }
@@ -166,6 +190,15 @@ mod tests {
         let text = "//! What it is.\n\n/// Returns it.\n/// What follows.\nfn f() {}\n    /// Whether so.\n/// Whatever.";
         assert_eq!(openings(text), [(1, "What"), (6, "Whether")]);
         assert_eq!(openings("// What is it?\n/// Whatever it is, it is returned."), []);
+    }
+
+    #[test]
+    fn a_test_has_a_name_of_at_most_sixty_characters() {
+        let (short, long) = ("a".repeat(60), "b".repeat(61));
+        let text = format!(
+            "#[test]\n#[ignore = \"slow\"]\nfn {long}() {{}}\n#[test]\nfn {short}() {{}}\nfn {long}() {{}}"
+        );
+        assert_eq!(long_names(&text), [(3, long.as_str())], "other functions may have any name");
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn mistakes_are_named_with_their_line() {
         (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = nan"), "depth_mm"),
         (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = 1e300"), "depth_mm"),
         (format!("{}\n[limits]\ntorque_mnm = 90.0\n", BUILT_IN[0].1), "limits"),
-        (format!("largest_force_n = 9.0\n{}", BUILT_IN[0].1), "ceiling is 2.880 N"),
+        (format!("largest_force_n = 9.0\n{}", BUILT_IN[0].1), "ceiling of 2.880 N"),
         ("[[layer]".into(), "line 1"),
         (String::new(), "format"),
     ] {
@@ -90,10 +90,10 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
     let (shoulder, phantom) = (file("shoulder"), file("phantom"));
     for (wrong, hint) in [
         (shoulder.replace("model = \"sparte\"", "model = \"magic\""), "magic"),
-        (shoulder.replace("relax_ms = 300 ", "relax_ms = 9 "), "RelaxMs is 9"),
+        (shoulder.replace("relax_ms = 300 ", "relax_ms = 9 "), "relax_ms is 9"),
         (shoulder.replace("relax_ms = 300 ", "relaxation = 300 "), "relaxation"),
         (shoulder.replace("force_scale = 0.65", "force_scale = 1.0"), "N/mm"),
-        (shoulder.replace("inwards_n = 4.0", "inwards_n = 40.0"), "layer 5 asks for 40.4"),
+        (shoulder.replace("inwards_n = 4.0", "inwards_n = 40.0"), "layer 5 demands 40.4"),
         (shoulder.replace("cutting = { inwards_n = 4.0, outwards_n = 1.2 }", ""), "cutting is missing"),
         (shoulder.replace("depth_mm = 29.0", "depth_mm = -29.0"), "depth_mm of layer 5 is -29"),
         (shoulder.replace("depth_mm = 29.0", "depth_mm = 23.0"), "does not begin below"),
@@ -110,8 +110,8 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (phantom.replace("speeds_mm_s = [1.0, 3.0, 5.0]", "speeds_mm_s = [1.0, 3.0]"), "need 6 rows"),
         (phantom.replace("speeds_mm_s = [1.0,", "speeds_mm_s = [0.5, 1.0,"), "at most 3"),
         (phantom.replace("measured = [false,", "measured = ["), "measured has 8 values"),
-        (phantom.replace("withdrawal = 0.4 ", "withdrawal = 1.4 "), "Withdrawal is 1.4"),
-        (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = 0.01"), "TableDepth is 0.01"),
+        (phantom.replace("withdrawal = 0.4 ", "withdrawal = 1.4 "), "withdrawal is 1.4"),
+        (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = 0.01"), "depth_step_mm is 0.01"),
         (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = inf"), "depth_step_mm is inf"),
         (phantom.replace("[0.000,", "[nan,"), "force_n holds NaN"),
         (BUILT_IN[0].1.replacen("friction_n_per_mm = 0.02\n", "", 1), "friction_n_per_mm is missing"),
