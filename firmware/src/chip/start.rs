@@ -149,14 +149,14 @@ impl<W: Wiring> Parts<W> {
 
 /// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
 fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
-    let (device, lost_device) = device.or(Device::unknown());
+    let (device, lost_device) = device.or(Device::default());
     let is_too_much = ceilings.check(&device).is_err();
-    let device = if is_too_much { Device::unknown() } else { device };
+    let device = if is_too_much { Device::default() } else { device };
     let (patient, lost_patient) = patient.or(Patient::default());
     let fault = (lost_device || lost_patient || is_too_much).then_some(Fault::StoredConfig);
     // A patient for another device leaves, and a device that may not be leaves the default.
     let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
-    let parts = [(device, Patient::nobody()), (Device::unknown(), Patient::default())];
+    let parts = [(device, Patient::nobody()), (Device::default(), Patient::default())];
     let plan = fitting.or_else(|_| {
         let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
         plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())

@@ -29,6 +29,8 @@ pub struct Shared {
     pub supervised_ms: AtomicU32,
     /// Whether the amplifier is on. Written by the tick.
     pub powered: AtomicBool,
+    /// Whether the encoder's lines are at one level. Written by the supervisor.
+    pub lines_agree: AtomicBool,
     /// Ticks that came late or not at all. Written by the tick.
     pub missed_ticks: AtomicU32,
     /// What the USB host has done to us: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
@@ -52,6 +54,7 @@ impl Shared {
             stages: Stages::new(),
             supervised_ms: AtomicU32::new(0),
             powered: AtomicBool::new(false),
+            lines_agree: AtomicBool::new(false),
             missed_ticks: AtomicU32::new(0),
             link: AtomicU8::new(0),
             discard: AtomicBool::new(false),

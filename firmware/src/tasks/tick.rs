@@ -83,6 +83,7 @@ impl<B: Board> Tick<B> {
         {
             self.controller.order(Order::Trip(fault));
         }
+        self.controller.set_lines_agree(self.shared.lines_agree.load(Relaxed));
         let output = self.controller.tick(input);
         self.drive.apply(self.width, &output);
         let to_dac = self.timer.cycles_since_edge();

@@ -219,7 +219,7 @@ mod tests {
     use fixed::types::{I2F30, I16F16};
 
     fn hello() -> Hello {
-        let device = Config::default().device;
+        let device = Config::commissioned_virtual().device;
         Hello {
             version: frames::PROTOCOL_VERSION,
             identity: [0; 12],

@@ -30,8 +30,10 @@ const FIRST_LARGE_NUMBER: u64 = 5;
 const LARGE: u64 = 0x2_0000;
 /// A sector holds a slot of the configuration.
 pub(super) const SLOT_BYTES: u64 = LARGE;
-/// The sectors the firmware may write: the last two of one megabyte.
-pub(super) const WRITABLE: std::ops::Range<u64> = 0x080C_0000..0x0810_0000;
+/// The sectors of the configuration: the last two of one megabyte.
+pub const CONFIGURATION: std::ops::Range<u64> = 0x080C_0000..0x0810_0000;
+/// The sectors that a firmware may write: the configuration's and the two before them, which the board's own test uses.
+pub(super) const WRITABLE: std::ops::Range<u64> = 0x0808_0000..0x0810_0000;
 const ERASED: u32 = u32::MAX;
 
 /// The array's state.
@@ -93,6 +95,12 @@ impl Array {
     #[must_use]
     pub fn written(&self) -> Vec<u64> {
         self.words.keys().copied().collect()
+    }
+
+    /// The configuration's words that are not erased, with their addresses.
+    #[must_use]
+    pub fn configuration(&self) -> Vec<(u64, u32)> {
+        self.words.range(CONFIGURATION).map(|(&address, &word)| (address, word)).collect()
     }
 
     /// Whether the next operation still has supply; the one that hasn't cuts it.

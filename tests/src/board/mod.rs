@@ -109,6 +109,8 @@ pub struct Wiring {
     pub tilt: Option<tilt::Model>,
     /// Whether an analogue inclinometer is there, level until [`Stopped::set_analogue`] says otherwise, and its strap with it.
     pub inclinometer: bool,
+    /// Whether the encoder's supply is sensed.
+    pub supply_sense: bool,
     /// Whether the motor's current is measured.
     pub current_monitor: bool,
     /// The part's supply when it is switched on, in millivolts.
@@ -128,6 +130,7 @@ impl Default for Wiring {
             set_value: SetValue::OnChip,
             tilt: Some(tilt::Model::Lis3dsh),
             inclinometer: false,
+            supply_sense: false,
             current_monitor: false,
             supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,

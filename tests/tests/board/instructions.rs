@@ -143,7 +143,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
     let sticking = FrictionLaw::StickSlip { stiffness: Stiffness(q(0.5)), sliding: q(0.5) };
     (0..10_u8).map(move |choice| {
         let is = |bit: u8| choice & 1 << bit != 0;
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.patient.law = Law::Jog(match (is(3), is(0)) {
             (true, _) => sticking,
             (false, true) => paper,
@@ -192,7 +192,8 @@ fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, i64)> {
 fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
-    let (mut board, _) = profile.add(Config::default(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
+    let (mut board, _) =
+        profile.add(Config::commissioned_virtual(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
     profile.has_worked();
     let longest = profile.longest("default");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
@@ -204,7 +205,7 @@ fn a_tick_takes_at_most_840_instructions() {
 
 #[test]
 fn a_tick_that_feeds_all_of_it_forward_takes_at_most_1260_instructions() {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.compensation = all_fed_forward();
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;

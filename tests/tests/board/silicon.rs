@@ -54,7 +54,7 @@ fn full_torque_both_ways_reaches_the_pin() {
 fn three_hundred_configurations_are_all_saved() {
     let mut rig = connected(Wiring::default());
     let config = |number: u16| {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.device.limits.fade_in_ms = 300 + number;
         config
     };
@@ -83,7 +83,7 @@ fn three_hundred_configurations_are_all_saved() {
 #[test]
 fn a_sector_is_erased_with_the_amplifier_off_only() {
     let mut rig = connected(Wiring::default());
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     for number in 1..=140 {
         rig.pc.send(&mut rig.board, Command::Start);
         rig.pc.run_ms(&mut rig.board, 3);
@@ -109,7 +109,7 @@ fn a_sector_is_erased_with_the_amplifier_off_only() {
 fn a_configuration_that_is_not_saved_is_reported() {
     let mut rig = connected(Wiring::default());
     rig.board.flash().array().worn = true;
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 400;
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
     rig.pc.run_ms(&mut rig.board, 50);
