@@ -13,7 +13,7 @@ use crate::passivity::{Elements, Observer};
 use crate::plan::Plan;
 use crate::runaway::{self, LOOK_TICKS};
 use crate::safety::Limiter;
-use crate::stillness::{Seen, Stillness};
+use crate::stillness::{self, Stillness};
 use crate::thermal::{WARM_TICKS, Winding};
 use crate::units::{
     Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
@@ -290,6 +290,7 @@ impl Controller {
         if self.turn % 8 == LOOK_TURN {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
+            self.look_at_stillness();
         } else if transitions.is_empty() {
             // A tick in which a layer is touched, gives way or is left is long enough.
             self.take_turn(input.tilt);
@@ -326,7 +327,7 @@ impl Controller {
     #[inline(never)]
     fn take_turn(&mut self, tilt: Milliradians) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
-        const { assert!(anatomy::LOOK_TICKS == 16, "the turns below") };
+        const { assert!(anatomy::LOOK_TICKS == 16 && stillness::LOOK_TICKS == 8, "the turns below") };
         let fault = match self.turn {
             0 | 8 => return self.winding.warm(&self.plan.thermal),
             2 | 10 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
@@ -398,28 +399,45 @@ impl Controller {
             self.trip(Fault::EncoderJump);
         } else if is_beyond {
             self.trip(Fault::Travel);
-        } else if self.is_dead(step) {
-            self.trip(Fault::EncoderFrozen);
+        } else if step != 0 {
+            self.still.step(self.runaway.is_back(step));
         }
         count
     }
 
-    /// Whether the encoder no longer counts. A count up and down again is less than one: a live channel gives them beside a dead
-    /// one.
-    fn is_dead(&mut self, step: i32) -> bool {
-        let has_moved = step != 0;
-        let is_back = has_moved && self.runaway.is_back(step);
+    /// The look for an encoder that no longer counts. A count up and down again is less than one: a live channel gives them when
+    /// the other one is dead.
+    fn look_at_stillness(&mut self) {
         // While the encoder is asked, what would be given counts, and else what is: less while it fades in.
         let torque = if self.still.is_asking() { self.asked } else { self.limiter.given().0 };
-        let is_loaded = torque.unsigned_abs() >= self.plan.loaded_torque;
-        self.still.see(Seen { has_moved, is_back }, is_loaded);
-        if self.mode == Mode::Exciting {
-            // Nobody's hand is on the needle, and less torque would be another signal.
-            return self.still.is_doubtful(false);
+        self.still.look(torque.unsigned_abs() >= self.plan.loaded_torque);
+        if self.still.is_asking() || self.still.is_doubtful(self.lines_agree) {
+            self.ask_for_a_count();
         }
-        let is_doubtful = self.still.is_doubtful(self.lines_agree);
-        let is_off = self.limiter.given().0 == I16F16::ZERO;
-        (is_doubtful || self.still.is_asking()) && self.still.ask(is_doubtful, is_off)
+    }
+
+    /// Asks a needle that is in doubt for a count; trips if its encoder is dead.
+    #[cold]
+    #[inline(never)]
+    fn ask_for_a_count(&mut self) {
+        let given = self.limiter.given().0;
+        let is_dead = match self.mode {
+            Mode::Running => {
+                if !self.still.is_asking() {
+                    self.asked = given;
+                }
+                self.still.ask(self.still.is_doubtful(self.lines_agree), given == I16F16::ZERO)
+            }
+            // Nobody's hand is on the needle, and less torque would be another signal.
+            Mode::Exciting => self.still.is_doubtful(false),
+            Mode::Idle | Mode::Faulted => {
+                self.still = Stillness::default();
+                false
+            }
+        };
+        if is_dead {
+            self.trip(Fault::EncoderFrozen);
+        }
     }
 
     fn watch_host(&mut self) {
@@ -489,6 +507,14 @@ impl Controller {
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 
+    /// What is given of the torque `held` while the encoder is asked whether it counts.
+    #[cold]
+    #[inline(never)]
+    fn left_while_asking(&mut self, held: I16F16) -> I16F16 {
+        self.asked = held;
+        self.still.left_of(held)
+    }
+
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
         let most = self.plan.torque_limits.torque;
         let allowed = self.winding.allowed();
@@ -503,8 +529,7 @@ impl Controller {
             };
             limits = limits.with(thermal).with(torque);
         }
-        self.asked = held;
-        let given = if self.still.is_asking() { self.still.left_of(held) } else { held };
+        let given = if self.still.is_asking() { self.left_while_asking(held) } else { held };
         let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(given));
         let missing = torque.0.saturating_sub(wanted.0);
         if missing != I16F16::ZERO {

@@ -75,7 +75,7 @@ impl<D12: MotorDac, D8: MotorDac, E: OutputPin> Drive<D12, D8, E> {
     }
 
     /// Puts a code out at the 12-bit converter while the amplifier stays off: for the test of the board, which looks at the pin.
-    pub fn put_with_amplifier_off(&mut self, code: DacCode) {
+    pub fn put_while_off(&mut self, code: DacCode) {
         self.off();
         self.twelve.put(code);
     }
@@ -194,7 +194,7 @@ mod tests {
         let writes = RefCell::new(vec![]);
         let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
         writes.take();
-        drive.put_with_amplifier_off(DacCode(4095));
+        drive.put_while_off(DacCode(4095));
         let writes = writes.take();
         assert_eq!(writes.last(), Some(&Write::Twelve(4095)));
         assert!(writes.contains(&Write::Enable(false)) && !writes.contains(&Write::Enable(true)));

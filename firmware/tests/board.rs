@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn the_converter_gives_code_for_code(mut parts: Parts) {
         for code in (1..=4095).step_by(23) {
-            parts.drive.put_with_amplifier_off(DacCode(code));
+            parts.drive.put_while_off(DacCode(code));
             (0..3).for_each(|_| a_tick(&parts));
             let readings = parts.drive_lines.read();
             assert!(!readings.enable_line, "the enable line is high");

@@ -148,20 +148,25 @@ fn held_on_the_board(patient: Patient) -> (Rig, Needle) {
     rig.pc.must(&mut rig.board, Command::Zero);
     rig.pc.must(&mut rig.board, Command::Start);
     rig.pc.run_ms(&mut rig.board, 350);
+    press_until(&mut rig, &needle, HELD_CODES);
+    (rig, needle)
+}
+
+/// Presses on until the motor gives so many codes of torque, and then holds.
+fn press_until(rig: &mut Rig, needle: &Needle, codes: u16) {
     needle.change(|state| state.hand_speed = 0.01);
     let pressed = (0..1_000).any(|_| {
         rig.pc.run_ms(&mut rig.board, 5);
-        rig.board.at_stop(|stopped| stopped.drive()).code.is_some_and(|code| code <= ZERO_TORQUE - HELD_CODES)
+        rig.board.at_stop(|stopped| stopped.drive()).code.is_some_and(|code| code <= ZERO_TORQUE - codes)
     });
     needle.change(|state| state.hand_speed = 0.0);
     assert!(pressed, "{:?}", rig.board.at_stop(|stopped| stopped.drive()));
-    (rig, needle)
 }
 
 #[test]
 fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
     for (name, patient) in patients() {
-        let (mut rig, _) = held_on_the_board(patient);
+        let (mut rig, needle) = held_on_the_board(patient);
         let mut codes = (u16::MAX, 0);
         for _ in 0..2_000 {
             rig.pc.run_ms(&mut rig.board, 10);
@@ -173,6 +178,8 @@ fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
         }
         let newtons = |codes: u16| f64::from(codes) / 2_047.0 * 2.88;
         println!("| {name}, held for 20 s | {:.2} to {:.2} N |", newtons(codes.0), newtons(codes.1));
+        // The tissue has relaxed below an eighth of the limit, from which on the check is awake.
+        press_until(&mut rig, &needle, HELD_CODES);
         rig.board.at_stop(|stopped| stopped.set_wires(Wires { supply_off: true, ..Wires::default() }));
         let time = rig.time_to_safe(200 * MILLISECOND);
         println!("| {name}, encoder without supply | {:.1} ms |", time as f64 / 1e6);
