@@ -205,6 +205,7 @@ fn timing(timing: frames::Timing) -> Timing {
     Timing {
         longest_tick_us: f64::from(longest) / per_us,
         missed_ticks: timing.missed_ticks,
+        late_codes: timing.late_codes,
         dropped_samples: timing.dropped_samples,
     }
 }

@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod amplifier;
+pub mod cache;
 mod dac;
 pub mod elf;
 mod exti;
@@ -205,6 +206,7 @@ impl Board {
         let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
         let (probe, flash) = (Probe::default(), flash::Flash::default());
+        flash.array().supply = wiring.supply;
         if wiring.commissioned {
             record::commission(&mut flash.array());
         }
@@ -311,11 +313,21 @@ impl Board {
         self.probe.tally().counted = Some(Counted { entry, exits });
     }
 
+    /// The same, and counts the lines of its code that come from the flash, which takes an instruction at a time.
+    ///
+    /// # Panics
+    ///
+    /// When the image has no such handler.
+    pub fn count_lines_of(&self, name: &str) {
+        self.count_runs_of(name);
+        self.probe.tally().count_lines = true;
+    }
+
     /// Stops counting and returns the runs that have ended.
     #[must_use]
     pub fn counted_runs(&self) -> Vec<HandlerRun> {
         let mut tally = self.probe.tally();
-        tally.counted = None;
+        (tally.counted, tally.count_lines) = (None, false);
         std::mem::take(&mut tally.runs)
     }
 

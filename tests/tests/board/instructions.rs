@@ -15,7 +15,9 @@ use control_core::units::{
 };
 use fixed::types::{I8F24, I16F16};
 use link::Command;
+use tests::board::cache;
 use tests::board::plant::{self, PlantSide};
+use tests::board::processor::HandlerRun;
 use tests::board::{Board, MILLISECOND, Nanos};
 use tests::laws;
 use tests::pc::Pc;
@@ -25,6 +27,7 @@ use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 const TICK: &str = "TIM4";
 /// What a tick of the default may take, with nothing fed forward: five per cent of its cycles. The converter is latched after 3,360.
 const LONGEST: u32 = 840;
+const LATCH_CYCLES: u32 = 3_360;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_060;
 const EXCITING: u32 = 910;
@@ -201,6 +204,41 @@ fn a_tick_takes_at_most_840_instructions() {
     println!("tick_instructions_longest={longest}");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
+}
+
+/// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used the cache since the tick before. With every
+/// line of it from the flash, without prefetch, and one and a half cycles for an instruction, a tick is done before the
+/// converter takes its code.
+#[test]
+fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
+    for (name, compensation) in [("default", Compensation::NONE), ("all fed forward", all_fed_forward())] {
+        let mut config = Config::commissioned_virtual();
+        config.device.compensation = compensation;
+        let mut board = board(venepuncture(BEGIN));
+        let mut pc = Pc::new();
+        pc.connect(&mut board);
+        pc.configure(&mut board, &config);
+        pc.must(&mut board, Command::Index(Some(17)));
+        pc.must(&mut board, Command::Start);
+        // Through the skin, and its wall gives way.
+        let end = BEGIN + 2_600 * MILLISECOND;
+        pc.run_ms(&mut board, 1_600);
+        board.count_lines_of(TICK);
+        while board.now() < end {
+            pc.run_ms(&mut board, 1);
+        }
+        let runs = board.counted_runs();
+        let cycles = |run: &HandlerRun| run.instructions * 3 / 2 + run.lines_fetched * cache::WAIT_CYCLES;
+        let worst = runs.iter().max_by_key(|run| cycles(run)).expect("ticks");
+        println!(
+            "| {name}, nothing cached | {} instructions, {} lines from the flash, {} of {LATCH_CYCLES} cycles |",
+            worst.instructions,
+            worst.lines_fetched,
+            cycles(worst)
+        );
+        assert!(runs.iter().any(|run| run.lines_fetched > 64), "more lines than the cache has");
+        assert!(cycles(worst) < LATCH_CYCLES, "{worst:?}");
+    }
 }
 
 #[test]

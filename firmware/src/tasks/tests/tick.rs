@@ -93,6 +93,20 @@ fn a_tick_that_comes_late_is_counted_and_takes_torque_away() {
     assert_eq!(shared.missed_ticks.load(Relaxed), 3, "an erasure stops the processor");
 }
 
+#[test]
+fn a_code_written_after_the_latch_is_counted() {
+    let (mut tick, shared, _) = tick();
+    world().since_edge.set(timing::OUTPUT_CYCLES - 1);
+    run(&mut tick, shared, 2);
+    assert_eq!(shared.late_codes.load(Relaxed), 0);
+    world().since_edge.set(timing::OUTPUT_CYCLES);
+    run(&mut tick, shared, 3);
+    assert_eq!(shared.late_codes.load(Relaxed), 3);
+    shared.conditions.set(Interlock::Saving, true);
+    run(&mut tick, shared, 1);
+    assert_eq!(shared.late_codes.load(Relaxed), 3, "an erasure stops the processor");
+}
+
 /// After 119 hours the number of ticks begins again; a tick that is missed then is missed.
 #[test]
 fn the_number_of_ticks_wraps_without_a_word() {
