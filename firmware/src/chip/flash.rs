@@ -114,13 +114,17 @@ impl ConfigFlash for Sectors {
     }
 
     fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
-        let address = self.address(slot, index);
-        let done = self.operate(timing::FLASH_WORD_TURNS, |flash| {
-            // A register written whole begins from its reset value, which locks.
-            flash.cr().write(|w| w.lock().clear_bit().psize().psize32().pg().set_bit());
-            // SAFETY: an aligned word of flash that no variable lies in, open for programming.
-            unsafe { address.write_volatile(word) };
-            cortex_m::asm::dsb();
+        let address = self.address(slot, index).cast::<u16>();
+        let halves = [(address, word as u16), (address.wrapping_add(1), (word >> 16) as u16)];
+        let done = halves.into_iter().try_for_each(|(address, half)| {
+            self.operate(timing::FLASH_WORD_TURNS, |flash| {
+                // A register written whole begins from its reset value, which locks. 16 bits at a time: 32 ask for 2.7 V, and
+                // the rail may be lower (RM0090 3.6.2).
+                flash.cr().write(|w| w.lock().clear_bit().psize().psize16().pg().set_bit());
+                // SAFETY: an aligned half of a word of flash that no variable lies in, open for programming.
+                unsafe { address.write_volatile(half) };
+                cortex_m::asm::dsb();
+            })
         });
         // Telemetry is at work, not hung: a configuration has a hundred words and more.
         SHARED.reports.alive(Task::Telemetry);
@@ -136,7 +140,7 @@ impl ConfigFlash for Sectors {
             // would be lost without a word.
             // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
             flash.cr().write(|w| unsafe {
-                w.lock().clear_bit().psize().psize32().ser().set_bit().snb().bits(sector)
+                w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
             });
             flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
         });

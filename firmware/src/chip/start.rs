@@ -1,6 +1,7 @@
 //! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the amplifier first, then all that the
 //! microcontroller does by itself. Interrupts are masked meanwhile.
 
+use super::brownout;
 use super::clock::{self, Source};
 use super::encoder::{Encoder, EncoderLines};
 use super::flash::Sectors;
@@ -106,6 +107,10 @@ impl<W: Wiring> Parts<W> {
         own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 
         let Said { crash, torque, heat } = LAST_WORDS.take();
+        let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
+        if !supply_level.is_falling() {
+            brownout::set(&own.flash);
+        }
         let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
         let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
         let reset_cause = cause(flags, crash, torque).or(damage);
@@ -118,7 +123,6 @@ impl<W: Wiring> Parts<W> {
 
         let bus = USB::new(own.usb, own.usb_pins, &rcc.clocks);
         let serial = usb::init(bus, serial_number(), &mut statics.usb);
-        let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
         let mut systick = core.SYST;
         systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
         systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);

@@ -99,6 +99,7 @@ impl Stopped<'_> {
         const PVDO: u64 = 1 << 2;
         let machine = self.session.board_mut();
         machine.part().set_supply(millivolts);
+        machine.flash.array().supply = millivolts;
         let status = machine.mcu.peek(VirtualNanos(self.at), PWR_CSR, Width::W32).unwrap_or(0);
         machine.exti().drive_detector(status & PVDO != 0);
     }

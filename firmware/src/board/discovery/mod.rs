@@ -15,6 +15,7 @@
 //! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
 //! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
 //! | PA11, PA12 | USB | the micro-USB connector CN5 |
+//! | PC0 | power switch of CN5, for a host; low is on | high for good: this is a device (UM1472, OTG) |
 //! | PD12 | green LED: running | on the board |
 
 use crate::chip::{
@@ -58,6 +59,7 @@ impl Wiring for Discovery {
         let mut enable = gpiod.pd7.into_push_pull_output();
         enable.set_low();
         gpiod.pd4.into_push_pull_output().set_low();
+        gpioc.pc0.into_push_pull_output().set_high();
         let lines = Lines::new((
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
