@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn a_board_bounds_torque_and_the_speed_that_its_counts_make() {
-        let mut device = Device::default();
+        let mut device = Device::commissioned_virtual();
         assert_eq!(BOARD.check(&device), Ok(()));
         device.limits.max_counts_per_tick = 23;
         let refused = BOARD.check(&device);
@@ -119,7 +119,7 @@ mod tests {
             (Field::MechanismFriction, |d| d.mechanism.dry_friction.0 += I16F16::DELTA),
             (Field::DriveDelayUs, |d| d.mechanism.delay_us -= 1),
         ];
-        let before = Device::default();
+        let before = Device::commissioned_virtual();
         for (field, change) in changes {
             let mut after = before;
             change(&mut after);

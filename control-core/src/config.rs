@@ -25,6 +25,11 @@ pub struct Config {
 }
 
 impl Config {
+    /// The default patient on [`Device::commissioned_virtual`].
+    pub fn commissioned_virtual() -> Self {
+        Self { device: Device::commissioned_virtual(), patient: Patient::default() }
+    }
+
     /// Both parts checked, ready to run.
     pub fn plan(&self) -> Result<crate::Plan, crate::Refusal> {
         crate::Plan::new(&self.device, &self.patient)
@@ -164,7 +169,8 @@ pub enum SpeedMethod {
 }
 
 impl Default for Device {
-    /// A 10 mm roller on the motor and encoder of Paper 001, a 12-bit converter: the virtual device, which is known to be so.
+    /// A 10 mm roller on the motor and encoder of Paper 001 and a 12-bit converter, not commissioned: the device that a board without a
+    /// record of its own assumes.
     fn default() -> Self {
         let mm = |whole: i32| Millimetres(I16F16::from_bits(whole << 16));
         // 28.8 mN·m.
@@ -195,15 +201,16 @@ impl Default for Device {
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
             mechanism: Mechanism::default(),
             compensation: Compensation::NONE,
-            commissioned: true,
+            commissioned: false,
         }
     }
 }
 
 impl Device {
-    /// A device that nobody has commissioned, taken for the default one: what a board is that has no record of its own.
-    pub fn unknown() -> Self {
-        Self { commissioned: false, ..Self::default() }
+    /// The default device as a simulated one, whose wiring is known: it gives torque without being commissioned first. Never save it
+    /// on a board.
+    pub fn commissioned_virtual() -> Self {
+        Self { commissioned: true, ..Self::default() }
     }
 }
 

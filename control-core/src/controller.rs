@@ -13,6 +13,7 @@ use crate::passivity::{Elements, Observer};
 use crate::plan::Plan;
 use crate::runaway::{self, LOOK_TICKS};
 use crate::safety::Limiter;
+use crate::stillness::{self, Stillness};
 use crate::thermal::{WARM_TICKS, Winding};
 use crate::units::{
     Counts, DacCode, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons,
@@ -22,9 +23,6 @@ use serde::{Deserialize, Serialize};
 
 /// Of eight ticks, the one in which the watch takes the count.
 const LOOK_TURN: u32 = 4;
-
-/// An encoder without a count for this long under torque is dead: 4 s, where a light tremor on the simulated bearings pauses for up to 1 s.
-const FROZEN_TICKS: u32 = 4 * crate::TICK_HZ;
 
 /// What the tick reads.
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,7 +80,7 @@ pub struct Sample {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
 pub enum Order {
-    /// Power up and fade in; clears a latched fault.
+    /// Power up and fade in; clears a latched fault. Only on a device that has been commissioned.
     Start,
     /// Zero torque, amplifier off.
     Stop,
@@ -94,7 +92,8 @@ pub enum Order {
     Configure(Plan),
     /// Something outside the tick went wrong: torque off, latched.
     Trip(Fault),
-    /// Play an excitation from where the motor is; only while torque is off. It has passed [`Excitation::check`].
+    /// Play an excitation from where the motor is; only while torque is off, and on a device that has not been
+    /// commissioned only where [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
     Excite(Excitation),
     /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
     /// [`crate::compensation::check::check`].
@@ -121,7 +120,10 @@ pub struct Controller {
     winding: Winding,
     limiter: Limiter,
     silent_ticks: u32,
-    frozen_ticks: u32,
+    still: Stillness,
+    lines_agree: bool,
+    /// Torque that was asked for in the tick before, within its limit.
+    asked: I16F16,
     runaway: runaway::Watch,
     /// Ticks, for what is done in one of eight or of sixteen only.
     turn: u32,
@@ -170,7 +172,9 @@ impl Controller {
             winding,
             limiter: Limiter::default(),
             silent_ticks: 0,
-            frozen_ticks: 0,
+            still: Stillness::default(),
+            lines_agree: false,
+            asked: I16F16::ZERO,
             runaway: runaway::Watch::default(),
             turn: 0,
             tripped: None,
@@ -190,11 +194,13 @@ impl Controller {
     /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
     pub fn order(&mut self, order: Order) {
         match order {
-            Order::Start if !self.mode.is_powered() => {
+            Order::Start if !self.mode.is_powered() && self.plan.device().commissioned => {
                 self.insertion.begin();
                 self.power_up(Mode::Running, true);
             }
-            Order::Excite(excitation) if !self.mode.is_powered() => {
+            Order::Excite(excitation)
+                if !self.mode.is_powered() && (self.plan.device().commissioned || excitation.is_gentle()) =>
+            {
                 let depth = self.plan.scale.depth(self.latest_count());
                 self.player = Some(Player::new(&excitation, depth));
                 self.withdraw();
@@ -233,6 +239,13 @@ impl Controller {
         self.silent_ticks = 0;
     }
 
+    /// Says, until it is said again, whether both of the encoder's lines are at one level, as they also are without its supply or
+    /// its ground. An encoder without lines, such as a simulated one, leaves it at `false`.
+    #[inline]
+    pub fn set_lines_agree(&mut self, agree: bool) {
+        self.lines_agree = agree;
+    }
+
     /// As if the needle had never been in this tissue.
     fn withdraw(&mut self) {
         self.insertion = Insertion::new(&self.plan.anatomy);
@@ -245,7 +258,8 @@ impl Controller {
         self.feedforward.restart(&self.plan.compensation, count, is_compensated);
         self.observer = Observer::new(self.plan.scale.depth(self.latest_count()));
         self.silent_ticks = 0;
-        self.frozen_ticks = 0;
+        self.still = Stillness::default();
+        self.asked = I16F16::ZERO;
         self.runaway = runaway::Watch::new(self.latest_count().0);
         self.mode = mode;
     }
@@ -276,6 +290,7 @@ impl Controller {
         if self.turn % 8 == LOOK_TURN {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
+            self.look_at_stillness();
         } else if transitions.is_empty() {
             // A tick in which a layer is touched, gives way or is left is long enough.
             self.take_turn(input.tilt);
@@ -312,7 +327,7 @@ impl Controller {
     #[inline(never)]
     fn take_turn(&mut self, tilt: Milliradians) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
-        const { assert!(anatomy::LOOK_TICKS == 16, "the turns below") };
+        const { assert!(anatomy::LOOK_TICKS == 16 && stillness::LOOK_TICKS == 8, "the turns below") };
         let fault = match self.turn {
             0 | 8 => return self.winding.warm(&self.plan.thermal),
             2 | 10 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
@@ -384,19 +399,45 @@ impl Controller {
             self.trip(Fault::EncoderJump);
         } else if is_beyond {
             self.trip(Fault::Travel);
-        } else if self.is_frozen(step) {
-            self.trip(Fault::EncoderFrozen);
+        } else if step != 0 {
+            self.still.step(self.runaway.is_back(step));
         }
         count
     }
 
-    /// No hand that holds against this much torque is without a count of tremor for this long: the encoder is dead. A count
-    /// up and down again is none: a live channel beside a dead one gives no more.
-    fn is_frozen(&mut self, step: i32) -> bool {
-        let is_still = step == 0 || self.runaway.is_back(step);
-        let is_frozen = is_still && self.limiter.given().0.unsigned_abs() >= self.plan.frozen_torque;
-        self.frozen_ticks = if is_frozen { self.frozen_ticks.wrapping_add(1) } else { 0 };
-        self.frozen_ticks > FROZEN_TICKS
+    /// The look for an encoder that no longer counts. A count up and down again is less than one: a live channel gives them when
+    /// the other one is dead.
+    fn look_at_stillness(&mut self) {
+        // While the encoder is asked, what would be given counts, and else what is: less while it fades in.
+        let torque = if self.still.is_asking() { self.asked } else { self.limiter.given().0 };
+        self.still.look(torque.unsigned_abs() >= self.plan.loaded_torque);
+        if self.still.is_asking() || self.still.is_doubtful(self.lines_agree) {
+            self.ask_for_a_count();
+        }
+    }
+
+    /// Asks a needle that is in doubt for a count; trips if its encoder is dead.
+    #[cold]
+    #[inline(never)]
+    fn ask_for_a_count(&mut self) {
+        let given = self.limiter.given().0;
+        let is_dead = match self.mode {
+            Mode::Running => {
+                if !self.still.is_asking() {
+                    self.asked = given;
+                }
+                self.still.ask(self.still.is_doubtful(self.lines_agree), given == I16F16::ZERO)
+            }
+            // Nobody's hand is on the needle, and less torque would be another signal.
+            Mode::Exciting => self.still.is_doubtful(false),
+            Mode::Idle | Mode::Faulted => {
+                self.still = Stillness::default();
+                false
+            }
+        };
+        if is_dead {
+            self.trip(Fault::EncoderFrozen);
+        }
     }
 
     fn watch_host(&mut self) {
@@ -466,6 +507,14 @@ impl Controller {
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 
+    /// What is given of the torque `held` while the encoder is asked whether it counts.
+    #[cold]
+    #[inline(never)]
+    fn left_while_asking(&mut self, held: I16F16) -> I16F16 {
+        self.asked = held;
+        self.still.left_of(held)
+    }
+
     fn limit(&mut self, wanted: MillinewtonMetres, limits: Limits) -> (MillinewtonMetres, Limits) {
         let most = self.plan.torque_limits.torque;
         let allowed = self.winding.allowed();
@@ -480,7 +529,8 @@ impl Controller {
             };
             limits = limits.with(thermal).with(torque);
         }
-        let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(held));
+        let given = if self.still.is_asking() { self.left_while_asking(held) } else { held };
+        let (torque, in_force) = self.limiter.tick(&self.plan.torque_limits, MillinewtonMetres(given));
         let missing = torque.0.saturating_sub(wanted.0);
         if missing != I16F16::ZERO {
             self.observer.held_back(saturating_multiply(missing, self.plan.per_lever));

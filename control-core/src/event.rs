@@ -65,7 +65,7 @@ pub enum Fault {
     Brownout = 8,
     /// The stored configuration was damaged; the default is in use.
     StoredConfig = 9,
-    /// The encoder stands still although torque should move the motor.
+    /// The encoder does not count, neither under torque nor when the torque is taken away.
     EncoderFrozen = 10,
     /// The needle speeds up against the motor as no hand makes it: the motor's leads or the encoder's channels are swapped.
     WrongWay = 11,
@@ -126,7 +126,7 @@ impl fmt::Display for Fault {
             Fault::Crash => "the program panicked or took a hard fault",
             Fault::Brownout => "the supply dipped",
             Fault::StoredConfig => "the stored configuration was damaged and the default is in use",
-            Fault::EncoderFrozen => "the encoder stands still although torque should move the motor",
+            Fault::EncoderFrozen => "the encoder does not count, whatever the torque: check its supply and its ground",
             Fault::WrongWay => {
                 "the needle sped up against the motor: the motor's leads or the encoder's channels are swapped"
             }

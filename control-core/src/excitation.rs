@@ -426,7 +426,7 @@ mod tests {
 
     #[test]
     fn what_would_leave_the_travel_or_the_torque_is_refused() {
-        let plan = Config::default().plan().unwrap();
+        let plan = Config::commissioned_virtual().plan().unwrap();
         let servo = Servo { stiffness: Stiffness(I16F16::from_num(0.1)), damping: Damping::default() };
         let travel = Millimetres(I16F16::from_num(100));
         let sound =

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Interlock {
-    /// The supply is below the level at which the core surely runs.
+    /// The supply is below the level at which the core surely runs, or no brown-out reset guards it.
     Supply = 0,
     /// The emergency stop's loop is open: pressed, or its wire is off.
     EmergencyStop = 1,
@@ -57,7 +57,9 @@ impl Interlock {
 impl fmt::Display for Interlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Supply => "the supply is too low; check the board's power",
+            Self::Supply => {
+                "the supply is too low, or no brown-out reset guards it; check the board's power, then switch it off and on"
+            }
             Self::EmergencyStop => "the emergency stop is open; release it, or fit its jumper if there is none",
             Self::AmplifierNotReady => {
                 "the amplifier is not ready; check its supply, or fit the jumper if it has no such output"

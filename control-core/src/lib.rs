@@ -37,6 +37,7 @@ mod runaway;
 pub mod safety;
 mod sine;
 mod stability;
+mod stillness;
 mod thermal;
 mod tissue;
 pub mod units;

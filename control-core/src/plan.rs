@@ -15,15 +15,13 @@ use crate::refusal::{milli, within};
 use crate::runaway;
 use crate::safety::{DacScale, TorqueLimits};
 use crate::stability;
+use crate::stillness;
 use crate::thermal::ThermalLimits;
 use crate::units::Newtons;
 use fixed::types::{I2F30, I16F16, U16F16};
 
 /// 0.0005 N·s/mm: with 30 g and the speed estimate's 6 ms of delay, more would itself ring.
 const LARGEST_DAMPING_BITS: i32 = 8_389;
-/// Torque at which an encoder without a count counts as dead: an eighth of the limit, several times the dry friction of motor
-/// and needle.
-const FROZEN_TORQUE_SHARE: u32 = 8;
 
 /// A configuration that may run.
 #[derive(Clone, Debug)]
@@ -38,7 +36,7 @@ pub struct Plan {
     pub(crate) per_lever: I16F16,
     pub(crate) torque_limits: TorqueLimits,
     /// Torque under which a motor that is not held moves.
-    pub(crate) frozen_torque: U16F16,
+    pub(crate) loaded_torque: U16F16,
     pub(crate) thermal: ThermalLimits,
     pub(crate) bounce_damping: BounceDamping,
     pub(crate) runaway: runaway::Bounds,
@@ -84,8 +82,11 @@ impl Plan {
                 slew_per_tick: config.device.limits.slew_per_tick.0,
                 fade_per_tick: I2F30::ONE / fade_ticks,
             },
-            frozen_torque: config.device.limits.torque.0.unsigned_abs() / FROZEN_TORQUE_SHARE
-                + check::at_rest(device),
+            loaded_torque: stillness::loaded_torque(
+                device.limits.torque.0,
+                device.mechanism.dry_friction.0.saturating_mul(device.roller_radius.0).unsigned_abs(),
+                check::at_rest(device),
+            ),
             thermal: ThermalLimits::new(
                 config.device.limits.continuous_torque,
                 config.device.limits.winding_time_s,

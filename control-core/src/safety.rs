@@ -121,7 +121,7 @@ mod tests {
     }
 
     fn device(dac: DacWidth, full_scale: f64) -> Device {
-        Device { dac, full_scale_torque: mnm(full_scale), ..Device::default() }
+        Device { dac, full_scale_torque: mnm(full_scale), ..Device::commissioned_virtual() }
     }
 
     #[test]

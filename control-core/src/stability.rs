@@ -51,7 +51,7 @@ mod tests {
             dry_friction: Newtons(I16F16::from_num(friction)),
             delay_us,
         };
-        stiffest(&Device { mechanism, ..Device::default() }).0.to_num()
+        stiffest(&Device { mechanism, ..Device::commissioned_virtual() }).0.to_num()
     }
 
     #[test]

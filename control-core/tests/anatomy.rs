@@ -71,7 +71,7 @@ const COUNT_MM: f64 = 0.016;
 fn the_vein_lies_at_its_depth_over_the_sine_of_the_angle() {
     for degrees in [10.0, 15.0, 22.0, 30.0, 45.0, 60.0, 75.0, 90.0_f64] {
         let (contacts, _) =
-            Needle::new(&Config::default(), degrees).met(4.8 / degrees.to_radians().sin() + 1.0);
+            Needle::new(&Config::commissioned_virtual(), degrees).met(4.8 / degrees.to_radians().sin() + 1.0);
         let vein = contacts.iter().find(|(layer, _)| *layer == 2).expect("the vein is met").1;
         let depth = vein * degrees.to_radians().sin();
         assert!((depth - 4.8).abs() < 0.05, "{degrees}°: met at {vein} mm, {depth} mm deep");
@@ -84,7 +84,7 @@ fn the_vein_lies_at_its_depth_over_the_sine_of_the_angle() {
 #[test]
 fn a_wall_that_holds_carries_the_next_one_along() {
     // The skin gives way at 3 mm; a vein 1 mm under it is met no sooner, and pushed in from there.
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.patient.layers =
         [config.patient.layers[0], Layer { depth: Millimetres(q(1.0)), ..config.patient.layers[2] }]
             .into_iter()
@@ -105,7 +105,7 @@ fn a_wall_that_holds_carries_the_next_one_along() {
 #[test]
 fn what_is_left_of_the_skins_indentation_delays_the_next_layer_until_the_relief_is_over() {
     // Given way at 3 mm, 0.3 of it left, gone at 4 mm: a layer 3.5 mm deep is met where x = 3.5 + 0.9·(4 − x).
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.patient.layers[1].depth = Millimetres(q(3.5));
     let (contacts, _) = Needle::new(&config, 90.0).met(6.0);
     assert!(contacts[1].0 == 1 && (contacts[1].1 - 7.1 / 1.9).abs() < COUNT_MM, "{contacts:?}");
@@ -119,7 +119,7 @@ fn what_is_left_of_the_skins_indentation_delays_the_next_layer_until_the_relief_
 #[test]
 fn where_a_wall_is_met_does_not_depend_on_when_a_tick_falls() {
     for depth in [1.0, 2.5, 3.2, 3.9, 3.96, 3.99, 4.05] {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.patient.layers =
             [config.patient.layers[0], Layer { depth: Millimetres(q(depth)), ..config.patient.layers[2] }]
                 .into_iter()
@@ -161,7 +161,7 @@ fn through(needle: &mut Needle, mm: f64) -> (Vec<VesselState>, usize) {
 #[test]
 fn a_vessel_is_touched_entered_and_left_through_its_far_wall_and_blood_shows_from_either_side() {
     use VesselState::{InLumen, Outside, Through, Touching};
-    let mut needle = Needle::new(&Config::default(), 30.0);
+    let mut needle = Needle::new(&Config::commissioned_virtual(), 30.0);
     assert_eq!(through(&mut needle, 13.0), (vec![Outside, Touching, InLumen], 1));
     // The far wall lies at 15.6 mm and gives way 1.5 mm further in.
     assert_eq!(through(&mut needle, 16.5), (vec![InLumen], 0), "it is pushed in and holds");
@@ -173,7 +173,7 @@ fn a_vessel_is_touched_entered_and_left_through_its_far_wall_and_blood_shows_fro
 #[test]
 fn a_needle_off_the_axis_meets_less_of_the_vessel_and_far_off_none_of_it() {
     let beside = |offset: f64| {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.patient.vessel = Some(Vessel { width: Millimetres(q(4.0)), offset: Millimetres(q(offset)) });
         config
     };
@@ -197,7 +197,7 @@ fn a_needle_off_the_axis_meets_less_of_the_vessel_and_far_off_none_of_it() {
 #[test]
 fn a_tilt_that_trembles_makes_no_layer_come_and_go() {
     for degrees in [15.0, 30.0, 60.0_f64] {
-        let mut needle = Needle::new(&Config::default(), degrees);
+        let mut needle = Needle::new(&Config::commissioned_virtual(), degrees);
         let mut noise = 1_u32;
         let tilt = needle.tilt;
         // Just inside the vein, for three seconds, with 3 mrad of white noise at each tick.
@@ -215,7 +215,7 @@ fn a_tilt_that_trembles_makes_no_layer_come_and_go() {
 
 #[test]
 fn a_needle_that_is_flattened_leaves_the_layers_it_no_longer_reaches() {
-    let mut needle = Needle::new(&Config::default(), 30.0);
+    let mut needle = Needle::new(&Config::commissioned_virtual(), 30.0);
     needle.go(12.0, |_| ());
     assert_eq!(needle.tick().vessel, VesselState::InLumen);
     // At 15° the vein lies at 18.5 mm.
@@ -233,7 +233,7 @@ fn a_needle_that_is_flattened_leaves_the_layers_it_no_longer_reaches() {
 
 #[test]
 fn the_skins_own_slope_is_no_part_of_the_angle() {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.skin_tilt = Milliradians(-300);
     let (contacts, _) = Needle::new(&config, 30.0 - 0.3_f64.to_degrees()).met(11.0);
     assert!((contacts[2].1 - 9.6).abs() < 0.05, "{contacts:?}");
@@ -249,7 +249,7 @@ proptest! {
         gaps in prop::collection::vec(0.05..3.0_f64, 3),
         spring_back in 0.0..1.0_f64,
     ) {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         let mut depth = 0.0;
         for (layer, gap) in config.patient.layers.iter_mut().skip(1).zip(gaps) {
             depth += gap;

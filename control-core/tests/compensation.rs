@@ -41,7 +41,7 @@ fn found() -> Compensation {
 }
 
 fn plan(compensation: Compensation) -> Result<Plan, Refusal> {
-    Plan::new(&Device { compensation, ..Device::default() }, &Patient::nobody())
+    Plan::new(&Device { compensation, ..Device::commissioned_virtual() }, &Patient::nobody())
 }
 
 fn running(compensation: Compensation) -> Controller {
@@ -182,7 +182,7 @@ fn device() -> impl Strategy<Value = Device> {
                 },
                 ..Compensation::NONE
             };
-            let mut device = Device { compensation, ..Device::default() };
+            let mut device = Device { compensation, ..Device::commissioned_virtual() };
             device.limits.stiffness = Stiffness(q(stiffness));
             // A tilt that jumps is no matter here.
             device.limits.slew_per_tick = MillinewtonMetres(q(50.0));
@@ -353,7 +353,7 @@ fn a_count_to_and_fro_is_rest() {
 }
 
 fn refused(change: impl FnOnce(&mut Device)) -> Option<Refusal> {
-    let mut device = Device { compensation: found(), ..Device::default() };
+    let mut device = Device { compensation: found(), ..Device::commissioned_virtual() };
     device.compensation.gains = gains(0.5);
     change(&mut device);
     Plan::new(&device, &Patient::nobody()).err()

@@ -122,7 +122,7 @@ fn played(signal: Signal) -> Excitation {
 }
 
 fn refused(excitation: &Excitation) -> Option<Field> {
-    match excitation.check(&Config::default().plan().expect("sound")) {
+    match excitation.check(&Config::commissioned_virtual().plan().expect("sound")) {
         Ok(()) => None,
         Err(Refusal::OutOfRange { field, .. }) => Some(field),
         Err(other) => panic!("{other:?}"),
@@ -183,7 +183,7 @@ fn the_last_step_of_a_series_is_what_has_to_fit() {
 #[test]
 fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
     let servo = Servo { stiffness: Stiffness(q(0.2)), damping: Damping(I8F24::from_num(0.002)) };
-    let plan = Config::default().plan().expect("sound");
+    let plan = Config::commissioned_virtual().plan().expect("sound");
     let mnm_per_step = 28.8 / 2047.0;
     let mm_per_count = plan.mm_per_count().to_num::<f64>();
     let zero = f64::from(plan.zero_torque_code().0);

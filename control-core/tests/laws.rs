@@ -56,7 +56,7 @@ fn tick_at(c: &mut Controller, count: i32) -> TickOutput {
 
 #[test]
 fn the_default_is_a_venepuncture_with_two_punctures() {
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let (mut at, mut punctures, mut peak) = (0.0, Vec::new(), 0.0_f64);
     travel(&mut c, &mut at, 7.7, 10.0, |out| {
         if out.transitions.puncture != 0 {
@@ -71,7 +71,7 @@ fn the_default_is_a_venepuncture_with_two_punctures() {
 
 #[test]
 fn a_wall_is_pressed_then_gives_way_then_rubs() {
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let (mut at, mut states) = (0.0, Vec::new());
     travel(&mut c, &mut at, 7.7, 10.0, |out| states.push(out.sample.state));
     states.dedup();
@@ -85,8 +85,8 @@ fn a_wall_is_pressed_then_gives_way_then_rubs() {
 fn a_needle_drawn_back_slowly_is_not_withdrawn_yet() {
     // From edges, for one count in a window is faster already.
     let mut c = started(&Config {
-        device: Device { speed: SpeedMethod::EdgeTiming, ..Device::default() },
-        ..Config::default()
+        device: Device { speed: SpeedMethod::EdgeTiming, ..Device::commissioned_virtual() },
+        ..Config::commissioned_virtual()
     });
     let mut at = 0.0;
     travel(&mut c, &mut at, 7.7, 10.0, |_| ());
@@ -108,7 +108,8 @@ fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
         friction: FrictionPerMillimetre(I16F16::from_num(friction)),
     };
     let layers = [layer(0, 0.0), layer(2, 1.5)].into_iter().collect();
-    let mut config = Config { patient: Patient { layers, ..Patient::default() }, ..Config::default() };
+    let mut config =
+        Config { patient: Patient { layers, ..Patient::default() }, ..Config::commissioned_virtual() };
     config.device.limits.travel = Millimetres(I16F16::from_num(3));
     let mut c = started(&config);
     let mut at = 0.0;
@@ -124,7 +125,7 @@ fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
     for (law, held) in [(cone(), true), (paper(), false)] {
         let mut c = started(&Config {
             patient: Patient { law: Law::Jog(law), ..Patient::default() },
-            ..Config::default()
+            ..Config::commissioned_virtual()
         });
         let mut at = 0.0;
         let mut moving = 0.0;
@@ -145,7 +146,10 @@ fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
 #[test]
 fn one_count_to_and_fro_is_no_withdrawal() {
     for speed in [SpeedMethod::Window, SpeedMethod::EdgeTiming] {
-        let mut c = started(&Config { device: Device { speed, ..Device::default() }, ..Config::default() });
+        let mut c = started(&Config {
+            device: Device { speed, ..Device::commissioned_virtual() },
+            ..Config::commissioned_virtual()
+        });
         let mut at = 0.0;
         travel(&mut c, &mut at, 7.7, 10.0, |_| ());
         hold(&mut c, at, 0.1);
@@ -180,7 +184,7 @@ fn sticking() -> Config {
         sliding: I16F16::from_num(0.5),
     });
     let layers = [layer(0, 0.02), layer(10, 0.0)].into_iter().collect();
-    Config { patient: Patient { law, layers, ..Patient::default() }, ..Config::default() }
+    Config { patient: Patient { law, layers, ..Patient::default() }, ..Config::commissioned_virtual() }
 }
 
 #[test]
@@ -242,7 +246,7 @@ fn friction_opposes_withdrawal() {
     for law in [cone(), paper()] {
         let mut c = started(&Config {
             patient: Patient { law: Law::Jog(law), ..Patient::default() },
-            ..Config::default()
+            ..Config::commissioned_virtual()
         });
         let (mut at, mut inwards, mut outwards) = (0.0, 0.0, 0.0);
         travel(&mut c, &mut at, 5.0, 10.0, |o| inwards = o.force.0.to_num::<f64>());
@@ -258,7 +262,7 @@ fn friction_opposes_withdrawal() {
 
 #[test]
 fn a_wall_stays_open_until_the_tip_has_left_it() {
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let (mut at, mut punctures, mut exits) = (0.0, 0, 0);
     let mut see = |o: &TickOutput| {
         punctures += u32::from(o.transitions.puncture & 1);
@@ -273,7 +277,7 @@ fn a_wall_stays_open_until_the_tip_has_left_it() {
 #[test]
 fn every_fault_takes_torque_away_within_the_tick_and_latches() {
     let pressed = || {
-        let mut c = started(&Config::default());
+        let mut c = started(&Config::commissioned_virtual());
         let mut at = 0.0;
         travel(&mut c, &mut at, 2.5, 10.0, |_| {});
         c
@@ -300,12 +304,12 @@ fn every_fault_takes_torque_away_within_the_tick_and_latches() {
 
 #[test]
 fn orders_that_do_not_fit_the_mode_change_nothing() {
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let mut at = 0.0;
     travel(&mut c, &mut at, 2.5, 10.0, |_| {});
     let before = hold(&mut c, at, 0.1);
     c.order(Order::Zero);
-    c.order(Order::Configure(Config::default().plan().expect("sound")));
+    c.order(Order::Configure(Config::commissioned_virtual().plan().expect("sound")));
     c.order(Order::Start);
     let after = hold(&mut c, at, 0.000_1);
     assert_eq!((before.sample, before.force), (after.sample, after.force));
@@ -323,7 +327,7 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
         travel: Millimetres(I16F16::from_num(20)),
         compensated: false,
     };
-    let mut c = Controller::new(Config::default().plan().expect("sound"));
+    let mut c = Controller::new(Config::commissioned_virtual().plan().expect("sound"));
     c.tick(TickInput { tilt: STRAIGHT, ..TickInput::default() });
     c.order(Order::Excite(excitation.clone()));
     let outputs = (0..11_000).map(|_| tick_at(&mut c, 0)).collect::<Vec<_>>();
@@ -341,16 +345,25 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
 
 #[test]
 fn an_encoder_without_a_count_under_torque_is_dead_and_a_resting_needle_is_not() {
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let mut at = 0.0;
     travel(&mut c, &mut at, 2.5, 10.0, |_| {});
     let count = (at / c.plan().mm_per_count().to_num::<f64>()).round() as i32;
-    let trips =
-        (0..50_000).filter_map(|t| tick_at(&mut c, count).tripped.map(|f| (t, f))).collect::<Vec<_>>();
-    assert!(matches!(trips[..], [(39_990..=40_010, Fault::EncoderFrozen)]), "{trips:?}");
+    let dead = |c: &mut Controller| {
+        (0..50_000).filter_map(|t| tick_at(c, count).tripped.map(|f| (t, f))).collect::<Vec<_>>()
+    };
+    // Torque is taken away after 4 s, and where that brings no count the encoder is dead.
+    let trips = dead(&mut c);
+    assert!(matches!(trips[..], [(40_490..=40_520, Fault::EncoderFrozen)]), "{trips:?}");
+    // Lines at one level may be without power: 50 ms are long then.
+    c.order(Order::Start);
+    c.set_lines_agree(true);
+    let trips = dead(&mut c);
+    // The fade-in comes first.
+    assert!(matches!(trips[..], [(2_000..=4_100, Fault::EncoderFrozen)]), "{trips:?}");
 
     // Let go in tissue, where friction holds a fraction of a newton, the needle rests as long as it likes.
-    let mut c = started(&Config::default());
+    let mut c = started(&Config::commissioned_virtual());
     let mut at = 0.0;
     travel(&mut c, &mut at, 4.5, 10.0, |_| {});
     assert_eq!(hold(&mut c, at, 9.0).tripped, None);
@@ -378,7 +391,7 @@ fn six_walls() -> Config {
     };
     let mut config = Config {
         patient: Patient { layers: (0..6).map(layer).collect(), ..Patient::default() },
-        ..Config::default()
+        ..Config::commissioned_virtual()
     };
     config.device.limits.max_counts_per_tick = 1_000;
     config

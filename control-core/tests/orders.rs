@@ -11,7 +11,7 @@ use fixed::types::{I8F24, I16F16};
 const STRAIGHT: Milliradians = Milliradians(1_571);
 
 fn controller() -> Controller {
-    Controller::new(Config::default().plan().expect("the default is sound"))
+    Controller::new(Config::commissioned_virtual().plan().expect("the default is sound"))
 }
 
 fn tick(c: &mut Controller, count: i32) -> TickOutput {
@@ -33,7 +33,7 @@ fn tremor(tick: i32) -> i32 {
 }
 
 fn other_plan() -> Plan {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.dac = DacWidth::Bits8;
     config.plan().expect("sound")
 }
@@ -50,6 +50,29 @@ fn ramps(travel_mm: i32) -> Excitation {
 
 fn state(output: &TickOutput) -> Option<State> {
     State::from_code(output.sample.state)
+}
+
+/// The control law holds to it by itself, whatever the link lets through.
+#[test]
+fn an_uncommissioned_device_plays_only_gentle_excitations() {
+    let unknown = Config::default();
+    let mut c = Controller::new(unknown.plan().expect("the default is sound"));
+    c.order(Order::Start);
+    assert!(!tick(&mut c, 0).enable, "no start");
+    let mut strong = ramps(50);
+    strong.signal = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(2.1)), ramp_ms: 100 };
+    let mut servo = ramps(50);
+    servo.servo.stiffness.0 = I16F16::from_num(0.1);
+    for refused in [strong, servo] {
+        c.order(Order::Excite(refused));
+        assert!(!tick(&mut c, 0).enable, "no excitation that is not gentle");
+    }
+    c.order(Order::Excite(ramps(50)));
+    assert!(tick(&mut c, 0).enable, "1 mN·m without a servo");
+    c.order(Order::Stop);
+    c.order(Order::Configure(Config::commissioned_virtual().plan().expect("sound")));
+    c.order(Order::Start);
+    assert!(tick(&mut c, 0).enable, "a commissioned one starts");
 }
 
 #[test]
@@ -132,7 +155,7 @@ fn an_excitation_begins_where_the_motor_is_and_only_while_torque_is_off() {
 
 #[test]
 fn an_encoder_may_move_as_far_in_a_tick_as_the_limit_and_no_further() {
-    let most = i32::from(Config::default().device.limits.max_counts_per_tick);
+    let most = i32::from(Config::commissioned_virtual().device.limits.max_counts_per_tick);
     for direction in [-1, 1] {
         assert_eq!(tick(&mut started_at(0), direction * most).tripped, None);
         let further = tick(&mut started_at(0), direction * (most + 1)).tripped;
@@ -156,7 +179,7 @@ fn a_needle_may_go_to_the_end_of_its_travel_and_no_further() {
 
 #[test]
 fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
-    let silence = i32::from(Config::default().device.limits.heartbeat_ms) * 10;
+    let silence = i32::from(Config::commissioned_virtual().device.limits.heartbeat_ms) * 10;
     let mut c = started_at(0);
     c.order(Order::Heartbeat);
     for silent in 1..=silence {
@@ -172,7 +195,7 @@ fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
 
 #[test]
 fn the_torque_limit_is_told_when_it_holds_torque_down() {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     // 1.005 N; the wall alone asks for 1.0 N, and damping at 50 mm/s for 0.025 N.
     config.device.limits.torque = MillinewtonMetres(I16F16::from_num(10.05));
     config.device.limits.travel = Millimetres(I16F16::from_num(40));
@@ -197,7 +220,7 @@ fn the_torque_limit_is_told_when_it_holds_torque_down() {
 #[test]
 fn torque_is_given_as_far_as_it_has_faded_in() {
     let mut c = started_at(0);
-    let fade_ticks = i32::from(Config::default().device.limits.fade_in_ms) * 10;
+    let fade_ticks = i32::from(Config::commissioned_virtual().device.limits.fade_in_ms) * 10;
     for at in 1..=2 * fade_ticks {
         c.order(Order::Heartbeat);
         let in_force = tick(&mut c, -3 - tremor(at)).limits.contains(Limits::FADE_IN);

@@ -39,7 +39,7 @@ fn tissue(layers: &[Layer], hold: f64) -> Config {
     let friction = FrictionLaw::Cone { stiffness: Stiffness(q(hold)) };
     let layers = layers.iter().copied().collect();
     let patient = Patient { law: Law::Jog(friction), layers, ..Patient::default() };
-    let mut config = Config { patient, ..Config::default() };
+    let mut config = Config { patient, ..Config::commissioned_virtual() };
     config.device.limits.stiffness = Stiffness(q(7.0));
     // What rings is faster than a hand: the protection against that is not the one that is looked at here.
     config.device.limits.max_counts_per_tick = 200;

@@ -17,7 +17,7 @@ fn q(value: f64) -> I16F16 {
 }
 
 fn refusal(change: impl FnOnce(&mut Config)) -> Option<Refusal> {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     change(&mut config);
     config.plan().err()
 }
@@ -405,7 +405,7 @@ fn no_patient_raises_the_devices_ceiling_and_one_may_ask_for_less() {
     assert!(matches!(refused, Some(Refusal::AboveCeiling { .. })), "{refused:?}");
     // The default tissue asks for up to 1.2 N at the end of the travel: what a patient may not ask for is told.
     assert!(matches!(wants(0.9), Some(Refusal::TooStrong { layer: 0, .. })));
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.patient.largest_force = Some(Newtons(q(2.0)));
     assert_eq!(config.plan().expect("sound").largest_force().0, q(2.0));
 }
@@ -413,7 +413,7 @@ fn no_patient_raises_the_devices_ceiling_and_one_may_ask_for_less() {
 #[test]
 fn any_device_that_may_be_bears_nobody() {
     let nobody = Patient::nobody();
-    let mut device = control_core::Device::default();
+    let mut device = control_core::Device::commissioned_virtual();
     assert!(Plan::new(&device, &nobody).is_ok());
     device.roller_radius.0 = q(25.0);
     device.limits.torque.0 = q(0.1);
@@ -427,7 +427,7 @@ fn any_device_that_may_be_bears_nobody() {
 /// What a plan says of itself.
 #[test]
 fn a_plan_knows_its_force_its_layers_and_its_torque_of_a_dead_encoder() {
-    let plan = Config::default().plan().expect("sound");
+    let plan = Config::commissioned_virtual().plan().expect("sound");
     assert_eq!(plan.largest_force().0, q(28.8).saturating_div(q(10.0)));
     assert_eq!(plan.tissue(0), Some(Tissue::Skin));
     assert_eq!((plan.tissue(2), plan.tissue(4)), (Some(Tissue::Vessel), None));

@@ -51,7 +51,7 @@ fn layer(tissue: Tissue, depth: f64, wall: Option<Wall>) -> Layer {
 /// A shoulder: the cutting forces of the paper's section IV, at a scale that the motor bears.
 fn shoulder() -> Config {
     use Tissue::{Bursa, Cartilage, Fat, Muscle, Skin, Tendon};
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.speed = SpeedMethod::EdgeTiming;
     config.patient.layers = [
         layer(Skin, 0.0, wall(1.2, 3.0)),

@@ -42,7 +42,8 @@ fn wall(slope: f64, mechanism: Mechanism) -> Config {
     };
     let law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) });
     let patient = Patient { law, layers: [layer].into_iter().collect(), ..Patient::default() };
-    let mut device = Device { mechanism, passivity_damping: Damping::default(), ..Device::default() };
+    let mut device =
+        Device { mechanism, passivity_damping: Damping::default(), ..Device::commissioned_virtual() };
     device.limits.stiffness = Stiffness(q(1.1 * slope));
     device.limits.max_counts_per_tick = 200;
     Config { device, patient }

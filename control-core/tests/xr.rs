@@ -44,7 +44,7 @@ fn table(force: impl Fn(f64, f64, f64) -> f64) -> ForceTable {
 }
 
 fn config(table: ForceTable) -> Config {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.speed = SpeedMethod::EdgeTiming;
     config.patient.law = Law::Xr(table);
     config

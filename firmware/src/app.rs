@@ -83,7 +83,7 @@ mod app {
     }
 
     /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses it takes torque away
-    /// and says so. Above every other task; no critical section masks it; never logs, never waits.
+    /// and says so. Above every other task, masked by PRIMASK only; never logs, never waits.
     #[task(binds = TIM4, priority = 16, local = [tick])]
     fn tick(context: tick::Context) {
         context.local.tick.run();

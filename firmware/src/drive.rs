@@ -74,7 +74,7 @@ impl<D12: MotorDac, D8: MotorDac, E: OutputPin> Drive<D12, D8, E> {
         }
     }
 
-    /// Puts a code out of the twelve-bit converter while the amplifier stays off, for the board's own test.
+    /// Puts a code out at the 12-bit converter while the amplifier stays off: for the test of the board, which looks at the pin.
     pub fn put_while_off(&mut self, code: DacCode) {
         self.off();
         self.twelve.put(code);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     fn output(enable: bool, dac: u16) -> TickOutput {
-        let plan = Config::default().plan().unwrap();
+        let plan = Config::commissioned_virtual().plan().unwrap();
         let mut controller = Controller::new(plan);
         let mut output = controller.tick(TickInput::default());
         output.enable = enable;
@@ -190,6 +190,17 @@ mod tests {
     }
 
     #[test]
+    fn a_code_for_the_test_of_the_board_goes_out_with_the_amplifier_off() {
+        let writes = RefCell::new(vec![]);
+        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
+        writes.take();
+        drive.put_while_off(DacCode(4095));
+        let writes = writes.take();
+        assert_eq!(writes.last(), Some(&Write::Twelve(4095)));
+        assert!(writes.contains(&Write::Enable(false)) && !writes.contains(&Write::Enable(true)));
+    }
+
+    #[test]
     fn a_code_too_wide_for_eight_lines_is_clamped() {
         let writes = RefCell::new(vec![]);
         ParallelDac(Bus(&writes)).put(DacCode(256));
@@ -201,7 +212,7 @@ mod tests {
     fn a_controller_switches_the_drive() {
         let writes = RefCell::new(vec![]);
         let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
-        let mut controller = Controller::new(Config::default().plan().unwrap());
+        let mut controller = Controller::new(Config::commissioned_virtual().plan().unwrap());
         let mut tick = |controller: &mut Controller| {
             drive.apply(DacWidth::Bits12, &controller.tick(TickInput::default()));
             drive.is_enabled()

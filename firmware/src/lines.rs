@@ -1,5 +1,5 @@
 //! Whether a wire is there: a line that somebody drives stays where it is whichever way it is pulled, one without a wire
-//! goes along.
+//! goes along. And whether the encoder has power.
 
 /// Which way the inputs are pulled, by some 40 kΩ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +9,12 @@ pub enum Pull {
     Down,
 }
 
-/// Up to eight inputs that are pulled together.
+/// The encoder's lines, up to eight inputs that are pulled together, and its supply.
 pub trait PulledLines {
+    /// All of them, a bit each.
+    const ALL: u8;
+    /// Whether the encoder's supply is there, as far as it is wired to be sensed: without that wire it is not.
+    fn has_supply(&self) -> bool;
     /// Those that are high, a bit each.
     fn high(&mut self) -> u8;
     /// Pulls all of them.
@@ -22,40 +26,72 @@ pub trait PulledLines {
 /// Looks that must agree: an edge of a line that is driven may fall between two readings of one look, but hardly in two.
 const LOOKS: u8 = 2;
 
+/// Looks in a row for which the supply must have been there before its absence means anything: 0.1 s.
+const SUPPLY_LOOKS: u8 = 100;
+
+/// What a look finds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wires {
+    /// A wire is off, or the encoder has lost its supply.
+    pub off: bool,
+    /// All lines are at one level. Where they are not, one is held high and another low, both against their pulls, and the
+    /// encoder has power.
+    pub agree: bool,
+}
+
 /// Looks for wires that are off, every millisecond.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WireWatch {
     looks: u8,
+    /// Looks in a row in which the supply was there; once they are enough, it is sensed.
+    supplied: u8,
+    unsupplied: u8,
 }
 
 impl WireWatch {
     /// Nothing seen.
     pub const fn new() -> Self {
-        Self { looks: 0 }
+        Self { looks: 0, supplied: 0, unsupplied: 0 }
     }
 
-    /// Whether a wire of `lines`, which have been pulled up since the look before, is off.
-    pub fn look(&mut self, lines: &mut impl PulledLines) -> bool {
-        self.looks = if floating(lines) == 0 { 0 } else { (self.looks + 1).min(LOOKS) };
-        self.looks == LOOKS
+    /// A look at `lines`, which have been pulled up since the look before.
+    pub fn look<L: PulledLines>(&mut self, lines: &mut L) -> Wires {
+        let (driven_high, floating) = pulled(lines);
+        self.looks = if floating == 0 { 0 } else { (self.looks + 1).min(LOOKS) };
+        let off = self.looks == LOOKS || self.has_lost_supply(lines.has_supply());
+        Wires { off, agree: driven_high == 0 || driven_high == L::ALL }
+    }
+
+    /// Whether a supply that has been there is gone. It may come back.
+    fn has_lost_supply(&mut self, has_supply: bool) -> bool {
+        let is_sensed = self.supplied == SUPPLY_LOOKS;
+        if has_supply {
+            (self.supplied, self.unsupplied) = ((self.supplied + 1).min(SUPPLY_LOOKS), 0);
+        } else if is_sensed {
+            self.unsupplied = (self.unsupplied + 1).min(LOOKS);
+        } else {
+            self.supplied = 0;
+        }
+        is_sensed && self.unsupplied == LOOKS
     }
 }
 
-/// The lines that go up, down and up again as they are pulled. Leaves them pulled up.
-fn floating(lines: &mut impl PulledLines) -> u8 {
+/// The lines that are high against a pull down, and those that go up, down and up again as they are pulled. Leaves them pulled up.
+fn pulled(lines: &mut impl PulledLines) -> (u8, u8) {
     let high = lines.high();
     if high == 0 {
-        return 0;
+        return (0, 0);
     }
     lines.pull(Pull::Down);
     lines.settle();
-    let fell = high & !lines.high();
+    let driven_high = high & lines.high();
+    let fell = high & !driven_high;
     lines.pull(Pull::Up);
     if fell == 0 {
-        return 0;
+        return (driven_high, 0);
     }
     lines.settle();
-    fell & lines.high()
+    (driven_high, fell & lines.high())
 }
 
 #[cfg(test)]
@@ -71,9 +107,16 @@ mod tests {
         pull: Pull,
         readings: usize,
         settled: bool,
+        has_supply: bool,
     }
 
     impl PulledLines for Two {
+        const ALL: u8 = 0b11;
+
+        fn has_supply(&self) -> bool {
+            self.has_supply
+        }
+
         fn high(&mut self) -> u8 {
             assert!(self.settled, "read before the pull has acted");
             self.readings += 1;
@@ -91,12 +134,12 @@ mod tests {
     }
 
     fn trips(driven: [Driver; 2], looks: usize) -> Option<usize> {
-        let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true };
+        let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
         let mut watch = WireWatch::new();
         (1..=looks).find(|_| {
             // A millisecond passes.
             lines.settled = true;
-            watch.look(&mut lines)
+            watch.look(&mut lines).off
         })
     }
 
@@ -117,9 +160,35 @@ mod tests {
     #[test]
     fn a_wire_that_comes_back_is_there_again() {
         let mut watch = WireWatch::new();
-        let mut lines = Two { driven: [None, None], pull: Pull::Up, readings: 0, settled: true };
-        assert!(!watch.look(&mut lines) && watch.look(&mut lines) && watch.look(&mut lines));
+        let mut lines =
+            Two { driven: [None, None], pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+        assert_eq!([0; 3].map(|_| watch.look(&mut lines).off), [false, true, true]);
         lines.driven = [Some(|_| true), Some(|_| true)];
-        assert!(!watch.look(&mut lines));
+        assert!(!watch.look(&mut lines).off);
+    }
+
+    #[test]
+    fn lines_agree_where_no_two_are_held_apart() {
+        let agree = |driven: [Driver; 2]| {
+            let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+            WireWatch::new().look(&mut lines).agree
+        };
+        assert!(agree([Some(|_| true), Some(|_| true)]) && agree([Some(|_| false), Some(|_| false)]));
+        assert!(!agree([Some(|_| true), Some(|_| false)]) && !agree([Some(|_| false), Some(|_| true)]));
+        assert!(agree([None, Some(|_| false)]), "a pull is no encoder");
+    }
+
+    #[test]
+    fn a_supply_that_was_there_is_missed_in_two_looks() {
+        let mut watch = WireWatch::new();
+        let driven: [Driver; 2] = [Some(|_| false), Some(|_| false)];
+        let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+        assert!((0..1_000).all(|_| !watch.look(&mut lines).off), "without its wire it is not sensed");
+        lines.has_supply = true;
+        assert!((0..100).all(|_| !watch.look(&mut lines).off));
+        lines.has_supply = false;
+        assert_eq!([0; 3].map(|_| watch.look(&mut lines).off), [false, true, true]);
+        lines.has_supply = true;
+        assert!(!watch.look(&mut lines).off);
     }
 }

@@ -72,7 +72,7 @@ pub trait ReadDrive {
 
 /// The supply's detector.
 pub trait SupplyLevel {
-    /// Whether the supply is below the level at which the core surely runs.
+    /// Whether the supply is below the level at which the core surely runs, or nothing would end a core that it no longer carries.
     fn is_low(&self) -> bool;
 }
 

@@ -165,6 +165,11 @@ impl<F: ConfigFlash> Store<F> {
         (store, device, patient)
     }
 
+    /// Gives the flash back, for the test of the board.
+    pub fn close(self) -> F {
+        self.flash
+    }
+
     /// Saves the device's part unless it is what was saved last. Takes as long as the flash takes for its words; where no cell
     /// is left, as long as an erasure.
     pub fn save_device(&mut self, device: &Device) -> Result<(), StoreError> {

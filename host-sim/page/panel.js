@@ -144,8 +144,9 @@ export class Panel {
   }
 
   timing(timing) {
-    const late = timing.missed_ticks ? `, ${whole.format(timing.missed_ticks)} late` : "";
-    write(byId("tick"), `${timing.longest_tick_us.toFixed(1)} µs${late}`);
+    const ticks = timing.missed_ticks ? `, ${whole.format(timing.missed_ticks)} late` : "";
+    const codes = timing.late_codes ? `, ${whole.format(timing.late_codes)} past the converter's instant` : "";
+    write(byId("tick"), `${timing.longest_tick_us.toFixed(1)} µs${ticks}${codes}`);
   }
 
   /** One sentence across the page, or nothing. */

@@ -52,12 +52,12 @@ mod tests {
     fn a_share_is_of_what_the_device_has_stored_and_never_more() {
         let mut gains = LiveGains::default();
         assert_eq!((gains.share(), gains.at(0.5)), (None, None), "nothing is known");
-        gains.learn(&Device::default());
+        gains.learn(&Device::commissioned_virtual());
         assert_eq!(gains.at(0.5), None, "nothing to compensate");
         let stored = Gains { angle: Gain(235), friction: Gain(205), weight: Gain(0), drive: Gain(1) };
         let weight = MillinewtonMetres(fixed::types::I16F16::ONE);
         let compensation = Compensation { weight, gains: stored, ..Compensation::NONE };
-        gains.learn(&Device { compensation, ..Device::default() });
+        gains.learn(&Device { compensation, ..Device::commissioned_virtual() });
         assert_eq!(gains.share(), Some(1.0));
         let half = Gains { angle: Gain(118), friction: Gain(103), weight: Gain(0), drive: Gain(1) };
         assert_eq!((gains.at(0.5), gains.share()), (Some(half), Some(0.5)));

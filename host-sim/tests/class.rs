@@ -160,7 +160,8 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let mute = TcpListener::bind("127.0.0.1:0").expect("a port");
     let nowhere = Meeting { address: mute.local_addr().expect("bound"), ..meeting("mute", None) };
     let (session, publisher) = paced::open();
-    let _membership = class::join(session, Device::default(), &nowhere, &"a".parse().expect("a name"));
+    let _membership =
+        class::join(session, Device::commissioned_virtual(), &nowhere, &"a".parse().expect("a name"));
     let run = paced::run(publisher, paced::End::After(3), true);
     check("a mute server", &run);
 
@@ -172,7 +173,8 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let mut lines = BufReader::new(instructor.stdout.take().expect("piped")).lines();
     assert!(lines.any(|line| line.is_ok_and(|line| line.starts_with("class page at"))));
     let (session, publisher) = paced::open();
-    let membership = class::join(session, Device::default(), &stalled, &"a".parse().expect("a name"));
+    let membership =
+        class::join(session, Device::commissioned_virtual(), &stalled, &"a".parse().expect("a name"));
     let pid = rustix::process::Pid::from_child(&instructor);
     let stop = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(2));

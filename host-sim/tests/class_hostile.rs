@@ -70,7 +70,7 @@ fn send_noise(at: SocketAddr, stop: &AtomicBool) -> u64 {
 
 /// A Zenoh program of somebody else's.
 fn stranger(meeting: &Meeting) -> Session {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     let endpoints = format!("[\"tcp/{}\"]", meeting.address);
     for (key, value) in [
         ("mode", "\"client\""),
@@ -151,8 +151,9 @@ fn neither_the_page_nor_a_device_notices_hostile_programs() {
     let meeting = Meeting { class: "besieged".parse().expect("a name"), address: free, token: None };
     let (mut child, page) = instructor(&meeting);
     let (session, publisher) = paced::open();
-    let membership = class::join(session, Device::default(), &meeting, &"bed-1".parse().expect("a name"))
-        .expect("it joins");
+    let membership =
+        class::join(session, Device::commissioned_virtual(), &meeting, &"bed-1".parse().expect("a name"))
+            .expect("it joins");
 
     let silent: Vec<TcpStream> = (0..SILENT).filter_map(|_| TcpStream::connect(free).ok()).collect();
     assert_eq!(silent.len(), SILENT);

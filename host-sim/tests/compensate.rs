@@ -110,7 +110,8 @@ fn a_report_of_nothing_that_helps_leaves_the_device_as_it_was() {
 
 #[test]
 fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
-    let found = coefficients::found(&rig("hidden-found.toml"), &Device::default(), 1.0).expect("sound");
+    let found =
+        coefficients::found(&rig("hidden-found.toml"), &Device::commissioned_virtual(), 1.0).expect("sound");
     let near = |got: I16F16, wanted: f64| {
         let got = got.to_num::<f64>();
         assert!((got / wanted - 1.0).abs() < 0.02, "{got} for {wanted}");
@@ -123,7 +124,8 @@ fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
     near(found.compensation.angle[1].amplitude, 0.5);
     assert_eq!((found.compensation.angle[0].order, found.compensation.angle[1].order), (14, 7));
     // 0.4 in 256ths: gains are shares of what is usual.
-    let half = coefficients::found(&rig("hidden-found.toml"), &Device::default(), 0.5).expect("sound");
+    let half =
+        coefficients::found(&rig("hidden-found.toml"), &Device::commissioned_virtual(), 0.5).expect("sound");
     assert_eq!(half.compensation.gains.friction, Gain(102));
 }
 

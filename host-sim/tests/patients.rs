@@ -56,7 +56,7 @@ fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscri
 #[test]
 fn another_patient_is_taken_whole_and_the_run_goes_on_with_it() {
     let file = folder("patient-taken").join("a.mcap");
-    let mut looker = run(&Device::default(), PatientWish::Named("firm-skin".into()), 7, &file);
+    let mut looker = run(&Device::commissioned_virtual(), PatientWish::Named("firm-skin".into()), 7, &file);
     let batch = looker.drain();
     assert_eq!(batch.scene.expect("another tissue").profile, "firm-skin");
     let patient = batch.patient.expect("an answer");
@@ -80,7 +80,7 @@ fn another_patient_is_taken_whole_and_the_run_goes_on_with_it() {
 fn a_refused_patient_changes_nothing_and_gives_its_reason() {
     let file = folder("patient-refused").join("a.mcap");
     // A motor that gives 1.7 N at the roller: enough for an adult, not for firm skin.
-    let mut weak = Device::default();
+    let mut weak = Device::commissioned_virtual();
     weak.limits.torque = MillinewtonMetres(17_i16.into());
     let mut looker = run(&weak, PatientWish::Named("firm-skin".into()), 7, &file);
     let batch = looker.drain();

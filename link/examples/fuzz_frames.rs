@@ -16,7 +16,7 @@ fn main() {
     let seed = argument("--seed").unwrap_or(1);
     let mut random = fastrand::Rng::with_seed(seed);
     let end = Instant::now() + Duration::from_secs(seconds);
-    let plan = Config::default().plan().expect("the default is sound");
+    let plan = Config::commissioned_virtual().plan().expect("the default is sound");
     let mut device = Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth();
     let mut controller = Controller::new(plan);
     let mut reception = Reception::default();
@@ -81,7 +81,7 @@ fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
 
 /// A sound configuration, some of its values replaced by any other.
 fn config(random: &mut fastrand::Rng) -> Config {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     let any =
         |random: &mut fastrand::Rng| fixed::types::I16F16::from_bits(random.i32(..) >> random.u32(0..32));
     for layer in &mut config.patient.layers {

@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_seal_is_of_one_device_and_one_record() {
-        let record = Record::of(&Device::default(), [1; 12]);
+        let record = Record::of(&Device::commissioned_virtual(), [1; 12]);
         assert!(record.is_of([1; 12]));
         assert!(!record.is_of([2; 12]));
         let edited = Device { dac_zero: 1, ..record.device };

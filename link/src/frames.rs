@@ -14,7 +14,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -186,6 +186,8 @@ pub struct Timing {
     pub stages: [StageTime; STAGES],
     /// Ticks that came late or not at all.
     pub missed_ticks: u32,
+    /// Codes that were written after the instant at which the converter takes one: they reach the motor a tick later.
+    pub late_codes: u32,
     /// Samples that the device had to drop because the PC did not take them.
     pub dropped_samples: u32,
     /// Frames from the PC that could not be read.

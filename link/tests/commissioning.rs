@@ -109,16 +109,16 @@ impl Bench {
 }
 
 fn with(change: impl Fn(&mut Device)) -> Device {
-    let mut device = Device::default();
+    let mut device = Device::commissioned_virtual();
     change(&mut device);
     device
 }
 
 #[test]
 fn only_pulses_that_the_device_has_played_commission_it() {
-    let mut bench = Bench::new(&Device::unknown(), (1.0, 1.0));
-    assert_eq!(bench.ask(Command::ConfigureDevice(Device::default())), Err(Rejection::NotShown));
-    let forged = Record { device: Device::default(), seal: 1 };
+    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    assert_eq!(bench.ask(Command::ConfigureDevice(Device::commissioned_virtual())), Err(Rejection::NotShown));
+    let forged = Record { device: Device::commissioned_virtual(), seal: 1 };
     assert_eq!(bench.ask(Command::RestoreDevice(forged)), Err(Rejection::NotShown));
     assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown));
     bench.pulse(600);
@@ -126,7 +126,7 @@ fn only_pulses_that_the_device_has_played_commission_it() {
     bench.run(10);
     assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown), "they were cut short");
     bench.pulse(1_300);
-    let otherwise = Device { roller_radius: Millimetres(I16F16::from_num(12)), ..Device::unknown() };
+    let otherwise = Device { roller_radius: Millimetres(I16F16::from_num(12)), ..Device::default() };
     assert_eq!(bench.ask(Command::ConfigureDevice(otherwise)), Ok(()));
     assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown), "of another device");
     bench.run(10);
@@ -145,7 +145,7 @@ fn only_pulses_that_the_device_has_played_commission_it() {
 #[test]
 fn a_motor_that_drives_the_other_way_is_not_commissioned() {
     for (motor, encoder) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
-        let mut bench = Bench::new(&Device::unknown(), (motor, encoder));
+        let mut bench = Bench::new(&Device::default(), (motor, encoder));
         bench.pulse(1_300);
         let goes_together = motor * encoder > 0.0;
         let answer = bench.ask(Command::Commission);
@@ -155,7 +155,7 @@ fn a_motor_that_drives_the_other_way_is_not_commissioned() {
 
 #[test]
 fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
-    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    let mut bench = Bench::new(&Device::commissioned_virtual(), (1.0, 1.0));
     let whole = bench.record();
     let half = with(|device| device.limits.torque.0 /= 2);
     let raised = |field| Err(Rejection::Commissioned(field));
@@ -167,23 +167,26 @@ fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
     let faster = with(|device| device.limits.max_counts_per_tick += 1);
     assert_eq!(bench.ask(Command::ConfigureDevice(faster)), raised(Field::MaxCountsPerTick));
     assert_eq!(bench.ask(Command::ConfigureDevice(half)), Ok(()));
-    assert_eq!(bench.ask(Command::ConfigureDevice(Device::default())), raised(Field::TorqueLimit));
+    assert_eq!(
+        bench.ask(Command::ConfigureDevice(Device::commissioned_virtual())),
+        raised(Field::TorqueLimit)
+    );
     assert_eq!(bench.record().device, half, "refused whole");
 
-    let anothers = Record::of(&Device::default(), [8; 12]);
+    let anothers = Record::of(&Device::commissioned_virtual(), [8; 12]);
     assert_eq!(bench.ask(Command::RestoreDevice(anothers)), raised(Field::TorqueLimit));
     let edited = Record { device: stronger, ..whole };
     assert_eq!(bench.ask(Command::RestoreDevice(edited)), raised(Field::FullScaleTorque));
     assert_eq!(bench.ask(Command::RestoreDevice(whole)), Ok(()));
     // After the flash was lost it is the device's own still.
-    let mut bench = Bench::new(&Device::unknown(), (1.0, 1.0));
+    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
     assert_eq!(bench.ask(Command::RestoreDevice(whole)), Ok(()));
     assert_eq!(bench.record(), whole);
 }
 
 #[test]
 fn no_command_passes_the_boards_ceilings() {
-    let mut bench = Bench::new(&Device::unknown(), (1.0, 1.0));
+    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
     let strong = Device {
         full_scale_torque: control_core::units::MillinewtonMetres(I16F16::from_num(50)),
         ..with(|device| device.limits.torque.0 = I16F16::from_num(41))

@@ -26,7 +26,7 @@ struct Device {
 
 impl Device {
     fn new() -> Self {
-        let plan = Config::default().plan().expect("the default is sound");
+        let plan = Config::commissioned_virtual().plan().expect("the default is sound");
         Self {
             endpoint: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
@@ -110,7 +110,7 @@ fn another_version_is_turned_away() {
 #[test]
 fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
     let mut device = Device::in_session();
-    let plan = Plan::new(&config::Device::unknown(), &Patient::default()).expect("as sound as the default");
+    let plan = Plan::new(&config::Device::default(), &Patient::default()).expect("as sound as the default");
     device.endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
     assert_eq!(device.answer(Command::Hello { version: PROTOCOL_VERSION }), Ok(()));
     let interlocked = |interlock| Err(Rejection::Interlocked(interlock));
@@ -141,12 +141,16 @@ fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
         assert_eq!(device.answer(command), if is_taken { Ok(()) } else { refused });
     }
     device.answer(Command::Stop).expect("a stop is always taken");
-    let record = Record::of(&config::Device::default(), [0; 12]);
+    let record = Record::of(&config::Device::commissioned_virtual(), [0; 12]);
     assert_eq!(device.answer(Command::RestoreDevice(record)), Ok(()));
     while device.endpoint.next_order().is_some() {}
     assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotZeroed));
     assert_eq!(device.answer(Command::Zero), Ok(()));
-    assert_eq!(device.answer(Command::ConfigureDevice(config::Device::default())), Ok(()), "the same one");
+    assert_eq!(
+        device.answer(Command::ConfigureDevice(config::Device::commissioned_virtual())),
+        Ok(()),
+        "the same one"
+    );
     assert_eq!(device.answer(Command::Start), Ok(()));
 }
 
@@ -214,7 +218,7 @@ fn times_are_passed_on_and_its_own_counts_are_kept() {
 
 #[test]
 fn a_configuration_is_known_by_its_hash() {
-    let default = Config::default();
+    let default = Config::commissioned_virtual();
     let mut other = default.clone();
     other.device.limits.fade_in_ms += 1;
     assert_eq!(codec::hash(&default), codec::hash(&default.clone()));

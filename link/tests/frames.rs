@@ -90,7 +90,7 @@ proptest! {
 fn the_largest_frames_fit() {
     let sample = Sample { count: i32::MIN, dac: u16::MAX, state: u8::MAX, tilt_mrad: i16::MIN };
     encoded(&Numbered { sequence: u32::MAX, frame: block(u64::MAX, &[sample; BLOCK_SAMPLES]) });
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     let mut layer = config.patient.layers[0];
     let wall = layer.wall.as_mut().expect("skin has a wall");
     let most = fixed::types::I16F16::MIN;
@@ -114,7 +114,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let plan = Config::default().plan().expect("the default is sound");
+        let plan = Config::commissioned_virtual().plan().expect("the default is sound");
         Self {
             device: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
@@ -251,7 +251,7 @@ fn a_patient_never_changes_the_device_but_may_be_dismissed() {
         hello.expect("a new configuration is told")
     };
     let hash = |device: Device, patient: Patient| codec::hash(&Config { device, patient });
-    let mut device = Device { motor_reversed: true, dac_zero: 3, ..Device::default() };
+    let mut device = Device { motor_reversed: true, dac_zero: 3, ..Device::commissioned_virtual() };
     let told = hello(&ask(&mut bench, Command::RestoreDevice(Record::of(&device, [0; 12]))));
     assert_eq!(told.config_hash, hash(device, Patient::default()), "the patient stays");
     assert_eq!(told.device_hash, codec::hash(&device));

@@ -70,7 +70,8 @@ pub fn follows(mut board: Board, config: Option<Config>) -> ([u32; 8], usize) {
         let sample = tick.checked_sub(first).and_then(|place| pc.heard.samples.get(place as usize));
         sample.map_or(0, |&(_, sample)| sample.tilt_mrad)
     };
-    let mut controller = Controller::new(config.unwrap_or_default().plan().expect("it may run"));
+    let mut controller =
+        Controller::new(config.unwrap_or_else(Config::commissioned_virtual).plan().expect("it may run"));
     let mut states = [0_u32; 8];
     for (tick, pins) in (0_u64..).zip(&ticks) {
         if tick == started {

@@ -39,7 +39,7 @@ fn with_layers(count: usize) -> Config {
         wall: (number.is_multiple_of(3)).then_some(wall),
         friction: FrictionPerMillimetre::default(),
     };
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.skin_tilt = Milliradians(-1_571);
     config.device.speed = SpeedMethod::EdgeTiming;
     config.device.damping = Damping(I8F24::from_num(0.0002));

@@ -31,7 +31,7 @@ fn device() -> impl Strategy<Value = Device> {
             counts_per_turn: counts,
             full_scale_torque: MillinewtonMetres(q(torque)),
             dac: if narrow { DacWidth::Bits8 } else { DacWidth::Bits12 },
-            ..Device::default()
+            ..Device::commissioned_virtual()
         },
     )
 }
@@ -241,7 +241,7 @@ proptest! {
 
     #[test]
     fn a_count_is_the_circumference_over_the_counts(radius in 4.0..25.0_f64, counts in 256..=65_535_u16) {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.device.roller_radius = Millimetres(q(radius));
         config.device.counts_per_turn = counts;
         config.device.limits.stiffness = Stiffness(q(7.0));

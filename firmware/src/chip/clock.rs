@@ -1,8 +1,9 @@
 //! The clocks, from 8 MHz that the board brings, and why the microcontroller was reset.
+#![allow(unsafe_code, reason = "the HAL chooses the flash's wait states for a supply of 2.7 V and more")]
 
 use firmware::reset::ResetFlags;
 use firmware::timing;
-use stm32f4xx_hal::pac::RCC;
+use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
@@ -26,10 +27,23 @@ pub(super) fn start(rcc: RCC, source: Source) -> Rcc {
         .pclk1(timing::APB1_HZ.Hz())
         .pclk2(timing::APB2_HZ.Hz())
         .require_pll48clk();
-    rcc.freeze(match source {
+    let rcc = rcc.freeze(match source {
         Source::Crystal => config,
         Source::Bypass => config.bypass_hse_oscillator(),
-    })
+    });
+    wait_for_flash();
+    rcc
+}
+
+/// Has the flash wait for as long as the lowest supply needs that the brown-out reset lets the core run on, 2.4 V: 6 wait states
+/// at 168 MHz (RM0090 3.5.1). The first revision of the STM32F40x does not prefetch (its errata sheet; ST's own start-up code asks
+/// for the revision too).
+fn wait_for_flash() {
+    const FIRST_REVISION: u16 = 0x1000;
+    // SAFETY: start-up has the part to itself; the HAL is done with the register, and the identity is only read.
+    let (flash, identity) = unsafe { (&*FLASH::ptr(), (&*DBGMCU::ptr()).idcode().read()) };
+    let can_prefetch = identity.rev_id().bits() != FIRST_REVISION;
+    flash.acr().modify(|_, w| w.latency().ws6().prften().bit(can_prefetch));
 }
 
 /// Has the clock security watch the clock from outside once it runs. One that never comes leaves the device here, its pins inputs

@@ -4,6 +4,7 @@
 //!
 //! Nothing here may name a board.
 
+mod brownout;
 mod clock;
 mod encoder;
 mod flash;

@@ -10,13 +10,18 @@ use stm32f4xx_hal::hal_02::adc::Channel;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC2};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
-/// A line that something outside connects to ground, pulled up: a wire that is off reads high.
+/// A line that a contact outside connects to the board's supply, pulled down: a wire that is off or shorted to ground reads low.
 pub(crate) struct Line(AnyPin<Input>);
 
 impl Line {
     /// On `pin`.
     pub(crate) fn new<const P: char, const N: u8>(pin: gpio::Pin<P, N>) -> Self {
-        Self(pin.into_pull_up_input().erase())
+        Self(pin.into_pull_down_input().erase())
+    }
+
+    /// Whether the contact is closed.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.0.is_high()
     }
 }
 
@@ -29,7 +34,7 @@ pub(crate) struct DriveLines {
 }
 
 impl DriveLines {
-    /// `fitted` is low where the current is measured, on `channel`. A wire that is off says stop, not ready, not fitted. The
+    /// `fitted` is closed where the current is measured, on `channel`. A wire that is off says stop, not ready, not fitted. The
     /// `enable` line is read back.
     pub(crate) fn new(
         [stop, ready, fitted]: [Line; 3],
@@ -38,7 +43,7 @@ impl DriveLines {
         rcc: &mut Rcc,
     ) -> Self {
         cortex_m::asm::delay(firmware::timing::PULL_SETTLE_CYCLES);
-        let current = fitted.0.is_low().then(|| convert_for_ever(converter, channel, rcc));
+        let current = fitted.is_closed().then(|| convert_for_ever(converter, channel, rcc));
         Self { stop, ready, enable, current }
     }
 }
@@ -46,8 +51,8 @@ impl DriveLines {
 impl ReadDrive for DriveLines {
     fn read(&self) -> Readings {
         Readings {
-            stop_open: self.stop.0.is_high(),
-            ready: self.ready.0.is_low(),
+            stop_open: !self.stop.is_closed(),
+            ready: self.ready.is_closed(),
             enable_line: self.enable.is_high(),
             current: self.current.as_ref().map(|adc| DacCode(adc.dr().read().data().bits())),
         }

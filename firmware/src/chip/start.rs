@@ -1,6 +1,7 @@
 //! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the amplifier first, then all that the
 //! microcontroller does by itself. Interrupts are masked meanwhile.
 
+use super::brownout;
 use super::clock::{self, Source};
 use super::encoder::{Encoder, EncoderLines};
 use super::flash::Sectors;
@@ -106,6 +107,10 @@ impl<W: Wiring> Parts<W> {
         own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 
         let Said { crash, torque, heat } = LAST_WORDS.take();
+        let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
+        if !supply_level.is_falling() {
+            brownout::set(&own.flash);
+        }
         let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
         let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
         let reset_cause = cause(flags, crash, torque).or(damage);
@@ -118,7 +123,6 @@ impl<W: Wiring> Parts<W> {
 
         let bus = USB::new(own.usb, own.usb_pins, &rcc.clocks);
         let serial = usb::init(bus, serial_number(), &mut statics.usb);
-        let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
         let mut systick = core.SYST;
         systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
         systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);
@@ -149,14 +153,14 @@ impl<W: Wiring> Parts<W> {
 
 /// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
 fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
-    let (device, lost_device) = device.or(Device::unknown());
+    let (device, lost_device) = device.or(Device::default());
     let is_too_much = ceilings.check(&device).is_err();
-    let device = if is_too_much { Device::unknown() } else { device };
+    let device = if is_too_much { Device::default() } else { device };
     let (patient, lost_patient) = patient.or(Patient::default());
     let fault = (lost_device || lost_patient || is_too_much).then_some(Fault::StoredConfig);
     // A patient for another device leaves, and a device that may not be leaves the default.
     let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
-    let parts = [(device, Patient::nobody()), (Device::unknown(), Patient::default())];
+    let parts = [(device, Patient::nobody()), (Device::default(), Patient::default())];
     let plan = fitting.or_else(|_| {
         let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
         plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())

@@ -1,7 +1,10 @@
 //! The supply's detector: an interrupt when it falls, and its level.
 
+#![allow(unsafe_code, reason = "the flash's registers are another owner's; here one is read")]
+
+use super::brownout;
 use firmware::port;
-use stm32f4xx_hal::pac::{EXTI, PWR};
+use stm32f4xx_hal::pac::{EXTI, FLASH, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
 /// An interrupt, from line 16, when the supply falls below 2.66 V. A board's rail may be a diode below 3.3 V, 2.9 V where people
@@ -13,6 +16,8 @@ pub(super) fn warning(pwr: PWR, exti: EXTI, rcc: &mut Rcc) -> (Supply, SupplyLev
     exti.imr().modify(|_, w| w.mr16().set_bit());
     // Three bits: any value is one.
     pwr.cr().modify(|_, w| w.pls().set(FALLING_2V66).pvde().set_bit());
+    // Its comparator settles.
+    cortex_m::asm::delay(firmware::timing::PULL_SETTLE_CYCLES);
     (Supply(exti), SupplyLevel(pwr))
 }
 
@@ -30,8 +35,16 @@ impl Supply {
 /// The voltage detector's level.
 pub(crate) struct SupplyLevel(PWR);
 
+impl SupplyLevel {
+    /// Whether the supply is below the detector's level.
+    pub(super) fn is_falling(&self) -> bool {
+        self.0.csr().read().pvdo().bit()
+    }
+}
+
 impl port::SupplyLevel for SupplyLevel {
     fn is_low(&self) -> bool {
-        self.0.csr().read().pvdo().bit()
+        // SAFETY: a read without a side effect.
+        self.is_falling() || !brownout::is_on(unsafe { &*FLASH::ptr() })
     }
 }

@@ -82,7 +82,7 @@ impl ConfigFlash for &mut Flash {
 
 /// A device that is told from others by its travel.
 fn device(travel: i16) -> Device {
-    let mut device = Device::default();
+    let mut device = Device::commissioned_virtual();
     device.limits.travel = Millimetres(travel.into());
     device
 }
@@ -213,7 +213,7 @@ fn a_cell_is_laid_out_as_it_always_was() {
     assert_eq!(PAYLOAD_BYTES, 1024 - 4 * (HEADER_WORDS + 1), "all but header and the word that commits it");
     let mut flash = Flash::new();
     let (mut store, ..) = Store::open(&mut flash);
-    let (device, patient) = (Device::default(), Patient::default());
+    let (device, patient) = (Device::commissioned_virtual(), Patient::default());
     store.save_device(&device).unwrap();
     store.save_patient(&patient).unwrap();
     let words = &flash.words[Slot::A as usize];

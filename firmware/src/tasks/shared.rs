@@ -29,8 +29,12 @@ pub struct Shared {
     pub supervised_ms: AtomicU32,
     /// Whether the amplifier is on. Written by the tick.
     pub powered: AtomicBool,
+    /// Whether the encoder's lines are at one level. Written by the supervisor.
+    pub lines_agree: AtomicBool,
     /// Ticks that came late or not at all. Written by the tick.
     pub missed_ticks: AtomicU32,
+    /// Codes that were written after the converter's instant. Written by the tick.
+    pub late_codes: AtomicU32,
     /// What the USB host has done to us: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
     pub link: AtomicU8,
     /// Asks the USB task to throw away what waits for a PC that is gone. Set by telemetry.
@@ -52,7 +56,9 @@ impl Shared {
             stages: Stages::new(),
             supervised_ms: AtomicU32::new(0),
             powered: AtomicBool::new(false),
+            lines_agree: AtomicBool::new(false),
             missed_ticks: AtomicU32::new(0),
+            late_codes: AtomicU32::new(0),
             link: AtomicU8::new(0),
             discard: AtomicBool::new(false),
             last_words,

@@ -45,7 +45,9 @@ impl<B: Board> Watch<B> {
     fn look_at_conditions(&mut self) {
         self.shared.conditions.set(Interlock::Supply, self.supply.is_low());
         let (lines, watch) = &mut self.encoder;
-        self.shared.conditions.set(Interlock::EncoderWire, watch.look(lines));
+        let wires = watch.look(lines);
+        self.shared.conditions.set(Interlock::EncoderWire, wires.off);
+        self.shared.lines_agree.store(wires.agree, Relaxed);
         let (lines, monitor) = &mut self.drive;
         let powered = self.shared.is_powered();
         let verdict = monitor.look(&lines.read(), Asked { powered, code: self.shared.given() });

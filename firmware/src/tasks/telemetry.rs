@@ -214,6 +214,7 @@ impl<B: Board> Telemetry<B> {
             clock_hz: timing::CORE_HZ,
             stages: self.shared.stages.read(),
             missed_ticks: self.shared.missed_ticks.load(Relaxed),
+            late_codes: self.shared.late_codes.load(Relaxed),
             ..Timing::default()
         });
     }

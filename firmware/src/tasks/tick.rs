@@ -104,6 +104,9 @@ impl<B: Board> Tick<B> {
         self.watch_supervisor();
         self.take_order();
         self.shared.stages.note(Stage::TickToDac, to_dac);
+        if to_dac >= timing::OUTPUT_CYCLES && self.width == DacWidth::Bits12 {
+            self.late_code();
+        }
         self.shared.reports.alive(Task::Tick);
         self.watch_time(entered);
     }
@@ -146,6 +149,8 @@ impl<B: Board> Tick<B> {
         if supervised_ms != self.supervised_ms {
             self.supervised_ms = supervised_ms;
             self.unsupervised_ticks = 0;
+            // What the supervisor has found in that millisecond.
+            self.controller.set_lines_agree(self.shared.lines_agree.load(Relaxed));
             return;
         }
         self.unsupervised_ticks = self.unsupervised_ticks.saturating_add(1);
@@ -168,10 +173,24 @@ impl<B: Board> Tick<B> {
         self.shared.stages.note(Stage::Tick, B::cycles().wrapping_sub(entered));
     }
 
+    /// Counts a code that came after the converter's instant. One by itself is a delay of a tick; many make a wall softer than it
+    /// is calculated to be, so they are counted, sent to the PC and shown.
+    #[cold]
+    fn late_code(&self) {
+        if self.is_saving() {
+            return;
+        }
+        self.shared.late_codes.store(self.shared.late_codes.load(Relaxed).saturating_add(1), Relaxed);
+    }
+
+    /// Returns true while the flash is being written: an erasure stops the processor, and torque is off.
+    fn is_saving(&self) -> bool {
+        self.shared.conditions.get().contains(Interlock::Saving)
+    }
+
     #[cold]
     fn missed(&self, ticks: u32) {
-        if self.shared.conditions.get().contains(Interlock::Saving) {
-            // An erasure stops the processor, and torque is off.
+        if self.is_saving() {
             return;
         }
         self.shared.missed_ticks.store(self.shared.missed_ticks.load(Relaxed).saturating_add(ticks), Relaxed);

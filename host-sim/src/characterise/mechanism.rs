@@ -90,7 +90,7 @@ impl BareDevice {
 
     /// The same before anybody has commissioned it, wired as `wiring`.
     pub fn uncommissioned(self, wiring: Wiring) -> Result<Self, Failure> {
-        let device = Device::unknown();
+        let device = Device::default();
         let plan = Plan::new(&device, &Patient::nobody()).map_err(Failure::failed)?;
         let endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
         Ok(Self { wiring, endpoint, controller: Controller::new(plan), ..self })

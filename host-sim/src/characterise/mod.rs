@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(2);
 
 /// The control configuration for characterising: no tissue matters, encoder and torque limits as they are.
 pub fn configuration() -> Config {
-    Config::default()
+    Config::commissioned_virtual()
 }
 
 /// The scale of a device that is configured with `config`.

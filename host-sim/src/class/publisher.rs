@@ -179,7 +179,8 @@ mod tests {
     fn live_score_equals_the_recordings_and_no_pose_is_lost() {
         let (recording, profile) = recorded();
         let (session, publisher) = open(&profile);
-        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::new(Device::default()));
+        let (mut subscription, mut to_class) =
+            (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
         let (mut messages, mut poses) = (Vec::new(), 0);
         for (number, message) in recording.messages.iter().enumerate() {
             match message {
@@ -226,7 +227,8 @@ mod tests {
     #[test]
     fn a_needle_that_stands_still_in_the_body_and_a_fault_are_told() {
         let (session, publisher) = open(&Profile::find("adult").unwrap());
-        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::new(Device::default()));
+        let (mut subscription, mut to_class) =
+            (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
         let mut about_after = |seconds: u64, depth_mm: f64| {
             let depth = Millimetres(I16F16::from_num(depth_mm));
             publisher.pose(Pose { tick: seconds * 10_000, depth, ..Pose::default() });

@@ -111,7 +111,7 @@ impl Run {
             // It is built as its file says.
             part.device.commissioned = true;
         }
-        let device = part.as_ref().map_or_else(Device::default, |part| part.device);
+        let device = part.as_ref().map_or_else(Device::commissioned_virtual, |part| part.device);
         let profile = self.find_profile(&device)?;
         let profile = match self.angle {
             Some(degrees) => profile.at_angle(degrees)?,

@@ -145,7 +145,7 @@ fn tilt(key: &str, degrees: f64) -> Result<Milliradians, String> {
 
 impl File {
     fn device(&self) -> Result<Device, String> {
-        let (mut device, drive, control) = (Device::unknown(), &self.drive, &self.control);
+        let (mut device, drive, control) = (Device::default(), &self.drive, &self.control);
         device.commissioned = self.commissioned;
         if let Some(radius) = drive.roller_radius_mm {
             device.roller_radius = Millimetres(fix("roller_radius_mm", radius)?);
@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn what_is_left_out_is_the_built_in_devices() {
         let part = parse("format = 1\nname = \"bench 3\"\n[drive]\nmotor_reversed = true\n").expect("sound");
-        assert_eq!(part.device, Device { motor_reversed: true, ..Device::unknown() });
+        assert_eq!(part.device, Device { motor_reversed: true, ..Device::default() });
         assert_eq!(part.name, "bench 3");
         assert_eq!(part.command(), Command::ConfigureDevice(part.device), "no device has told it");
     }
@@ -300,7 +300,7 @@ mod tests {
             skin_tilt: Milliradians(-123),
             speed: SpeedMethod::EdgeTiming,
             counts_per_turn: 2_048,
-            ..Device::default()
+            ..Device::commissioned_virtual()
         };
         device.limits.winding_time_s = 30;
         device.compensation = crate::device::compensated::tests::something();

@@ -53,7 +53,7 @@ pub struct Profile {
 impl Profile {
     /// A built-in profile by its name, or a file by its path, for the built-in device.
     pub fn find(wanted: &str) -> Result<Self, Failure> {
-        Self::find_for(wanted, &Device::default())
+        Self::find_for(wanted, &Device::commissioned_virtual())
     }
 
     /// A built-in profile by its name, or a file by its path, for `device`.
@@ -63,7 +63,7 @@ impl Profile {
 
     /// Checks the text of a profile for the built-in device.
     pub fn parse(source: Text) -> Result<Self, Failure> {
-        Self::parse_for(source, &Device::default())
+        Self::parse_for(source, &Device::commissioned_virtual())
     }
 
     /// Checks the text of a profile for `device`.

@@ -205,6 +205,7 @@ fn timing(timing: frames::Timing) -> Timing {
     Timing {
         longest_tick_us: f64::from(longest) / per_us,
         missed_ticks: timing.missed_ticks,
+        late_codes: timing.late_codes,
         dropped_samples: timing.dropped_samples,
     }
 }
@@ -219,7 +220,7 @@ mod tests {
     use fixed::types::{I2F30, I16F16};
 
     fn hello() -> Hello {
-        let device = Config::default().device;
+        let device = Config::commissioned_virtual().device;
         Hello {
             version: frames::PROTOCOL_VERSION,
             identity: [0; 12],

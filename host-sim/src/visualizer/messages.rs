@@ -157,6 +157,8 @@ pub struct Timing {
     pub longest_tick_us: f64,
     /// Ticks that came late or not at all.
     pub missed_ticks: u32,
+    /// Codes that reached the motor a tick later than they should have.
+    pub late_codes: u32,
     /// Samples that the device had to drop.
     pub dropped_samples: u32,
 }

@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod amplifier;
+pub mod cache;
 mod dac;
 pub mod elf;
 mod exti;
@@ -109,6 +110,8 @@ pub struct Wiring {
     pub tilt: Option<tilt::Model>,
     /// True if an analogue inclinometer and its strap are fitted, level until [`Stopped::set_analogue`] changes it.
     pub inclinometer: bool,
+    /// True if the encoder's supply is sensed.
+    pub supply_sense: bool,
     /// True if the motor's current is measured.
     pub current_monitor: bool,
     /// The part's supply when it is switched on, in millivolts.
@@ -128,6 +131,7 @@ impl Default for Wiring {
             set_value: SetValue::OnChip,
             tilt: Some(tilt::Model::Lis3dsh),
             inclinometer: false,
+            supply_sense: false,
             current_monitor: false,
             supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,
@@ -202,6 +206,7 @@ impl Board {
         let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
         let (probe, flash) = (Probe::default(), flash::Flash::default());
+        flash.array().supply = wiring.supply;
         if wiring.commissioned {
             record::commission(&mut flash.array());
         }
@@ -308,11 +313,21 @@ impl Board {
         self.probe.tally().counted = Some(Counted { entry, exits });
     }
 
+    /// The same, and counts the lines of its code that come from the flash, which takes an instruction at a time.
+    ///
+    /// # Panics
+    ///
+    /// When the image has no such handler.
+    pub fn count_lines_of(&self, name: &str) {
+        self.count_runs_of(name);
+        self.probe.tally().count_lines = true;
+    }
+
     /// Stops counting and returns the runs that have ended.
     #[must_use]
     pub fn counted_runs(&self) -> Vec<HandlerRun> {
         let mut tally = self.probe.tally();
-        tally.counted = None;
+        (tally.counted, tally.count_lines) = (None, false);
         std::mem::take(&mut tally.runs)
     }
 

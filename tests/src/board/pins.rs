@@ -45,13 +45,17 @@ pub enum Clock {
 pub struct Pins {
     /// The name of the board's image in cargo's folder.
     pub image: &'static str,
+    /// What the image of the board's own test says of itself.
+    pub own_test: &'static str,
     /// 8 MHz, and from where.
     pub clock: Clock,
     /// The amplifier's enable line, high is on.
     pub enable: PartPin,
     /// Tracks A and B of the encoder.
     pub tracks: [PartPin; 2],
-    /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to ground.
+    /// Where the encoder's supply is sensed.
+    pub encoder_supply: PartPin,
+    /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to the supply.
     pub drive_lines: [PartPin; 3],
     /// The strap that says that an analogue inclinometer is fitted, where it is a matter of choice.
     pub strap: Option<PartPin>,
@@ -64,9 +68,11 @@ pub struct Pins {
 /// STM32F4DISCOVERY.
 pub const DISCOVERY: Pins = Pins {
     image: "firmware",
+    own_test: "own test: discovery",
     clock: Clock::Crystal,
     enable: PartPin::new('D', 7),
     tracks: [PartPin::new('A', 15), PartPin::new('A', 1)],
+    encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('E', 4), PartPin::new('E', 5), PartPin::new('E', 6)],
     strap: Some(PartPin::new('B', 1)),
     inclinometer: 11,
@@ -76,9 +82,11 @@ pub const DISCOVERY: Pins = Pins {
 /// NUCLEO-F429ZI.
 pub const NUCLEO_F429ZI: Pins = Pins {
     image: "nucleo-f429zi",
+    own_test: "own test: nucleo-f429zi",
     clock: Clock::Elsewhere,
     enable: PartPin::new('F', 13),
     tracks: [PartPin::new('A', 15), PartPin::new('B', 3)],
+    encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],
     strap: None,
     inclinometer: 10,

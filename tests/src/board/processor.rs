@@ -13,7 +13,8 @@ use rigless::emulator::{
 use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
-use super::flash::{Flash, WRITABLE};
+use super::cache::InstructionCache;
+use super::flash::{FLASH_OPTCR, Flash, WRITABLE};
 use super::machine::INSTRUCTIONS_PER_SECOND;
 use super::pins::{PartPin, register};
 
@@ -33,6 +34,9 @@ fn window(address: u64) -> u64 {
     address
 }
 
+/// The part's identity.
+const DBGMCU_IDCODE: u64 = 0xE004_2000;
+
 /// The number the architecture gives external interrupt 0.
 pub const FIRST_EXTERNAL: u32 = 16;
 const REGISTER_PC: usize = 15;
@@ -45,6 +49,8 @@ pub struct HandlerRun {
     pub from: u64,
     /// The number of its instructions.
     pub instructions: u32,
+    /// How many lines of its code came from the flash, where none of them was in the cache before; 0 where nobody asked.
+    pub lines_fetched: u32,
 }
 
 /// Something that goes wrong inside the core, and when.
@@ -83,6 +89,8 @@ pub struct Tally {
     pub counted: Option<Counted>,
     /// Every completed run of that handler.
     pub runs: Vec<HandlerRun>,
+    /// True if the lines of its code are counted, too, which takes an instruction at a time.
+    pub count_lines: bool,
     /// The addresses at which the image masks all interrupts (PRIMASK, `true`) and restores the previous state.
     pub masks: BTreeMap<u32, bool>,
     /// The instruction count at which interrupts were masked, and how many times one in the other.
@@ -93,6 +101,8 @@ pub struct Tally {
     masked_at: u32,
     /// The output that is shorted to the supply, which the part reads back.
     pub(super) shorted: Option<PartPin>,
+    /// The part's revision, where it is to be another one (`REV_ID`, RM0090 38.6.1).
+    pub revision: Option<u16>,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -125,7 +135,7 @@ pub(super) struct Probed {
 }
 
 /// A run of the counted handler that is under way.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Run {
     /// The exception that it runs in.
     exception: u32,
@@ -133,6 +143,8 @@ struct Run {
     from: u64,
     /// The same without that time.
     retired: u64,
+    /// What the flash's cache holds of its code, where the lines are counted.
+    cache: Option<InstructionCache>,
 }
 
 impl Probed {
@@ -177,7 +189,8 @@ impl Probed {
     fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
-            bus.stepping = self.probe.tally().upset.is_some();
+            bus.stepping = self.probe.tally().upset.is_some() || self.is_counting_lines();
+            self.note_fetch();
             let left = if bus.stepping { 1 } else { budget - retired as u32 };
             let (mut exit, mut did) = self.core.run(left, bus);
             let place = self.core.pc() as u32;
@@ -210,11 +223,26 @@ impl Probed {
         (Exit::Budget, retired)
     }
 
+    /// Returns true while the lines of a handler's code are counted.
+    fn is_counting_lines(&self) -> bool {
+        self.counting.as_ref().is_some_and(|run| run.cache.is_some())
+    }
+
+    /// Takes note of the instruction that comes next, where its lines are counted.
+    fn note_fetch(&mut self) {
+        let address = self.core.pc() as u32;
+        if let Some(cache) = self.counting.as_mut().and_then(|run| run.cache.as_mut()) {
+            cache.fetch(address);
+        }
+    }
+
     /// Begins a run of the counted handler where it begins at `place`.
     fn enter(&mut self, place: u32) {
         if self.probe.tally().counted.as_ref().is_some_and(|counted| counted.entry == place) {
             let exception = self.exception();
-            self.counting = Some(Run { exception, from: self.retired(), retired: self.core.retired() });
+            let cache = self.probe.tally().count_lines.then(InstructionCache::default);
+            self.counting =
+                Some(Run { exception, from: self.retired(), retired: self.core.retired(), cache });
         }
     }
 
@@ -225,14 +253,15 @@ impl Probed {
     ///
     /// When the handler returned elsewhere: more than the handler was counted then.
     fn leave(&mut self, place: Option<u32>) {
-        let Some(run) = self.counting.filter(|run| run.exception != self.exception()) else { return };
-        self.counting = None;
+        let exception = self.exception();
+        let Some(run) = self.counting.take_if(|run| run.exception != exception) else { return };
         let mut tally = self.probe.tally();
         let Some(counted) = &tally.counted else { return };
         let is_exit = place.is_some_and(|place| counted.exits.contains(&place));
         assert!(is_exit, "the handler at {:#x} returned by an instruction that is not known", counted.entry);
         let instructions = (self.core.retired() - run.retired) as u32;
-        tally.runs.push(HandlerRun { from: run.from, instructions });
+        let lines_fetched = run.cache.map_or(0, |cache| cache.misses());
+        tally.runs.push(HandlerRun { from: run.from, instructions, lines_fetched });
     }
 
     /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is one of those.
@@ -286,9 +315,19 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let shorted = self.probe.tally().shorted;
-        let mut bus =
-            Rerouted { bus, flash: &flash, stalled: self.stalled, standstill: 0, shorted, stepping: false };
+        let (shorted, revision) = {
+            let tally = self.probe.tally();
+            (tally.shorted, tally.revision)
+        };
+        let mut bus = Rerouted {
+            bus,
+            flash: &flash,
+            stalled: self.stalled,
+            standstill: 0,
+            shorted,
+            revision,
+            stepping: false,
+        };
         self.settle_breakpoints();
         let watched = !self.breakpoints.is_empty() || self.probe.tally().upset.is_some();
         let (exit, retired) =
@@ -397,6 +436,7 @@ struct Rerouted<'a> {
     /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
     standstill: u64,
     shorted: Option<PartPin>,
+    revision: Option<u16>,
     /// True if the core is inspected after every instruction.
     stepping: bool,
 }
@@ -414,17 +454,24 @@ impl CoreBus for Rerouted<'_> {
             let word = u64::from(array.word(address)) | u64::from(array.word(address + 4)) << 32;
             return Some(word >> (8 * (address & 3)) & access.width.mask());
         }
+        if !written && access.address == FLASH_OPTCR {
+            return Some(self.flash.array().option_register().into());
+        }
         if written {
             let at = self.bus.time(access.instruction_count + self.stalled).0;
             let stall = self.flash.array().register_written(access.address, access.value as u32, at);
             self.standstill += stall * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000;
         }
+        let address = access.address;
         access.address = window(access.address);
         if self.stalled > 0 {
             access.instruction_count += self.stalled;
             access.virtual_time = self.bus.time(access.instruction_count);
         }
         let value = self.bus.access(access, from_code)?;
+        if let Some(revision) = self.revision.filter(|_| !written && address == DBGMCU_IDCODE) {
+            return Some(value & 0xFFFF | u64::from(revision) << 16);
+        }
         let high = self.shorted.filter(|place| !written && access.address == place.register(register::INPUT));
         Some(high.map_or(value, |place| value | 1 << place.index))
     }

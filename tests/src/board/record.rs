@@ -3,7 +3,7 @@
 use control_core::Device;
 use firmware::store::{CELL_WORDS, ConfigFlash, Slot, Store, StoreError};
 
-use super::flash::{Array, SLOT_BYTES, WRITABLE};
+use super::flash::{Array, CONFIGURATION, SLOT_BYTES};
 
 /// The array as the store sees it, without the rules of its registers: what a programmer does before the board is switched on.
 struct Cells<'a>(&'a mut Array);
@@ -13,7 +13,7 @@ fn address(slot: Slot, index: usize) -> u64 {
         Slot::A => 0,
         Slot::B => 1,
     };
-    WRITABLE.start + slot * SLOT_BYTES + 4 * index as u64
+    CONFIGURATION.start + slot * SLOT_BYTES + 4 * index as u64
 }
 
 impl ConfigFlash for Cells<'_> {
@@ -37,5 +37,5 @@ impl ConfigFlash for Cells<'_> {
 /// The default device, commissioned.
 pub(super) fn commission(array: &mut Array) {
     let (mut store, ..) = Store::open(Cells(array));
-    store.save_device(&Device::default()).expect("a blank array has room");
+    store.save_device(&Device::commissioned_virtual()).expect("a blank array has room");
 }

@@ -74,6 +74,31 @@ pub(super) enum Order {
 /// The answer of the emulator's thread once the order is done.
 pub(super) struct Done;
 
+/// What a line of the drive is connected to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Contact {
+    /// The board's supply: the contact is closed.
+    Closed,
+    /// Nothing: it is open, or its wire is off.
+    Open,
+    /// Ground: its wire is shorted.
+    Ground,
+}
+
+impl Contact {
+    fn level(self) -> Option<Level> {
+        match self {
+            Self::Closed => Some(Level::High),
+            Self::Open => None,
+            Self::Ground => Some(Level::Low),
+        }
+    }
+
+    fn closed_if(is_closed: bool) -> Self {
+        if is_closed { Self::Closed } else { Self::Open }
+    }
+}
+
 /// The surroundings of the part.
 pub(super) struct World {
     pub(super) wiring: Wiring,
@@ -91,8 +116,8 @@ pub(super) struct World {
     /// The time at which the pull-down has drained the strap's pin.
     strap_settles: Option<Nanos>,
     pub(super) amplifier: Amplifier,
-    /// The drive's lines that are connected to ground.
-    pub(super) closed: [bool; 3],
+    /// The connection of each of the drive's lines.
+    pub(super) contacts: [Contact; 3],
     /// The firmware's actions that a data sheet forbids.
     pub(super) violations: Vec<String>,
     busy: bool,
@@ -128,7 +153,7 @@ impl World {
             latch_at: None,
             strap_settles: None,
             amplifier: Amplifier::default(),
-            closed: [true, true, wiring.current_monitor],
+            contacts: [true, true, wiring.current_monitor].map(Contact::closed_if),
             violations: Vec::new(),
             busy: false,
             painted: false,
@@ -136,12 +161,14 @@ impl World {
         }
     }
 
-    /// Connects the drive's lines to ground or lets them go.
+    /// Connects the drive's lines, and the wire that senses the encoder's supply.
     pub(super) fn drive_lines(&self, session: &mut Session<Machine>, at: Nanos) {
-        for (place, closed) in self.wiring.pins.drive_lines.into_iter().zip(self.closed) {
-            let level = closed.then_some(Level::Low);
-            session.board_mut().drive(at, place, level);
+        for (place, contact) in self.wiring.pins.drive_lines.into_iter().zip(self.contacts) {
+            session.board_mut().drive(at, place, contact.level());
         }
+        let has_supply = !self.tracks.wires.supply_off;
+        let sensed = self.wiring.supply_sense.then(|| Level::from(has_supply));
+        session.board_mut().drive(at, self.wiring.pins.encoder_supply, sensed);
     }
 
     fn paint_stack(&mut self, host: &mut dyn Host) {

@@ -9,7 +9,7 @@ use rigless::time::VirtualNanos;
 use super::amplifier::Amplifier;
 use super::machine::Machine;
 use super::plant::{Drive, Nanos, PlantSide};
-use super::run::{Log, World};
+use super::run::{Contact, Log, World};
 use super::tilt::Accelerometer;
 use super::usb_port::UsbPort;
 use super::wires::Wires;
@@ -37,16 +37,21 @@ impl Stopped<'_> {
 
     /// Opens or closes the emergency stop's loop.
     pub fn set_emergency_stop(&mut self, open: bool) {
-        self.drive_line(0, open);
+        self.drive_line(0, if open { Contact::Open } else { Contact::Closed });
+    }
+
+    /// Shorts the wire of the emergency stop's loop to ground.
+    pub fn short_emergency_stop(&mut self) {
+        self.drive_line(0, Contact::Ground);
     }
 
     /// Has the amplifier say that it is ready or not.
     pub fn set_amplifier_ready(&mut self, ready: bool) {
-        self.drive_line(1, !ready);
+        self.drive_line(1, if ready { Contact::Closed } else { Contact::Open });
     }
 
-    fn drive_line(&mut self, line: usize, open: bool) {
-        self.world.closed[line] = !open;
+    fn drive_line(&mut self, line: usize, contact: Contact) {
+        self.world.contacts[line] = contact;
         self.world.drive_lines(self.session, self.at);
     }
 
@@ -61,6 +66,7 @@ impl Stopped<'_> {
     /// Changes what becomes of the encoder's wires, from now on.
     pub fn set_wires(&mut self, wires: Wires) {
         self.world.tracks.wires = wires;
+        self.world.drive_lines(self.session, self.at);
         self.world.tracks.drive(self.session, self.at);
     }
 
@@ -93,6 +99,7 @@ impl Stopped<'_> {
         const PVDO: u64 = 1 << 2;
         let machine = self.session.board_mut();
         machine.part().set_supply(millivolts);
+        machine.flash.array().supply = millivolts;
         let status = machine.mcu.peek(VirtualNanos(self.at), PWR_CSR, Width::W32).unwrap_or(0);
         machine.exti().drive_detector(status & PVDO != 0);
     }

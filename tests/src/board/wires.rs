@@ -32,6 +32,10 @@ pub struct Wires {
     pub b: Wire,
     /// True if each goes to the other's pin.
     pub swapped: bool,
+    /// Its supply wire is off: both outputs, without power, are held near ground by their protection diodes.
+    pub supply_off: bool,
+    /// Its ground wire is off: what flows through it has no other way than its outputs, which are held near its supply.
+    pub ground_off: bool,
     /// Pulses of this many nanoseconds on both pins, one at every step of the plant, as the motor's PWM leads bring them.
     pub glitches: Option<u64>,
 }
@@ -40,6 +44,11 @@ impl Wires {
     /// Returns the levels that drive the pins of track A and track B.
     pub(super) fn drive(&self, (a, b): (bool, bool), is_in_glitch: bool) -> [Option<bool>; 2] {
         let (a, b) = if self.swapped { (b, a) } else { (a, b) };
+        let (a, b) = match (self.supply_off, self.ground_off) {
+            (true, _) => (false, false),
+            (false, true) => (true, true),
+            (false, false) => (a, b),
+        };
         [self.a.level(a), self.b.level(b)].map(|level| level.map(|level| level != is_in_glitch))
     }
 }
@@ -57,6 +66,8 @@ mod tests {
         assert_eq!(sound.drive(tracks, true), [Some(false), Some(true)]);
         assert_eq!(drive(Wires { swapped: true, ..sound }), [Some(false), Some(true)]);
         assert_eq!(drive(Wires { a: Wire::Off, ..sound }), [None, Some(false)]);
+        assert_eq!(drive(Wires { supply_off: true, ..sound }), [Some(false), Some(false)]);
+        assert_eq!(drive(Wires { ground_off: true, ..sound }), [Some(true), Some(true)]);
         assert_eq!(drive(Wires { b: Wire::Stuck(true), ..sound }), [Some(true), Some(true)]);
     }
 }

@@ -69,14 +69,14 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     // 2 mN·m of 28.8 on 2,047 codes.
     assert!(furthest.is_some_and(|codes| (100..=143).contains(&codes)), "{furthest:?} codes");
 
-    let turned = Device { encoder_reversed: true, ..Device::default() };
-    for device in [turned, Device::default()] {
+    let turned = Device { encoder_reversed: true, ..Device::commissioned_virtual() };
+    for device in [turned, Device::commissioned_virtual()] {
         let refused = pc.must_not(&mut board, Command::ConfigureDevice(device));
         assert_eq!(refused, Rejection::NotShown, "a command does not commission it");
     }
     let record = pc.record_of(turned);
     pc.must(&mut board, record);
-    let record = pc.record_of(Device::default());
+    let record = pc.record_of(Device::commissioned_virtual());
     pc.must(&mut board, record);
     assert_eq!(
         pc.must_not(&mut board, Command::Start),
@@ -126,7 +126,7 @@ fn no_command_raises_a_ceiling() {
     let mut pc = Pc::new();
     pc.connect(&mut board);
     let with = |change: fn(&mut Device)| {
-        let mut device = Device::default();
+        let mut device = Device::commissioned_virtual();
         change(&mut device);
         device
     };
@@ -145,7 +145,7 @@ fn no_command_raises_a_ceiling() {
     let weak = with(|device| device.limits.torque.0 = I16F16::from_num(20));
     pc.must(&mut board, Command::ConfigureDevice(weak));
     for (device, field) in [
-        (Device::default(), Field::TorqueLimit),
+        (Device::commissioned_virtual(), Field::TorqueLimit),
         (
             Device { limits: SafetyConfig { max_counts_per_tick: 17, ..weak.limits }, ..weak },
             Field::MaxCountsPerTick,

@@ -28,11 +28,14 @@ const PARTS: usize = 10;
 fn what_was_found() -> Found {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/hidden-found.toml");
     let rig = Rig::read(&path).expect("what the diagnosis found");
-    found(&rig, &Device::default(), 1.0).expect("it can be fed forward")
+    found(&rig, &Device::commissioned_virtual(), 1.0).expect("it can be fed forward")
 }
 
 fn config(compensation: Compensation) -> Config {
-    Config { device: Device { compensation, ..Device::default() }, ..Config::default() }
+    Config {
+        device: Device { compensation, ..Device::commissioned_virtual() },
+        ..Config::commissioned_virtual()
+    }
 }
 
 /// In through skin and vein, held, and out again; times from the start of the hand.

@@ -277,7 +277,7 @@ fn nothing_drives_the_motor_before_the_first_tick_after_a_reset() {
 fn the_motors_heat_outlives_a_reset() {
     let mut rig = Rig::pressed();
     rig.pc.must(&mut rig.board, Command::Stop);
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.limits.continuous_torque = MillinewtonMetres(I16F16::const_from_int(3));
     rig.pc.configure(&mut rig.board, &config);
     rig.pc.must(&mut rig.board, Command::Start);

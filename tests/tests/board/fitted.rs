@@ -30,7 +30,7 @@ fn eight_lines_carry_the_codes_of_an_eight_bit_configuration_and_never_another()
     let mut board = board_wired(wiring, venepuncture(1_000 * MILLISECOND));
     let mut pc = Pc::new();
     pc.connect(&mut board);
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.dac = DacWidth::Bits8;
     pc.configure(&mut board, &config);
     pc.run_ms(&mut board, 50);

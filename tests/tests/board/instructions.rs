@@ -15,7 +15,9 @@ use control_core::units::{
 };
 use fixed::types::{I8F24, I16F16};
 use link::Command;
+use tests::board::cache;
 use tests::board::plant::{self, PlantSide};
+use tests::board::processor::HandlerRun;
 use tests::board::{Board, MILLISECOND, Nanos};
 use tests::laws;
 use tests::pc::Pc;
@@ -25,6 +27,7 @@ use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 const TICK: &str = "TIM4";
 /// The limit for a tick of the default patient without compensation: five per cent of its cycles. The converter is latched after 3,360.
 const LONGEST: u32 = 840;
+const LATCH_CYCLES: u32 = 3_360;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_060;
 const EXCITING: u32 = 910;
@@ -143,7 +146,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
     let sticking = FrictionLaw::StickSlip { stiffness: Stiffness(q(0.5)), sliding: q(0.5) };
     (0..10_u8).map(move |choice| {
         let is = |bit: u8| choice & 1 << bit != 0;
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.patient.law = Law::Jog(match (is(3), is(0)) {
             (true, _) => sticking,
             (false, true) => paper,
@@ -192,7 +195,8 @@ fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, i64)> {
 fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
-    let (mut board, _) = profile.add(Config::default(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
+    let (mut board, _) =
+        profile.add(Config::commissioned_virtual(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
     profile.has_worked();
     let longest = profile.longest("default");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
@@ -202,9 +206,44 @@ fn a_tick_takes_at_most_840_instructions() {
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
 }
 
+/// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used the cache since the tick before. With every
+/// line of it from the flash, without prefetch, and one and a half cycles for an instruction, a tick is done before the
+/// converter takes its code.
+#[test]
+fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
+    for (name, compensation) in [("default", Compensation::NONE), ("all fed forward", all_fed_forward())] {
+        let mut config = Config::commissioned_virtual();
+        config.device.compensation = compensation;
+        let mut board = board(venepuncture(BEGIN));
+        let mut pc = Pc::new();
+        pc.connect(&mut board);
+        pc.configure(&mut board, &config);
+        pc.must(&mut board, Command::Index(Some(17)));
+        pc.must(&mut board, Command::Start);
+        // Through the skin, and its wall gives way.
+        let end = BEGIN + 2_600 * MILLISECOND;
+        pc.run_ms(&mut board, 1_600);
+        board.count_lines_of(TICK);
+        while board.now() < end {
+            pc.run_ms(&mut board, 1);
+        }
+        let runs = board.counted_runs();
+        let cycles = |run: &HandlerRun| run.instructions * 3 / 2 + run.lines_fetched * cache::WAIT_CYCLES;
+        let worst = runs.iter().max_by_key(|run| cycles(run)).expect("ticks");
+        println!(
+            "| {name}, nothing cached | {} instructions, {} lines from the flash, {} of {LATCH_CYCLES} cycles |",
+            worst.instructions,
+            worst.lines_fetched,
+            cycles(worst)
+        );
+        assert!(runs.iter().any(|run| run.lines_fetched > 64), "more lines than the cache has");
+        assert!(cycles(worst) < LATCH_CYCLES, "{worst:?}");
+    }
+}
+
 #[test]
 fn a_tick_that_feeds_all_of_it_forward_takes_at_most_1260_instructions() {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.compensation = all_fed_forward();
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;

@@ -5,6 +5,7 @@ mod compensation;
 mod control;
 mod faults;
 mod fitted;
+mod holding;
 mod instructions;
 mod log;
 mod rate;

@@ -15,6 +15,8 @@ use tests::scenario::board_wired;
 /// The time limits for every fault of the drive, and for a dead channel.
 const SOON: Nanos = 5 * MILLISECOND;
 const DEAD_CHANNEL: Nanos = 20 * MILLISECOND;
+/// The time limit for an encoder that has lost its supply or its ground, if nothing senses it.
+const WITHOUT_POWER: Nanos = 110 * MILLISECOND;
 /// The largest travel of the needle by then, in m.
 const FAR: f64 = 0.002;
 
@@ -142,6 +144,43 @@ fn an_encoder_unplugged_while_friction_is_rendered() {
     tripped(&mut rig, Fault::EncoderWire);
 }
 
+/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let go runs free meanwhile.
+#[test]
+fn an_encoder_that_loses_its_power() {
+    let supply_off = Wires { supply_off: true, ..Wires::default() };
+    let ground_off = Wires { ground_off: true, ..Wires::default() };
+    for (name, wires) in [("supply", supply_off), ("ground", ground_off)] {
+        for is_held in [true, false] {
+            let (mut rig, needle) = pressed();
+            rig.board.at_stop(move |stopped| stopped.set_wires(wires));
+            if !is_held {
+                needle.change(|state| state.hand = None);
+            }
+            let (time, way) = off(&mut rig, &needle, 200 * MILLISECOND);
+            let how = if is_held { "held" } else { "let go" };
+            println!(
+                "| encoder without its {name}, {how} | {:.2} ms, {:.2} mm |",
+                time as f64 / 1e6,
+                way * 1e3
+            );
+            assert!(time <= WITHOUT_POWER, "{name}: {time} ns");
+            tripped(&mut rig, Fault::EncoderFrozen);
+        }
+    }
+}
+
+#[test]
+fn an_encoder_whose_supply_is_sensed() {
+    let (mut rig, needle) = pressed_on(Wiring { supply_sense: true, ..Wiring::default() });
+    rig.board.at_stop(|stopped| stopped.set_wires(Wires { supply_off: true, ..Wires::default() }));
+    needle.change(|state| state.hand = None);
+    let gone = off(&mut rig, &needle, 5 * SOON);
+    report("encoder without its supply, which is sensed", gone, SOON);
+    tripped(&mut rig, Fault::EncoderWire);
+    let why = rig.pc.must_not(&mut rig.board, Command::Start);
+    assert_eq!(why, Rejection::Interlocked(Interlock::EncoderWire));
+}
+
 #[test]
 fn an_amplifier_that_is_not_ready() {
     let (mut rig, needle) = pressed();
@@ -169,6 +208,16 @@ fn the_emergency_stop() {
     rig.pc.run_ms(&mut rig.board, 300);
     assert!(!rig.board.at_stop(|stopped| stopped.drive().enabled), "it does not start by itself");
     rig.pc.must(&mut rig.board, Command::Start);
+}
+
+/// A contact that closes to ground would be closed for ever by this.
+#[test]
+fn a_stop_whose_wire_is_shorted_to_ground() {
+    let (mut rig, needle) = pressed();
+    rig.board.at_stop(|stopped| stopped.short_emergency_stop());
+    let gone = off(&mut rig, &needle, 5 * SOON);
+    report("emergency stop shorted to ground", gone, SOON);
+    tripped(&mut rig, Fault::EmergencyStop);
 }
 
 /// The enable line is high whatever the device does: the converter at zero torque is what is left.

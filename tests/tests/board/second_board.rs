@@ -130,7 +130,7 @@ fn the_loss_of_the_inclinometers_wire_and_of_current_take_torque_away() {
 #[test]
 fn a_configuration_outlives_a_reset() {
     let mut rig = connected();
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 400;
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
     rig.pc.run_ms(&mut rig.board, 50);

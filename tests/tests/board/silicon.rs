@@ -7,6 +7,7 @@ use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::frames::{EventKind, Rejection, SaveFailure, Stage};
+use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
 use tests::board::wires::Wires;
 use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, plant};
 use tests::pc::Pc;
@@ -54,7 +55,7 @@ fn full_torque_both_ways_reaches_the_pin() {
 fn three_hundred_configurations_are_all_saved() {
     let mut rig = connected(Wiring::default());
     let config = |number: u16| {
-        let mut config = Config::default();
+        let mut config = Config::commissioned_virtual();
         config.device.limits.fade_in_ms = 300 + number;
         config
     };
@@ -83,7 +84,7 @@ fn three_hundred_configurations_are_all_saved() {
 #[test]
 fn a_sector_is_erased_with_the_amplifier_off_only() {
     let mut rig = connected(Wiring::default());
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     for number in 1..=140 {
         rig.pc.send(&mut rig.board, Command::Start);
         rig.pc.run_ms(&mut rig.board, 3);
@@ -109,7 +110,7 @@ fn a_sector_is_erased_with_the_amplifier_off_only() {
 fn a_configuration_that_is_not_saved_is_reported() {
     let mut rig = connected(Wiring::default());
     rig.board.flash().array().worn = true;
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 400;
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
     rig.pc.run_ms(&mut rig.board, 50);
@@ -129,6 +130,68 @@ fn a_supply_that_is_low_from_the_start_is_seen() {
     rig.board.at_stop(|stopped| stopped.set_supply(2_900));
     rig.pc.run_ms(&mut rig.board, 20);
     rig.pc.must(&mut rig.board, Command::Start);
+}
+
+/// RM0090 3.6.2: 32 bits at a time ask for 2.7 V. DS8626: the detector may not see a supply before 2.59 V.
+#[test]
+fn a_configuration_is_saved_on_a_low_supply() {
+    let mut rig = connected(Wiring { supply: 2_650, ..Wiring::default() });
+    let mut config = Config::commissioned_virtual();
+    config.device.limits.fade_in_ms = 333;
+    rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
+    rig.pc.run_ms(&mut rig.board, 50);
+    assert!(!rig.pc.heard_event(|kind| matches!(kind, EventKind::NotSaved { .. })), "it was saved");
+    is_allowed(&mut rig.board);
+}
+
+/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below. ST's start-up code prefetches from revision 0x1001 on.
+#[test]
+fn the_flash_has_time_on_the_lowest_supply() {
+    const FLASH_ACR: u64 = 0x4002_3C00;
+    const PREFETCH: u32 = 1 << 8;
+    for (revision, prefetches) in [(0x1000, false), (0x1001, true), (0x2001, true)] {
+        let mut board = board(plant::held());
+        board.probe().tally().revision = Some(revision);
+        board.run_ms(50);
+        let access = board.at_stop(|stopped| stopped.register(FLASH_ACR)).expect("a register");
+        assert!(access & 0xF >= 6, "{access:#x}");
+        assert_eq!(access & PREFETCH != 0, prefetches, "{revision:#x}: {access:#x}");
+    }
+}
+
+/// RM0090 3.9.10: the brown-out reset is off from the factory.
+#[test]
+fn a_part_from_the_factory_gets_its_brown_out_reset_once() {
+    let mut board = board(plant::held());
+    board.flash().array().options = FACTORY_OPTIONS;
+    board.at_stop(|stopped| stopped.reset_by_pin());
+    board.run_ms(50);
+    assert_eq!(board.flash().array().options, GUARDED_OPTIONS, "level 2, and nothing else is changed");
+    board.at_stop(|stopped| stopped.reset_by_pin());
+    board.run_ms(50);
+    assert_eq!(board.flash().array().option_writes, 1);
+
+    // On a supply that is too low nothing is written, and no torque is given.
+    let mut rig = connected(Wiring { supply: 2_600, ..Wiring::default() });
+    rig.board.flash().array().options = FACTORY_OPTIONS;
+    rig.board.at_stop(|stopped| stopped.reset_by_pin());
+    rig.board.run_ms(50);
+    assert_eq!(rig.board.flash().array().options, FACTORY_OPTIONS);
+    rig.board.at_stop(|stopped| stopped.set_supply(3_000));
+    rig.pc.connect(&mut rig.board);
+    rig.pc.must(&mut rig.board, Command::Zero);
+    let why = rig.pc.must_not(&mut rig.board, Command::Start);
+    assert_eq!(why, Rejection::Interlocked(Interlock::Supply));
+}
+
+/// UM1472: PC0 low would switch the 5 V of CN5 on, against the PC that feeds it.
+#[test]
+fn the_boards_own_usb_power_stays_off() {
+    const GPIOC_ODR: u64 = 0x4002_0814;
+    let mut board = board(plant::held());
+    board.run_ms(50);
+    let output = board.at_stop(|stopped| stopped.register(GPIOC_ODR)).expect("a register");
+    assert!(output & 1 != 0, "{output:#x}");
 }
 
 /// RM0090 8.3.9, DS8626: a pull of 40 kΩ takes its time.

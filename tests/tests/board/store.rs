@@ -10,7 +10,7 @@ use tests::scenario::board;
 
 /// A configuration that differs from the default.
 fn changed() -> Config {
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 400;
     config.patient.layers[0].friction.0 += fixed::types::I16F16::ONE / 64;
     config
@@ -30,7 +30,7 @@ fn a_configuration_outlives_a_reset() {
     let mut board = board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);
-    let default = link::codec::hash(&Config::default());
+    let default = link::codec::hash(&Config::commissioned_virtual());
     assert_eq!(pc.heard.hello.as_ref().map(|hello| hello.config_hash), Some(default));
     pc.configure(&mut board, &changed());
     pc.run_ms(&mut board, 50);
@@ -53,7 +53,7 @@ fn power_lost_before_any_write_leaves_the_old_or_the_new() {
 /// Cuts the power before every `step`th write of a save.
 fn power_lost_before_each(step: usize) {
     let hash = |device, patient| link::codec::hash(&Config { device, patient });
-    let (default, changed_one) = (Config::default(), changed());
+    let (default, changed_one) = (Config::commissioned_virtual(), changed());
     let (old, new) = (
         hash(default.device, default.patient.clone()),
         hash(changed_one.device, changed_one.patient.clone()),
@@ -77,7 +77,7 @@ fn power_lost_before_each(step: usize) {
     let mut pc = Pc::new();
     pc.connect(&mut board);
     for write in (0..writes).step_by(step) {
-        pc.configure(&mut board, &Config::default());
+        pc.configure(&mut board, &Config::commissioned_virtual());
         pc.run_ms(&mut board, 30);
         {
             let flash = board.flash();
@@ -104,7 +104,7 @@ fn power_lost_before_each(step: usize) {
 
 #[test]
 fn a_flipped_bit_in_flash_is_reported_and_costs_the_record_that_it_is_in() {
-    let (default, other) = (Config::default(), changed());
+    let (default, other) = (Config::commissioned_virtual(), changed());
     // A word of the record that was written first, and one of the last.
     for is_patients in [false, true] {
         let mut rig = {
@@ -127,7 +127,7 @@ fn a_flipped_bit_in_flash_is_reported_and_costs_the_record_that_it_is_in() {
         let left = if is_patients {
             Config { patient: default.patient.clone(), ..other.clone() }
         } else {
-            Config { device: Device::unknown(), ..other.clone() }
+            Config { device: Device::default(), ..other.clone() }
         };
         assert_eq!(hash, link::codec::hash(&left), "patient's: {is_patients}");
         assert_eq!(fault, Some(Fault::StoredConfig));

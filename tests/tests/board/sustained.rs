@@ -48,7 +48,7 @@ fn stiff_wall() -> Config {
         }),
         friction: FrictionPerMillimetre(q(0.0)),
     };
-    let mut config = Config::default();
+    let mut config = Config::commissioned_virtual();
     config.patient.law = Law::Jog(FrictionLaw::Cone { stiffness: Stiffness(q(0.05)) });
     config.patient.layers = [layer].into_iter().collect();
     config.device.limits.stiffness = Stiffness(q(7.0));

@@ -175,7 +175,7 @@ fn push_until(page: &mut Page, at: &mut (f64, f64), depth_mm: f64) -> Result<(),
 /// The force that the control core gives with the tip at rest at `depth_mm` in whole skin: the least on the way out, the
 /// greatest on the way in; friction makes the difference.
 fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Failure> {
-    let config = Config::default();
+    let config = Config::commissioned_virtual();
     let device = config.device;
     let mm_per_turn = 2.0 * std::f64::consts::PI * device.roller_radius.0.to_num::<f64>();
     let mm_per_count = mm_per_turn / f64::from(device.counts_per_turn);

@@ -2,18 +2,20 @@
 //!
 //! | pin | does | remark |
 //! | --- | --- | --- |
-//! | PA15, PA1 | encoder A, B (TIM2, 32 bit) | both free on the board; PA0 has the button, PA5 the accelerometer |
+//! | PA15, PA1 | encoder A, B (TIM2, 32 bit) | 3.3 V only; both free on the board; PA0 has the button, PA5 the accelerometer |
+//! | PE7 | the encoder's supply, high while it is there | pulled down inside; optional |
 //! | PA4 | motor set value, 12 bit (DAC 1) | shared with the audio codec, which is held in reset |
 //! | PD4 | codec reset | low, always |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
 //! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ; read back |
-//! | PE4 | emergency stop: to ground while it may run | pulled up inside: a jumper where there is no stop |
-//! | PE5 | amplifier ready: low while it is | pulled up inside: a jumper where it has no such output |
-//! | PC2, PE6 | motor current, scaled as PA4 (ADC 2, channel 12); PE6 to ground where it is fitted | read at start-up |
+//! | PE4 | emergency stop: to 3 V while it may run | pulled down inside: a jumper to 3 V where there is no stop |
+//! | PE5 | amplifier ready: to 3 V while it is | pulled down inside: a jumper to 3 V where it has no such output |
+//! | PC2, PE6 | motor current, scaled as PA4 (ADC 2, channel 12); PE6 to 3 V where it is fitted | read at start-up |
 //! | PA5, PA6, PA7, PE3 | accelerometer: SCK, MISO, MOSI, select | on the board |
 //! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
 //! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
 //! | PA11, PA12 | USB | the micro-USB connector CN5 |
+//! | PC0 | power switch of CN5, for a host; low is on | high for good: this is a device (UM1472, OTG) |
 //! | PD12 | green LED: running | on the board |
 
 use crate::chip::{
@@ -57,6 +59,7 @@ impl Wiring for Discovery {
         let mut enable = gpiod.pd7.into_push_pull_output();
         enable.set_low();
         gpiod.pd4.into_push_pull_output().set_low();
+        gpioc.pc0.into_push_pull_output().set_high();
         let lines = Lines::new((
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
@@ -84,8 +87,8 @@ impl Wiring for Discovery {
             rcc,
         );
         // PA15 is the debugger's JTDI out of reset (RM0090 8.3.2); from here on it is the timer's.
-        let encoder =
-            chip::encoder(device.TIM2, gpioa.pa15.into_pull_up_input(), gpioa.pa1.into_pull_up_input(), rcc);
+        let tracks = (gpioa.pa15.into_pull_up_input(), gpioa.pa1.into_pull_up_input());
+        let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiod.pd12.into_push_pull_output().set_high();
 
         let own = Own {

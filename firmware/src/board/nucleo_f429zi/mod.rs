@@ -5,12 +5,13 @@
 //! | pin | does | remark |
 //! | --- | --- | --- |
 //! | PA15, PB3 | encoder A, B (TIM2, 32 bit) | CN7 9 and 15; 3.3 V only; PB3 is the debugger's SWO, which nobody uses |
+//! | PE7 | the encoder's supply, high while it is there | CN10 20; pulled down inside; optional |
 //! | PA4 | motor set value, 12 bit (DAC 1) | CN7 17 |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | CN10 18, 4, 24, 6, 26, 10, 28, 30 |
 //! | PF13 | amplifier enable, high is on | CN10 2; needs an external pull-down of 10 kΩ; read back |
-//! | PF14 | emergency stop: to ground while it may run | CN10 8; pulled up inside: a jumper where there is no stop |
-//! | PF15 | amplifier ready: low while it is | CN10 12; pulled up inside: a jumper where it has no such output |
-//! | PC2, PF12 | motor current, scaled as PA4 (ADC 2, channel 12); PF12 to ground where it is fitted | CN10 9, CN7 20; read at start-up |
+//! | PF14 | emergency stop: to 3.3 V while it may run | CN10 8; pulled down inside: a jumper to 3.3 V where there is no stop |
+//! | PF15 | amplifier ready: to 3.3 V while it is | CN10 12; pulled down inside: a jumper to 3.3 V where it has no such output |
+//! | PC2, PF12 | motor current, scaled as PA4 (ADC 2, channel 12); PF12 to 3.3 V where it is fitted | CN10 9, CN7 20; read at start-up |
 //! | PC0 | analogue inclinometer (ADC 1, channel 10) | CN9 3; needs an external pull-down of 100 kΩ, which a wire that is off leaves it with |
 //! | PA11, PA12 | USB | the micro-USB connector CN13 |
 //! | PG6 | power switch of CN13, for a host | low, always: this is a device |
@@ -69,8 +70,8 @@ impl Wiring for NucleoF429zi {
             rcc,
         );
         // PA15 and PB3 are the debugger's JTDI and JTDO out of reset (RM0090 8.3.2); from here on they are the timer's.
-        let encoder =
-            chip::encoder(device.TIM2, gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input(), rcc);
+        let tracks = (gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input());
+        let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiog.pg6.into_push_pull_output().set_low();
         gpiob.pb0.into_push_pull_output().set_high();
 

@@ -156,6 +156,12 @@ impl OutputPin for Part {
 pub(super) struct Lines(pub(super) Pull);
 
 impl PulledLines for Lines {
+    const ALL: u8 = 0b11;
+
+    fn has_supply(&self) -> bool {
+        false
+    }
+
     fn high(&mut self) -> u8 {
         if world().wire_off.get() { u8::from(self.0 == Pull::Up) } else { 0 }
     }
@@ -244,7 +250,7 @@ impl ConfigFlash for Words {
 }
 
 pub(super) fn plan() -> Plan {
-    Plan::new(&Device::default(), &Patient::default()).unwrap()
+    Plan::new(&Device::commissioned_virtual(), &Patient::default()).unwrap()
 }
 
 pub(super) fn shared() -> &'static Shared {

@@ -40,7 +40,7 @@ fn the_tick_does_not_start_under_an_interlock_and_says_why() {
 #[test]
 fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let (mut tick, shared, mut telemetry) = tick();
-    let eight = Device { dac: DacWidth::Bits8, ..Device::default() };
+    let eight = Device { dac: DacWidth::Bits8, ..Device::commissioned_virtual() };
     let eight = Plan::new(&eight, &Patient::default()).unwrap();
     let configure = |telemetry: &mut TelemetryEnds| {
         assert!(telemetry.large_orders.enqueue(control_core::Order::Configure(eight.clone())).is_ok());
@@ -91,6 +91,20 @@ fn a_tick_that_comes_late_is_counted_and_takes_torque_away() {
     world().cycles.set(world().cycles.get() + 10 * timing::TICK_CYCLES);
     run(&mut tick, shared, 1);
     assert_eq!(shared.missed_ticks.load(Relaxed), 3, "an erasure stops the processor");
+}
+
+#[test]
+fn a_code_written_after_the_latch_is_counted() {
+    let (mut tick, shared, _) = tick();
+    world().since_edge.set(timing::OUTPUT_CYCLES - 1);
+    run(&mut tick, shared, 2);
+    assert_eq!(shared.late_codes.load(Relaxed), 0);
+    world().since_edge.set(timing::OUTPUT_CYCLES);
+    run(&mut tick, shared, 3);
+    assert_eq!(shared.late_codes.load(Relaxed), 3);
+    shared.conditions.set(Interlock::Saving, true);
+    run(&mut tick, shared, 1);
+    assert_eq!(shared.late_codes.load(Relaxed), 3, "an erasure stops the processor");
 }
 
 /// After 119 hours the number of ticks begins again; a tick that is missed then is missed.
