@@ -290,10 +290,14 @@ impl Controller {
         if self.turn % 8 == LOOK_TURN {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
-            self.look_at_stillness();
-        } else if transitions.is_empty() {
-            // A tick in which a layer is touched, gives way or is left is long enough.
-            self.take_turn(input.tilt);
+        }
+        // A tick in which a layer is touched, gives way or is left is long enough.
+        if transitions.is_empty() {
+            if self.turn % 8 == LOOK_TURN {
+                self.look_at_stillness();
+            } else {
+                self.take_turn(input.tilt);
+            }
         }
         let codes = self.plan.dac.codes(torque);
         let state = match self.mode {

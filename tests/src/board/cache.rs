@@ -12,7 +12,7 @@ const LINES: usize = 64;
 /// lines that follow one another wait for less.
 pub const WAIT_CYCLES: u32 = 6;
 
-/// What it holds.
+/// The cache's content, and a count of what it lacked.
 #[derive(Debug, Default)]
 pub(super) struct InstructionCache {
     /// Lines by their number in the address space, the one used longest ago first.

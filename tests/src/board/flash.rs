@@ -30,7 +30,7 @@ const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 const KEY1: u32 = 0x4567_0123;
 const KEY2: u32 = 0xCDEF_89AB;
-/// Bytes at a time by `PSIZE`, and the millivolts that the supply has for them at the least (3.6.2; 8 at a time asks for a supply of
+/// Bytes at a time by `PSIZE`, and the supply in millivolts that they need at least (3.6.2; 8 at a time asks for a supply of
 /// its own).
 const PARALLEL: [(u32, u32); 3] = [(1, 1_800), (2, 2_100), (4, 2_700)];
 /// A sector of 128 KiB takes a second, 32 bits at a time, and 1.3 s, 16 at a time (data sheet DS8626, flash memory programming; at most
@@ -62,7 +62,7 @@ pub struct Array {
     options_unlocked: bool,
     /// The option bytes: kept through a reset.
     pub options: u32,
-    /// How often they were written.
+    /// The number of times they were written.
     pub option_writes: u32,
     /// The part's supply in millivolts.
     pub(super) supply: u32,
@@ -179,7 +179,7 @@ impl Array {
         Some(bytes)
     }
 
-    /// What the option bytes' control register reads.
+    /// Returns the option bytes' control register as it reads.
     pub(super) fn option_register(&self) -> u32 {
         self.option_control | if self.options_unlocked { 0 } else { OPTLOCK }
     }

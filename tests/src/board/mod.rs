@@ -39,7 +39,7 @@ use rigless::time::VirtualNanos;
 pub use amplifier::Amplifier;
 pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use processor::{Counted, Effect, HandlerRun, Probe, Upset};
+pub use processor::{Counted, Effect, HandlerRun, Probe, ToCode, Upset};
 pub use run::{EncoderRead, Log, Output};
 pub use stopped::Stopped;
 pub use usb_port::UsbPort;

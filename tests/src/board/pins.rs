@@ -45,7 +45,7 @@ pub enum Clock {
 pub struct Pins {
     /// The name of the board's image in cargo's folder.
     pub image: &'static str,
-    /// What the image of the board's own test says of itself.
+    /// The name that the image of the board's own test prints.
     pub own_test: &'static str,
     /// 8 MHz, and from where.
     pub clock: Clock,
@@ -53,7 +53,7 @@ pub struct Pins {
     pub enable: PartPin,
     /// Tracks A and B of the encoder.
     pub tracks: [PartPin; 2],
-    /// Where the encoder's supply is sensed.
+    /// The pin that senses the encoder's supply.
     pub encoder_supply: PartPin,
     /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to the supply.
     pub drive_lines: [PartPin; 3],

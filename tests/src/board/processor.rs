@@ -34,6 +34,9 @@ fn window(address: u64) -> u64 {
     address
 }
 
+/// The converter's holding register for twelve bits, right aligned (RM0090 14.5.3).
+const CONVERTER_CODE: u64 = 0x4000_7408;
+
 /// The part's identity.
 const DBGMCU_IDCODE: u64 = 0xE004_2000;
 
@@ -49,8 +52,17 @@ pub struct HandlerRun {
     pub from: u64,
     /// The number of its instructions.
     pub instructions: u32,
-    /// How many lines of its code came from the flash, where none of them was in the cache before; 0 where nobody asked.
-    pub lines_fetched: u32,
+    /// The part of the run up to its first write of a code to the converter, if lines are counted.
+    pub to_code: Option<ToCode>,
+}
+
+/// A run up to the write of the converter's code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ToCode {
+    /// The number of instructions.
+    pub instructions: u32,
+    /// The number of lines of code that came from the flash, with an empty cache at the first instruction.
+    pub lines: u32,
 }
 
 /// Something that goes wrong inside the core, and when.
@@ -143,8 +155,9 @@ struct Run {
     from: u64,
     /// The same without that time.
     retired: u64,
-    /// What the flash's cache holds of its code, where the lines are counted.
+    /// The flash's cache, if lines are counted.
     cache: Option<InstructionCache>,
+    to_code: Option<ToCode>,
 }
 
 impl Probed {
@@ -205,6 +218,9 @@ impl Probed {
                 self.note_mask(place);
             }
             retired += did;
+            if std::mem::take(&mut bus.code_written) {
+                self.note_code();
+            }
             self.leave(stopped.then_some(place));
             if bus.standstill > 0 {
                 return (Exit::Returned, retired);
@@ -236,13 +252,23 @@ impl Probed {
         }
     }
 
+    /// Notes that the counted handler has written a code to the converter, if lines are counted.
+    fn note_code(&mut self) {
+        let retired = self.core.retired();
+        if let Some(Run { to_code: to_code @ None, cache: Some(cache), retired: from, .. }) =
+            &mut self.counting
+        {
+            *to_code = Some(ToCode { instructions: (retired - *from) as u32, lines: cache.misses() });
+        }
+    }
+
     /// Begins a run of the counted handler where it begins at `place`.
     fn enter(&mut self, place: u32) {
         if self.probe.tally().counted.as_ref().is_some_and(|counted| counted.entry == place) {
             let exception = self.exception();
             let cache = self.probe.tally().count_lines.then(InstructionCache::default);
-            self.counting =
-                Some(Run { exception, from: self.retired(), retired: self.core.retired(), cache });
+            let (from, retired) = (self.retired(), self.core.retired());
+            self.counting = Some(Run { exception, from, retired, cache, to_code: None });
         }
     }
 
@@ -260,8 +286,7 @@ impl Probed {
         let is_exit = place.is_some_and(|place| counted.exits.contains(&place));
         assert!(is_exit, "the handler at {:#x} returned by an instruction that is not known", counted.entry);
         let instructions = (self.core.retired() - run.retired) as u32;
-        let lines_fetched = run.cache.map_or(0, |cache| cache.misses());
-        tally.runs.push(HandlerRun { from: run.from, instructions, lines_fetched });
+        tally.runs.push(HandlerRun { from: run.from, instructions, to_code: run.to_code });
     }
 
     /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is one of those.
@@ -326,6 +351,7 @@ impl Processor for Probed {
             standstill: 0,
             shorted,
             revision,
+            code_written: false,
             stepping: false,
         };
         self.settle_breakpoints();
@@ -437,6 +463,8 @@ struct Rerouted<'a> {
     standstill: u64,
     shorted: Option<PartPin>,
     revision: Option<u16>,
+    /// True if a code was written to the converter since somebody asked.
+    code_written: bool,
     /// True if the core is inspected after every instruction.
     stepping: bool,
 }
@@ -463,6 +491,7 @@ impl CoreBus for Rerouted<'_> {
             self.standstill += stall * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000;
         }
         let address = access.address;
+        self.code_written |= written && address == CONVERTER_CODE;
         access.address = window(access.address);
         if self.stalled > 0 {
             access.instruction_count += self.stalled;

@@ -74,7 +74,7 @@ pub(super) enum Order {
 /// The answer of the emulator's thread once the order is done.
 pub(super) struct Done;
 
-/// What a line of the drive is connected to.
+/// The connection of a line of the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Contact {
     /// The board's supply: the contact is closed.
