@@ -290,14 +290,10 @@ impl Controller {
         if self.turn % 8 == LOOK_TURN {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
-        }
-        // A tick in which a layer is touched, gives way or is left is long enough.
-        if transitions.is_empty() {
-            if self.turn % 8 == LOOK_TURN {
-                self.look_at_stillness();
-            } else {
-                self.take_turn(input.tilt);
-            }
+            self.look_at_stillness();
+        } else if transitions.is_empty() {
+            // A tick in which a layer is touched, gives way or is left is long enough.
+            self.take_turn(input.tilt);
         }
         let codes = self.plan.dac.codes(torque);
         let state = match self.mode {
@@ -412,6 +408,9 @@ impl Controller {
     /// The look for an encoder that no longer counts. A count up and down again is less than one: a live channel gives them when
     /// the other one is dead.
     fn look_at_stillness(&mut self) {
+        if self.still.is_moving() {
+            return self.still.forget();
+        }
         // While the encoder is asked, what would be given counts, and else what is: less while it fades in.
         let torque = if self.still.is_asking() { self.asked } else { self.limiter.given().0 };
         self.still.look(torque.unsigned_abs() >= self.plan.loaded_torque);

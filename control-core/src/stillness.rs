@@ -68,6 +68,19 @@ impl Stillness {
         self.has_progressed |= !is_back;
     }
 
+    /// Returns true if the needle has got on since the last look and all of the torque is given: then there is nothing to look at.
+    #[inline]
+    pub(crate) fn is_moving(&self) -> bool {
+        self.has_progressed && !self.is_asking()
+    }
+
+    /// Begins anew, as after a step of the needle that got on.
+    #[inline]
+    pub(crate) fn forget(&mut self) {
+        (self.has_moved, self.has_progressed) = (false, false);
+        (self.since_count, self.since_progress) = (0, 0);
+    }
+
     /// Takes a look; `is_loaded` if the torque that the law asks for would move a needle that nobody holds. Called in one tick
     /// of [`LOOK_TICKS`].
     pub(crate) fn look(&mut self, is_loaded: bool) {
