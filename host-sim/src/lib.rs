@@ -35,4 +35,5 @@ pub mod sheet;
 pub mod station;
 pub mod streams;
 pub mod tally;
+pub mod version;
 pub mod visualizer;

@@ -22,7 +22,7 @@ use std::sync::atomic::AtomicBool;
 pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
     let (_, publisher) = session::open(profile.scene(Source::Virtual, Some(procedure.name.clone())));
     let setup = Setup {
-        program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
+        program: crate::version::program(),
         source: "virtual".into(),
         profile_toml: profile.source.text.clone(),
         profile_origin: profile.source.origin.clone(),

@@ -3,6 +3,7 @@
 
 mod waiting;
 
+use crate::build::Build;
 use crate::codec::{self, Decoder, MAX_FRAME};
 use crate::commissioning::{Proof, Record, may_become};
 use crate::frames::{
@@ -240,6 +241,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             version: PROTOCOL_VERSION,
             identity: self.identity.serial,
             firmware: self.identity.firmware,
+            build: Build::CURRENT,
             config_hash: codec::hash(plan.config()),
             device_hash: codec::hash(device),
             tick_hz: TICK_HZ,

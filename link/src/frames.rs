@@ -1,5 +1,6 @@
 //! The messages of both sides. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
+use crate::build::Build;
 use crate::commissioning::Record;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
@@ -59,6 +60,8 @@ pub struct Hello {
     pub identity: [u8; 12],
     /// Version of the firmware.
     pub firmware: [u8; 3],
+    /// The commit that the firmware was built from.
+    pub build: Build,
     /// CRC-32 of the configuration in force, both parts.
     pub config_hash: u32,
     /// CRC-32 of its device's part.

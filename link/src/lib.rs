@@ -9,6 +9,7 @@
 #![no_std]
 #![deny(clippy::panic, clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing)]
 
+pub mod build;
 pub mod codec;
 pub mod commissioning;
 pub mod device;

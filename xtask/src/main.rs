@@ -6,6 +6,8 @@
 mod bench;
 mod board_test;
 mod boards;
+mod dfu;
+mod dist;
 mod elf;
 mod firmware;
 mod flash;
@@ -34,6 +36,7 @@ The project's chores.
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, and board-test, take --board: discovery (default), nucleo-f429zi
+  cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         "test" => test::run(rest),
         "firmware" => for_board(rest, |board| firmware::report(board, &firmware::build(board)?)),
         "flash" => flash::run(rest),
+        "dist" => no_more(rest).and_then(|()| dist::run()),
         "wasm" => no_more(rest).and_then(|()| wasm::run()),
         "site" => no_more(rest).and_then(|()| site::run()),
         "nightly" => test::nightly(rest),

@@ -25,7 +25,7 @@ use host_sim::failure::Failure;
 ///
 /// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
 #[derive(Parser)]
-#[command(version, after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
+#[command(version = host_sim::version::version(), after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Cli {
     /// Print results and errors only: no progress, no addresses, no advice
     #[arg(long, short, global = true)]

@@ -130,7 +130,7 @@ impl Run {
         let looks = (!self.headless).then(|| session.subscribe());
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
-            program: concat!("host-sim ", env!("CARGO_PKG_VERSION")).into(),
+            program: host_sim::version::program(),
             source: self.device.clone(),
             profile_toml: profile.source.text.clone(),
             profile_origin: profile.source.origin.clone(),

@@ -5,6 +5,7 @@ use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
 use fixed::types::{I2F30, I16F16};
+use link::build::Build;
 use link::frames;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,9 @@ pub struct Hello {
     pub identity: String,
     /// Version of the firmware.
     pub firmware: [u8; 3],
+    /// The commit that the firmware was built from; unknown in a recording from before it was told.
+    #[serde(default)]
+    pub build: Build,
     /// CRC-32 of the configuration in force, both parts.
     pub config_hash: u32,
     /// CRC-32 of its device's part; 0 in a recording from before it was told.
@@ -154,6 +158,7 @@ impl From<&frames::Hello> for Hello {
             version: hello.version,
             identity: hello.identity.iter().map(|byte| format!("{byte:02x}")).collect(),
             firmware: hello.firmware,
+            build: hello.build,
             config_hash: hello.config_hash,
             device_hash: hello.device_hash,
             tick_hz: hello.tick_hz,
@@ -200,6 +205,7 @@ impl Hello {
             version: self.version,
             identity,
             firmware: self.firmware,
+            build: self.build,
             config_hash: self.config_hash,
             device_hash: self.device_hash,
             tick_hz: self.tick_hz,

@@ -73,7 +73,7 @@ impl<W: Write + Seek> Recorder<W> {
         let options = WriteOptions::new()
             .compression(None)
             .profile("needle-insertion")
-            .library(concat!("host-sim ", env!("CARGO_PKG_VERSION")))
+            .library(crate::version::program())
             .chunk_size(None)
             .disable_seeking(true);
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

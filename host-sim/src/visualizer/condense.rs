@@ -3,6 +3,7 @@
 use super::messages::{self, Bucket, Device, Range, Timing};
 use crate::session::{Batch, Happening, state_name, vessel_name};
 use control_core::config::DacWidth;
+use link::build::Build;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
 
@@ -185,7 +186,10 @@ fn device(hello: &Hello) -> Device {
     let [major, minor, patch] = hello.firmware;
     Device {
         identity: hex(&hello.identity),
-        firmware: format!("{major}.{minor}.{patch}"),
+        firmware: match hello.build {
+            Build { commit: 0, .. } => format!("{major}.{minor}.{patch}"),
+            build => format!("{major}.{minor}.{patch} ({build})"),
+        },
         config_hash: format!("{:08x}", hello.config_hash),
         tick_hz: hello.tick_hz,
         mm_per_count: hello.mm_per_count.to_num(),
@@ -225,6 +229,7 @@ mod tests {
             version: frames::PROTOCOL_VERSION,
             identity: [0; 12],
             firmware: [1, 2, 3],
+            build: Build::default(),
             config_hash: 0xabcd,
             device_hash: 0xef,
             tick_hz: 10_000,

@@ -1,0 +1,94 @@
+//! Makes what a lab downloads: both boards' images and a program for the PC, each with the commit it was built from.
+
+use crate::boards::{self, Board};
+use crate::elf::Elf;
+use crate::shell::{self, Failure};
+use crate::{dfu, firmware};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// The variable that names the commit (`link/src/build.rs`).
+const BUILD: &str = "NEEDLE_BUILD";
+
+/// `cargo xtask dist`.
+pub(crate) fn run() -> Result<(), Failure> {
+    let build = commit()?;
+    let folder = shell::target().join("dist");
+    fs::create_dir_all(&folder).map_err(|error| unwritable(&folder, &error))?;
+    // SAFETY: no other thread runs yet, and the builds below inherit the variable.
+    #[allow(unsafe_code, reason = "the environment of this process is changed once, before any thread")]
+    unsafe {
+        std::env::set_var(BUILD, &build);
+    }
+    let mut made = Vec::new();
+    for board in &boards::ALL {
+        made.extend(images(board, &folder)?);
+    }
+    made.push(program(&folder)?);
+    println!("built from {build}:");
+    for (name, bytes) in made {
+        println!("  {:>9} bytes  {}", bytes, folder.join(name).display());
+    }
+    Ok(())
+}
+
+/// The first eight digits of the commit's hash, with a `+` if the sources differ from it.
+fn commit() -> Result<String, Failure> {
+    let git = |arguments: &[&str]| {
+        Command::new("git").args(arguments).current_dir(shell::top()).output().map_err(|error| {
+            Failure::new(format!(
+                "git could not be started: {error}; install it, the images name their commit"
+            ))
+        })
+    };
+    let hash = git(&["rev-parse", "HEAD"])?;
+    let text = String::from_utf8_lossy(&hash.stdout);
+    let Some(hash) = text.get(..8).filter(|_| hash.status.success()) else {
+        return Err(Failure::new(
+            "this is not a git checkout: clone the repository, the images name their commit",
+        ));
+    };
+    let is_changed = !git(&["status", "--porcelain"])?.stdout.is_empty();
+    Ok(if is_changed { format!("{hash}+") } else { hash.to_string() })
+}
+
+/// Writes the images of a board. Returns their names and sizes.
+fn images(board: &Board, folder: &Path) -> Result<Vec<(String, usize)>, Failure> {
+    let built = firmware::build(board)?;
+    let elf = fs::read(&built).map_err(|error| unreadable(&built, &error))?;
+    let (start, bin) = Elf::read(&built)?.flash_image()?;
+    let name = format!("needle-{}", board.name);
+    let dfu = dfu::file(board.title, start, &bin);
+    let files = [("elf", elf), ("bin", bin), ("dfu", dfu)];
+    files.into_iter().map(|(ending, bytes)| write(folder, format!("{name}.{ending}"), &bytes)).collect()
+}
+
+/// Builds the program for the PC and writes it without its symbols. Returns its name and size.
+fn program(folder: &Path) -> Result<(String, usize), Failure> {
+    let name = format!("host-sim{}", std::env::consts::EXE_SUFFIX);
+    shell::run(
+        shell::cargo()
+            .args(["rustc", "--release", "--ignore-rust-version", "-p", "host-sim", "--bin", "host-sim"])
+            .args(["--", "-C", "strip=symbols"]),
+    )?;
+    let built = shell::target().join("release").join(&name);
+    let bytes = fs::read(&built).map_err(|error| unreadable(&built, &error))?;
+    let target = folder.join(&name);
+    fs::copy(&built, &target).map_err(|error| unwritable(&target, &error))?;
+    Ok((name, bytes.len()))
+}
+
+fn write(folder: &Path, name: String, bytes: &[u8]) -> Result<(String, usize), Failure> {
+    let path = folder.join(&name);
+    fs::write(&path, bytes).map_err(|error| unwritable(&path, &error))?;
+    Ok((name, bytes.len()))
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(format!("{} cannot be written: {error}", path.display()))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(format!("{} cannot be read: {error}", path.display()))
+}
