@@ -43,6 +43,8 @@ pub(crate) struct Layer {
     pub(crate) walls_above: usize,
     /// It begins with a wall that gives way.
     pub(crate) has_wall: bool,
+    /// A bit where the law of force decides that it gives way, else nothing.
+    pub(crate) opens: u8,
 }
 
 /// How far a wall is pushed in before it gives way, and how it springs back.
@@ -67,12 +69,14 @@ pub(crate) struct Passage {
     pub(crate) layer: usize,
     /// How many walls have given way.
     pub(crate) given: usize,
+    /// A bit of the layers that have given way by the law of force, or nothing.
+    pub(crate) opens: u8,
 }
 
 impl Passage {
     /// Past layer number `layer`, which is `met`.
     pub(crate) fn of(layer: usize, met: &Layer) -> Self {
-        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 } }
+        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 }, opens: met.opens }
     }
 }
 
@@ -146,6 +150,8 @@ pub(crate) struct Insertion {
     is_pressing: bool,
     /// Along the needle, where the tip passes beside the vessel.
     beside: I16F16,
+    /// A bit for each layer that has given way by the law of force.
+    open: u8,
     vessel: VesselState,
 }
 
@@ -167,6 +173,7 @@ impl Insertion {
             is_springing_back: false,
             is_pressing: false,
             beside: I16F16::MAX,
+            open: 0,
             vessel: VesselState::Outside,
         };
         insertion.turn_at_once(anatomy);
@@ -224,6 +231,14 @@ impl Insertion {
     fn innermost_above(&self, last: usize, depth: Millimetres) -> usize {
         let above = self.tops.get(..last).unwrap_or_default();
         above.iter().rposition(|&top| depth.0 >= top).unwrap_or(0)
+    }
+
+    /// The law of force says which layers have given way: a bit each. What it means for the vessel goes into `transitions`.
+    pub(crate) fn open(&mut self, anatomy: &Anatomy, open: u8, transitions: &mut Transitions) {
+        if open != self.open {
+            self.open = open;
+            self.look_at_vessel(anatomy, transitions);
+        }
     }
 
     /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
@@ -389,20 +404,28 @@ impl Insertion {
             Some(Vessel::Beside { .. }) if depth.0 >= self.beside => VesselState::Beside,
             Some(Vessel::Beside { .. }) => VesselState::Outside,
             Some(Vessel::Met { .. }) if transitions.is_empty() => return,
-            Some(Vessel::Met { near, far }) => {
-                let is_past = |wall: Passage| self.touched > wall.layer && self.given >= wall.given;
-                if far.is_some_and(is_past) {
-                    VesselState::Through
-                } else if is_past(near) {
-                    VesselState::InLumen
-                } else if self.touched > near.layer {
-                    VesselState::Touching
-                } else {
-                    VesselState::Outside
-                }
-            }
+            Some(Vessel::Met { .. }) => return self.look_at_vessel(anatomy, transitions),
         };
-        transitions.flashback = state == VesselState::InLumen && self.vessel != VesselState::InLumen;
+        self.vessel = state;
+    }
+
+    /// Where the tip is as seen from a vessel that it does not pass beside.
+    #[inline(never)]
+    fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
+        let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };
+        let is_past = |wall: Passage| {
+            self.touched > wall.layer && self.given >= wall.given && self.open & wall.opens == wall.opens
+        };
+        let state = if far.is_some_and(is_past) {
+            VesselState::Through
+        } else if is_past(near) {
+            VesselState::InLumen
+        } else if self.touched > near.layer {
+            VesselState::Touching
+        } else {
+            VesselState::Outside
+        };
+        transitions.flashback |= state == VesselState::InLumen && self.vessel != VesselState::InLumen;
         self.vessel = state;
     }
 }

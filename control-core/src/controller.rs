@@ -6,7 +6,7 @@ use crate::compensation::Gains;
 use crate::compensation::feedforward::{Feedforward, Here};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
-use crate::kinematics::{SpeedEstimator, Withdrawal, moved};
+use crate::kinematics::{Movement, SpeedEstimator, moved};
 use crate::law::{Memory, Motion, Response};
 use crate::math::{saturating_multiply, truncating_product};
 use crate::passivity::{Elements, Observer};
@@ -112,7 +112,7 @@ pub struct Controller {
     origin: Counts,
     previous: Option<Counts>,
     speed: SpeedEstimator,
-    withdrawal: Withdrawal,
+    movement: Movement,
     insertion: Insertion,
     memory: Memory,
     observer: Observer,
@@ -159,7 +159,7 @@ impl Controller {
         feedforward.set_gains(plan.device().compensation.gains);
         Self {
             speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
-            withdrawal: Withdrawal::default(),
+            movement: Movement::default(),
             insertion: Insertion::new(&plan.anatomy),
             memory: plan.law.memory(),
             plan,
@@ -270,7 +270,7 @@ impl Controller {
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
         self.turn = (self.turn + 1) % anatomy::LOOK_TICKS;
-        let (transitions, tissue) = self.meet(input.tilt, count, depth, speed);
+        let (transitions, tissue) = self.meet(input.tilt, depth, speed);
         let angle = self.insertion.angle();
         self.watch_host();
         let has_given_way = transitions.puncture != 0;
@@ -351,7 +351,6 @@ impl Controller {
     fn meet(
         &mut self,
         tilt: Milliradians,
-        count: Counts,
         depth: Millimetres,
         speed: MillimetresPerSecond,
     ) -> (Transitions, Response) {
@@ -362,12 +361,20 @@ impl Controller {
             self.insertion.look_anew(&self.plan.anatomy, tilt);
         }
         let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
+        let direction = self.movement.tick(depth);
         let response = {
             let (law, plan) = (&self.plan.config.patient.law, &self.plan.law);
-            let withdraws = self.withdrawal.tick(&self.plan.scale, count, speed);
-            self.memory.tick(law, plan, &self.insertion, Motion { depth, speed, withdraws })
+            self.memory.tick(
+                law,
+                plan,
+                &self.insertion,
+                Motion { depth, speed, direction, has_stopped: self.movement.has_stopped(depth) },
+            )
         };
         transitions.barrier = response.barrier;
+        transitions.in_track = transitions.contact & response.open;
+        transitions.puncture |= response.ruptured;
+        self.insertion.open(&self.plan.anatomy, response.open, &mut transitions);
         (transitions, response)
     }
 
