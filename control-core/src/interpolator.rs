@@ -53,6 +53,7 @@ impl Interpolator {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_arithmetic, reason = "a test")]
 mod tests {
     use super::*;
 

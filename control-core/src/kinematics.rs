@@ -259,6 +259,7 @@ pub(crate) fn mm_per_count(roller_radius: Millimetres, counts_per_turn: u16) -> 
 }
 
 #[cfg(test)]
+#[expect(clippy::indexing_slicing, reason = "a test")]
 mod tests {
     use super::*;
     use heapless::Vec;

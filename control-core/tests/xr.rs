@@ -384,7 +384,7 @@ fn strongest_line(forces: &[f64]) -> f64 {
 
 #[test]
 fn an_even_insertion_has_no_line_above_three_millinewtons() {
-    let mut config = config(table(|depth, speed, angle| rising(depth, speed, angle)));
+    let mut config = config(table(rising));
     for method in [SpeedMethod::Window, SpeedMethod::EdgeTiming] {
         config.device.speed = method;
         for speed in [1.0, 2.0, 3.0, 5.0] {

@@ -104,6 +104,7 @@ macro_rules! laws {
 
         /// The law that is in force.
         #[derive(Clone, Debug)]
+        #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one plan")]
         pub(crate) enum Plan { $($name($module::Plan)),+ }
 
         /// What it remembers.
