@@ -152,6 +152,10 @@ pub(crate) struct Insertion {
     beside: I16F16,
     /// A bit for each layer that has given way by the law of force.
     open: u8,
+    /// A bit for each layer that was touched, gave way or was left in this tick; the vessel is looked at for them in the next.
+    happened: u8,
+    /// The same of this tick and the one before.
+    busy: u8,
     vessel: VesselState,
 }
 
@@ -174,6 +178,8 @@ impl Insertion {
             is_pressing: false,
             beside: I16F16::MAX,
             open: 0,
+            happened: 0,
+            busy: 0,
             vessel: VesselState::Outside,
         };
         insertion.turn_at_once(anatomy);
@@ -233,12 +239,22 @@ impl Insertion {
         above.iter().rposition(|&top| depth.0 >= top).unwrap_or(0)
     }
 
-    /// The law of force says which layers have given way: a bit each. What it means for the vessel goes into `transitions`.
-    pub(crate) fn open(&mut self, anatomy: &Anatomy, open: u8, transitions: &mut Transitions) {
-        if open != self.open {
-            self.open = open;
-            self.look_at_vessel(anatomy, transitions);
-        }
+    /// A bit for each layer that has given way by the law of force.
+    pub(crate) fn opened(&self) -> u8 {
+        self.open
+    }
+
+    /// The law of force says which layers have given way: a bit each. What it means for the vessel is seen in the next tick.
+    pub(crate) fn open(&mut self, open: u8) {
+        let changed = open ^ self.open;
+        self.happened |= changed;
+        self.busy |= changed;
+        self.open = open;
+    }
+
+    /// True in a tick in which a layer is touched, gives way or is left, and in the next one, in which the vessel is looked at.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.busy != 0
     }
 
     /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
@@ -257,7 +273,13 @@ impl Insertion {
         let puncture = self.puncture(anatomy, depth);
         let mut transitions = Transitions { puncture, ..self.cross_layer(anatomy, depth) };
         self.is_pressing = anatomy.walls.get(self.given).is_some_and(|wall| wall.layer < self.touched);
-        self.watch_vessel(anatomy, depth, &mut transitions);
+        let happened = transitions.contact | transitions.puncture | transitions.exit;
+        let due = core::mem::replace(&mut self.happened, happened);
+        self.busy = due | happened;
+        if due != 0 {
+            self.look_at_vessel(anatomy, &mut transitions);
+        }
+        self.pass_beside(anatomy, depth);
         transitions
     }
 
@@ -398,18 +420,14 @@ impl Insertion {
         anatomy.layers.get(wall.layer).map_or(0, |layer| 1 << layer.number)
     }
 
-    fn watch_vessel(&mut self, anatomy: &Anatomy, depth: Millimetres, transitions: &mut Transitions) {
-        let state = match anatomy.vessel {
-            None => return,
-            Some(Vessel::Beside { .. }) if depth.0 >= self.beside => VesselState::Beside,
-            Some(Vessel::Beside { .. }) => VesselState::Outside,
-            Some(Vessel::Met { .. }) if transitions.is_empty() => return,
-            Some(Vessel::Met { .. }) => return self.look_at_vessel(anatomy, transitions),
-        };
-        self.vessel = state;
+    /// Whether the needle passes beside the vessel.
+    fn pass_beside(&mut self, anatomy: &Anatomy, depth: Millimetres) {
+        if let Some(Vessel::Beside { .. }) = anatomy.vessel {
+            self.vessel = if depth.0 >= self.beside { VesselState::Beside } else { VesselState::Outside };
+        }
     }
 
-    /// Where the tip is as seen from a vessel that it does not pass beside.
+    /// Where the tip is as seen from a vessel that it does not pass beside: in the tick after a layer was touched, gave way or was left.
     #[inline(never)]
     fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
         let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };

@@ -59,12 +59,14 @@ impl Scale {
     }
 }
 
+/// Ticks from one look at the movement to the next.
+pub(crate) const LOOK_TICKS: u32 = 16;
 /// A needle that has not come this far has not changed its direction: 0.25 mm in Q16, more than a hand at rest trembles.
 const TURNED: u32 = 1 << 14;
-/// A needle that has not gone on for this long rests: 0.25 s, with which 0.1 mm/s is still a movement.
-const QUIET_TICKS: u32 = 2_500;
-/// A needle that has not gone on for this long, with 16 µm a count slower than 0.8 mm/s, has stopped …
-const STOPPED_TICKS: u32 = 200;
+/// A needle that has not gone on for this many looks rests: 0.25 s, with which 0.1 mm/s is still a movement.
+const QUIET_LOOKS: u32 = 2_500 / LOOK_TICKS;
+/// A needle that has not gone on for this many looks, 20 ms, with 16 µm a count slower than 0.8 mm/s, has stopped …
+const STOPPED_LOOKS: u32 = 200 / LOOK_TICKS;
 /// … unless it has come back this far by then, in Q16: 0.1 mm.
 const TURNING: u32 = 6_554;
 
@@ -79,35 +81,53 @@ pub(crate) enum Direction {
 
 /// Tells a movement from a rest by the way that the needle goes, not by its speed: one count in a window of the speed is 1.2 mm/s
 /// already, and a hand at rest trembles as fast.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Movement {
     direction: Direction,
+    has_stopped: bool,
     /// The furthest place in this direction; at rest, where the rest began.
     furthest: Millimetres,
-    quiet_ticks: u32,
+    quiet_looks: u32,
+}
+
+impl Default for Movement {
+    fn default() -> Self {
+        Self {
+            direction: Direction::Rests,
+            has_stopped: true,
+            furthest: Millimetres::default(),
+            quiet_looks: 0,
+        }
+    }
 }
 
 impl Movement {
-    /// Whether the needle at `depth`, the place of the last tick, has stopped: earlier than it rests, and not while it turns round.
-    pub(crate) fn has_stopped(&self, depth: Millimetres) -> bool {
-        let back = depth.0.saturating_sub(self.furthest.0).to_bits().unsigned_abs();
-        self.direction == Direction::Rests || self.quiet_ticks > STOPPED_TICKS && back < TURNING
+    /// Where the needle went at the last look.
+    pub(crate) fn direction(&self) -> Direction {
+        self.direction
     }
 
-    /// Follows the tip, a tick later.
-    pub(crate) fn tick(&mut self, depth: Millimetres) -> Direction {
+    /// Whether the needle had stopped by the last look: earlier than it rests, and not while it turns round.
+    pub(crate) fn has_stopped(&self) -> bool {
+        self.has_stopped
+    }
+
+    /// Follows the tip, every [`LOOK_TICKS`].
+    pub(crate) fn look(&mut self, depth: Millimetres) {
         let off = depth.0.saturating_sub(self.furthest.0).to_bits();
         let gone = if self.direction == Direction::Out { off.saturating_neg() } else { off };
-        self.quiet_ticks = self.quiet_ticks.saturating_add(1);
+        self.quiet_looks = self.quiet_looks.saturating_add(1);
         if gone > 0 && self.direction != Direction::Rests {
-            (self.furthest, self.quiet_ticks) = (depth, 0);
+            (self.furthest, self.quiet_looks) = (depth, 0);
         } else if off.unsigned_abs() >= TURNED {
             self.direction = if off > 0 { Direction::In } else { Direction::Out };
-            (self.furthest, self.quiet_ticks) = (depth, 0);
-        } else if self.quiet_ticks == QUIET_TICKS {
+            (self.furthest, self.quiet_looks) = (depth, 0);
+        } else if self.quiet_looks == QUIET_LOOKS {
             (self.direction, self.furthest) = (Direction::Rests, depth);
         }
-        self.direction
+        let is_turning = off.unsigned_abs() >= TURNING;
+        self.has_stopped =
+            self.direction == Direction::Rests || self.quiet_looks > STOPPED_LOOKS && !is_turning;
     }
 }
 
@@ -291,8 +311,11 @@ mod tests {
     fn directions(way: impl Iterator<Item = f64>) -> [usize; 3] {
         let mut movement = Movement::default();
         let mut seen = [0; 3];
-        for mm in way {
-            let place = match movement.tick(Millimetres(I16F16::from_num(mm))) {
+        for (tick, mm) in way.enumerate() {
+            if tick % LOOK_TICKS as usize == 0 {
+                movement.look(Millimetres(I16F16::from_num(mm)));
+            }
+            let place = match movement.direction() {
                 Direction::Rests => 0,
                 Direction::In => 1,
                 Direction::Out => 2,

@@ -131,13 +131,13 @@ impl Memory {
         _: &FrictionLaw,
         forces: &Plan,
         met: &Insertion,
-        Motion { depth, direction, .. }: Motion,
+        Motion { depth, movement, .. }: Motion,
     ) -> Response {
         self.heal(met.given());
         let walls = self.walls(forces, met, depth);
         let friction = self.friction(forces, met, depth);
         let state = match friction {
-            Some(_) if direction == Direction::Out => State::Withdrawal,
+            Some(_) if movement.direction() == Direction::Out => State::Withdrawal,
             _ if walls.pressing => State::Elastic,
             Some(_) if walls.past_vertex < I16F16::ZERO => State::Puncture,
             Some(_) => State::Friction,

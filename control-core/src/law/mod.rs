@@ -4,7 +4,7 @@
 
 use crate::anatomy::Insertion;
 use crate::event::State;
-use crate::kinematics::Direction;
+use crate::kinematics::Movement;
 use crate::math::truncating_product;
 use crate::passivity::Elements;
 use crate::refusal::Refusal;
@@ -15,13 +15,11 @@ use serde::{Deserialize, Serialize};
 
 /// How the needle moves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Motion {
+pub(crate) struct Motion<'a> {
     /// Of the tip along the needle.
     pub(crate) depth: Millimetres,
     pub(crate) speed: MillimetresPerSecond,
-    pub(crate) direction: Direction,
-    /// It has stopped just now, or rests.
-    pub(crate) has_stopped: bool,
+    pub(crate) movement: &'a Movement,
 }
 
 /// A layer as the needle meets it.

@@ -171,7 +171,7 @@ impl Memory {
         config: &Sparte,
         plan: &Plan,
         met: &Insertion,
-        Motion { depth, speed, direction, has_stopped }: Motion,
+        Motion { depth, speed, movement }: Motion,
     ) -> Response {
         let step =
             depth.0.to_bits().wrapping_sub(self.last_depth.0.to_bits()).clamp(-LARGEST_STEP, LARGEST_STEP);
@@ -195,14 +195,14 @@ impl Memory {
             self.wall.release(Millimetres(depth.0.saturating_sub(reach(left.0, plan.inverse_tracking))));
         }
         self.given = met.given();
-        let (cutting, is_full) = self.track(config, plan, cut, elastic, (depth, has_stopped));
+        let (cutting, is_full) = self.track(config, plan, cut, elastic, (depth, movement.has_stopped()));
         let friction = self.rub(&plan.rub, step, speed);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
-        let state = if direction == Direction::Out {
+        let state = if movement.direction() == Direction::Out {
             State::Withdrawal
         } else if pressed.is_some() {
             State::Elastic
-        } else if !is_full && direction == Direction::In {
+        } else if !is_full && movement.direction() == Direction::In {
             State::Puncture
         } else {
             State::Friction

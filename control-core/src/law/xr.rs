@@ -9,14 +9,17 @@
 //! drawn back: there the force is held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it
 //! outwards.
 
+mod cells;
 mod check;
+
+use cells::{Cells, Gaps};
 
 use super::{Ground, Motion, Response, reach};
 use crate::anatomy::Insertion;
 use crate::event::State;
 use crate::interpolator::Interpolator;
 use crate::kinematics::Direction;
-use crate::math::{saturating_multiply, share, truncating_product};
+use crate::math::{saturating_multiply, share, truncating_product, upper_half};
 use crate::passivity::Elements;
 use crate::proxy::Anchor;
 use crate::refusal::Refusal;
@@ -73,9 +76,8 @@ pub(crate) struct Plan {
     /// How many depths a knot has, and how many further the next cell's is.
     depth_row: usize,
     depth_cell: usize,
-    /// One over the gap from each knot to the next, Q24.
-    per_speed: [i32; MAX_SPEEDS],
-    per_angle: [i32; MAX_ANGLES],
+    cells: usize,
+    gaps: Gaps,
     ruptures: Vec<Rupture, MAX_LAYERS>,
     inverse_stiffness: I16F16,
     walls_that_close: usize,
@@ -108,69 +110,6 @@ impl Position {
     }
 }
 
-/// Between knot `index` and the next, and how far: Q16.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    index: usize,
-    next: usize,
-    share: i32,
-}
-
-/// The four cells around a speed and an angle.
-#[derive(Clone, Copy, Debug)]
-struct Cells {
-    speed: Place,
-    angle: Place,
-    angles: usize,
-    /// How many there are in all.
-    count: usize,
-}
-
-impl Cells {
-    /// What lies between the cells' values.
-    fn mix(self, value: impl Fn(usize) -> i32) -> i32 {
-        let across = |speed: usize| {
-            let row = speed * self.angles;
-            between(value(row + self.angle.index), value(row + self.angle.next), self.angle.share)
-        };
-        between(across(self.speed.index), across(self.speed.next), self.speed.share)
-    }
-
-    /// Whether all cells that count were measured: a bit each.
-    fn are_measured(self, measured: u16) -> bool {
-        let is = |speed: usize, angle: usize| measured >> (speed * self.angles + angle) & 1 == 1;
-        let row = |speed: usize| {
-            is(speed, self.angle.index) && (self.angle.share == 0 || is(speed, self.angle.next))
-        };
-        row(self.speed.index) && (self.speed.share == 0 || row(self.speed.next))
-    }
-}
-
-/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing lies beyond it.
-fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N] {
-    let mut gaps = [0; N];
-    for (gap, (from, to)) in gaps.iter_mut().zip(knots.clone().zip(knots.skip(1))) {
-        *gap = ((1_i64 << 40) / i64::from((to - from).max(1))) as i32;
-    }
-    gaps
-}
-
-/// Where `at` lies among `knots` in Q16.
-fn place(knots: impl Iterator<Item = i32>, per_gap: &[i32], at: i32) -> Place {
-    let mut place = Place { index: 0, next: 0, share: 0 };
-    let mut count = 0;
-    for (knot, per_gap) in knots.zip(per_gap) {
-        count += 1;
-        if at < knot {
-            break;
-        }
-        let share = ((i64::from(at) - i64::from(knot)) * i64::from(*per_gap)) >> 24;
-        place = Place { index: count - 1, next: 0, share: share.min(1 << 16) as i32 };
-    }
-    // The walk ends at the knot beyond, where there is one.
-    Place { next: (place.index + 1).min(count - 1), ..place }
-}
-
 impl ForceTable {
     /// The table has its walls in it.
     pub(crate) fn hold(&self) -> I16F16 {
@@ -180,14 +119,6 @@ impl ForceTable {
     /// Speeds and angles together.
     fn cells(&self) -> usize {
         self.speeds.len() * self.angles.len()
-    }
-
-    fn speed_knots(&self) -> impl Iterator<Item = i32> + Clone {
-        self.speeds.iter().map(|speed| speed.0.to_bits())
-    }
-
-    fn angle_knots(&self) -> impl Iterator<Item = i32> + Clone {
-        self.angles.iter().map(|angle| i32::from(angle.0) << 16)
     }
 }
 
@@ -204,8 +135,8 @@ impl Plan {
             knots,
             depth_row: if in_each { cells } else { 1 },
             depth_cell: usize::from(in_each),
-            per_speed: per_gap(table.speed_knots()),
-            per_angle: per_gap(table.angle_knots()),
+            cells,
+            gaps: Gaps::new(table),
             ruptures: Vec::new(),
             inverse_stiffness: I16F16::ONE.saturating_div(table.stiffness.0),
             walls_that_close: usize::from(has_wall),
@@ -235,22 +166,14 @@ impl Plan {
         table.depths.get(index).copied().map_or(0, i32::from)
     }
 
-    /// The cells around a speed in mm/s and an angle in mrad, Q16.
-    fn cells(&self, table: &ForceTable, speed: i32, angle: i32) -> Cells {
-        Cells {
-            speed: place(table.speed_knots(), &self.per_speed, speed),
-            angle: place(table.angle_knots(), &self.per_angle, angle),
-            angles: table.angles.len(),
-            count: table.cells(),
-        }
-    }
-
-    /// Where among the knots of these cells a depth lies: knot and share, Q16. It is looked for from `near` on, a knot a tick: a needle
-    /// that goes faster than a knot a tick trips the device.
-    fn position(&self, table: &ForceTable, cells: Cells, near: usize, depth: I16F16) -> Position {
-        // 0.01 mm in Q12: beyond the table's deepest knot, nothing changes.
-        let depth = ((i64::from(depth.to_bits().min(DEEPEST)) * 100) >> 4) as i32;
-        let at = |knot: usize| cells.mix(|cell| self.depth(table, knot, cell) << 12);
+    /// Where among the knots of these cells a depth lies. It is looked for from `near` on, a knot a tick: a needle that goes faster
+    /// than a knot a tick trips the device.
+    fn position(&self, table: &ForceTable, cells: &Cells, near: usize, depth: I16F16) -> Position {
+        // 0.01 mm in Q16: beyond the table's deepest knot, nothing changes.
+        let depth = depth.to_bits().min(DEEPEST) * 100;
+        let at = |knot: usize| {
+            cells.mix(table.depths.get(knot * self.depth_row..).unwrap_or_default(), self.depth_cell)
+        };
         let last = self.knots.saturating_sub(1);
         let (from, to) = (at(near), at((near + 1).min(last)));
         if depth < from {
@@ -263,16 +186,15 @@ impl Plan {
     }
 
     /// The force of `forces` at `position`.
-    fn force(&self, forces: &[u16], cells: Cells, position: Position) -> I16F16 {
-        let at = |knot: usize| {
-            cells.mix(|cell| forces.get(knot * cells.count + cell).copied().map_or(0, i32::from) << 12)
-        };
+    fn force(&self, forces: &[u16], cells: &Cells, position: Position) -> I16F16 {
+        let at = |knot: usize| cells.mix(forces.get(knot * self.cells..).unwrap_or_default(), 1);
         let next = (position.knot + 1).min(self.knots.saturating_sub(1));
         let millinewtons = between(at(position.knot), at(next), position.share);
-        // mN in Q12 to N in Q16: by 16/1000, 0.016 in Q26.
-        I16F16::from_bits(truncating_product(millinewtons, 1_073_742, 26))
+        // mN to N: by 0.001 in Q40.
+        I16F16::from_bits(upper_half(millinewtons, 1_099_511_628) >> 8)
     }
 }
+
 fn between(from: i32, to: i32, share_q16: i32) -> i32 {
     from + truncating_product(to - from, share_q16, 16)
 }
@@ -332,6 +254,7 @@ pub(crate) struct Memory {
     /// w.
     anchor: Anchor,
     way: Interpolator,
+    cells: Cells,
     /// The knot that the tip was at.
     knot: usize,
     track: Track,
@@ -344,9 +267,10 @@ impl Memory {
         table: &ForceTable,
         plan: &Plan,
         met: &Insertion,
-        Motion { depth, speed, direction, .. }: Motion,
+        Motion { depth, speed, movement }: Motion,
     ) -> Response {
         let (fine, steady) = self.way.tick(depth, speed, plan.count);
+        self.cells.follow(table, &plan.gaps, steady, met.angle());
         if depth.0 < met.top(0) {
             self.anchor.release(fine);
             if depth.0 < met.top(0).saturating_sub(ANOTHER_ENTRY) {
@@ -356,12 +280,11 @@ impl Memory {
         }
         let along = fine.0.saturating_sub(met.top(0)).max(I16F16::ZERO);
         let inside = truncating_product(along.to_bits(), met.depth_per_path().to_bits(), 30);
-        let cells = plan.cells(table, steady.0.saturating_abs().to_bits(), i32::from(met.angle().0) << 16);
-        let position = plan.position(table, cells, self.knot, I16F16::from_bits(inside));
+        let position = plan.position(table, &self.cells, self.knot, I16F16::from_bits(inside));
         self.knot = position.knot;
         let ruptured = self.track.follow(plan, position.q16(), along, met.angle());
         let is_in_track = position.q16() < self.track.front;
-        let most = plan.force(if is_in_track { &plan.hull } else { &table.forces }, cells, position);
+        let most = plan.force(if is_in_track { &plan.hull } else { &table.forces }, &self.cells, position);
         let has_opened = plan.ruptures.is_empty() || self.track.given > 0;
         let is_inside = met.given() >= plan.walls_that_close && has_opened;
         // A wall that has not given way pushes back and does not hold.
@@ -369,7 +292,7 @@ impl Memory {
         let least = I16F16::from_bits(truncating_product(most.to_bits(), share.to_bits(), 16));
         self.anchor.drag(fine, reach(most, plan.inverse_stiffness), reach(least, plan.inverse_stiffness));
         let force = saturating_multiply(self.anchor.stretch(fine), table.stiffness.0);
-        let state = if is_inside && direction == Direction::Out {
+        let state = if is_inside && movement.direction() == Direction::Out {
             State::Withdrawal
         } else if !is_in_track && self.falls(plan, position) {
             State::Puncture
@@ -385,7 +308,7 @@ impl Memory {
         } else {
             Elements { walls: Newtons(force), ..Elements::NONE }
         };
-        let estimated = !cells.are_measured(table.measured);
+        let estimated = self.cells.is_estimated();
         Response { force, state, estimated, ruptured, open: self.track.open, ..Response::NONE }
     }
 
