@@ -43,6 +43,8 @@ pub(crate) struct Layer {
     pub(crate) walls_above: usize,
     /// It begins with a wall that gives way.
     pub(crate) has_wall: bool,
+    /// A bit where the law of force decides that it gives way, else nothing.
+    pub(crate) opens: u8,
 }
 
 /// The travel at which a wall gives way, and its springing back.
@@ -67,12 +69,14 @@ pub(crate) struct Passage {
     pub(crate) layer: usize,
     /// The number of walls that have given way.
     pub(crate) given: usize,
+    /// A bit of the layers that have given way by the law of force, or nothing.
+    pub(crate) opens: u8,
 }
 
 impl Passage {
     /// Past layer number `layer`, which is `met`.
     pub(crate) fn of(layer: usize, met: &Layer) -> Self {
-        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 } }
+        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 }, opens: met.opens }
     }
 }
 
@@ -146,6 +150,12 @@ pub(crate) struct Insertion {
     is_pressing: bool,
     /// Along the needle, where the tip passes beside the vessel.
     beside: I16F16,
+    /// A bit for each layer that has given way by the law of force.
+    open: u8,
+    /// A bit for each layer that was touched, gave way or was left in this tick; the vessel is looked at for them in the next.
+    happened: u8,
+    /// The same of this tick and the one before.
+    busy: u8,
     vessel: VesselState,
 }
 
@@ -167,6 +177,9 @@ impl Insertion {
             is_springing_back: false,
             is_pressing: false,
             beside: I16F16::MAX,
+            open: 0,
+            happened: 0,
+            busy: 0,
             vessel: VesselState::Outside,
         };
         insertion.turn_at_once(anatomy);
@@ -226,6 +239,24 @@ impl Insertion {
         above.iter().rposition(|&top| depth.0 >= top).unwrap_or(0)
     }
 
+    /// A bit for each layer that has given way by the law of force.
+    pub(crate) fn opened(&self) -> u8 {
+        self.open
+    }
+
+    /// The law of force says which layers have given way: a bit each. What it means for the vessel is seen in the next tick.
+    pub(crate) fn open(&mut self, open: u8) {
+        let changed = open ^ self.open;
+        self.happened |= changed;
+        self.busy |= changed;
+        self.open = open;
+    }
+
+    /// True in a tick in which a layer is touched, gives way or is left, and in the next one, in which the vessel is looked at.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.busy != 0
+    }
+
     /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
     pub(crate) fn begin(&mut self) {
         self.is_new = true;
@@ -242,7 +273,13 @@ impl Insertion {
         let puncture = self.puncture(anatomy, depth);
         let mut transitions = Transitions { puncture, ..self.cross_layer(anatomy, depth) };
         self.is_pressing = anatomy.walls.get(self.given).is_some_and(|wall| wall.layer < self.touched);
-        self.watch_vessel(anatomy, depth, &mut transitions);
+        let happened = transitions.contact | transitions.puncture | transitions.exit;
+        let due = core::mem::replace(&mut self.happened, happened);
+        self.busy = due | happened;
+        if due != 0 {
+            self.look_at_vessel(anatomy, &mut transitions);
+        }
+        self.pass_beside(anatomy, depth);
         transitions
     }
 
@@ -382,26 +419,30 @@ impl Insertion {
         anatomy.layers.get(wall.layer).map_or(0, |layer| 1 << layer.number)
     }
 
-    fn watch_vessel(&mut self, anatomy: &Anatomy, depth: Millimetres, transitions: &mut Transitions) {
-        let state = match anatomy.vessel {
-            None => return,
-            Some(Vessel::Beside { .. }) if depth.0 >= self.beside => VesselState::Beside,
-            Some(Vessel::Beside { .. }) => VesselState::Outside,
-            Some(Vessel::Met { .. }) if transitions.is_empty() => return,
-            Some(Vessel::Met { near, far }) => {
-                let is_past = |wall: Passage| self.touched > wall.layer && self.given >= wall.given;
-                if far.is_some_and(is_past) {
-                    VesselState::Through
-                } else if is_past(near) {
-                    VesselState::InLumen
-                } else if self.touched > near.layer {
-                    VesselState::Touching
-                } else {
-                    VesselState::Outside
-                }
-            }
+    /// Whether the needle passes beside the vessel.
+    fn pass_beside(&mut self, anatomy: &Anatomy, depth: Millimetres) {
+        if let Some(Vessel::Beside { .. }) = anatomy.vessel {
+            self.vessel = if depth.0 >= self.beside { VesselState::Beside } else { VesselState::Outside };
+        }
+    }
+
+    /// Where the tip is as seen from a vessel that it does not pass beside: in the tick after a layer was touched, gave way or was left.
+    #[inline(never)]
+    fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
+        let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };
+        let is_past = |wall: Passage| {
+            self.touched > wall.layer && self.given >= wall.given && self.open & wall.opens == wall.opens
         };
-        transitions.flashback = state == VesselState::InLumen && self.vessel != VesselState::InLumen;
+        let state = if far.is_some_and(is_past) {
+            VesselState::Through
+        } else if is_past(near) {
+            VesselState::InLumen
+        } else if self.touched > near.layer {
+            VesselState::Touching
+        } else {
+            VesselState::Outside
+        };
+        transitions.flashback |= state == VesselState::InLumen && self.vessel != VesselState::InLumen;
         self.vessel = state;
     }
 }

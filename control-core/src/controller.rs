@@ -6,7 +6,7 @@ use crate::compensation::Gains;
 use crate::compensation::feedforward::{Feedforward, Here};
 use crate::event::{Fault, Limits, State, Transitions, VesselState};
 use crate::excitation::{Excitation, Player};
-use crate::kinematics::{SpeedEstimator, Withdrawal, moved};
+use crate::kinematics::{self, Movement, SpeedEstimator, moved};
 use crate::law::{Memory, Motion, Response};
 use crate::math::{saturating_multiply, truncating_product};
 use crate::passivity::{Elements, Observer};
@@ -112,7 +112,7 @@ pub struct Controller {
     origin: Counts,
     previous: Option<Counts>,
     speed: SpeedEstimator,
-    withdrawal: Withdrawal,
+    movement: Movement,
     insertion: Insertion,
     memory: Memory,
     observer: Observer,
@@ -159,7 +159,7 @@ impl Controller {
         feedforward.set_gains(plan.device().compensation.gains);
         Self {
             speed: SpeedEstimator::new(plan.config.device.speed, Counts(0)),
-            withdrawal: Withdrawal::default(),
+            movement: Movement::default(),
             insertion: Insertion::new(&plan.anatomy),
             memory: plan.law.memory(),
             plan,
@@ -270,7 +270,7 @@ impl Controller {
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
         self.turn = (self.turn + 1) % anatomy::LOOK_TICKS;
-        let (transitions, tissue) = self.meet(input.tilt, count, depth, speed);
+        let (transitions, tissue) = self.meet(input.tilt, depth, speed);
         let angle = self.insertion.angle();
         self.watch_host();
         let has_given_way = transitions.puncture != 0;
@@ -291,9 +291,9 @@ impl Controller {
             // Always at its time, for speeds are taken from it.
             self.runaway.take(count.0, torque.0);
             self.look_at_stillness();
-        } else if transitions.is_empty() {
+        } else if !self.insertion.is_busy() {
             // A tick in which a layer is touched, gives way or is left is long enough.
-            self.take_turn(input.tilt);
+            self.take_turn(input.tilt, depth);
         }
         let codes = self.plan.dac.codes(torque);
         let state = match self.mode {
@@ -325,12 +325,18 @@ impl Controller {
 
     /// What is slow enough to be done in one tick of eight or sixteen, each in another one.
     #[inline(never)]
-    fn take_turn(&mut self, tilt: Milliradians) {
+    fn take_turn(&mut self, tilt: Milliradians, depth: Millimetres) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };
-        const { assert!(anatomy::LOOK_TICKS == 16 && stillness::LOOK_TICKS == 8, "the turns below") };
+        const {
+            assert!(
+                kinematics::LOOK_TICKS == 16 && anatomy::LOOK_TICKS == 16 && stillness::LOOK_TICKS == 8,
+                "the turns below"
+            )
+        };
         let fault = match self.turn {
             0 | 8 => return self.winding.warm(&self.plan.thermal),
-            2 | 10 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
+            2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
+            10 => return self.movement.look(depth),
             3 => return self.insertion.look(&self.plan.anatomy, tilt),
             1 | 9 | 11 => return self.insertion.turn(&self.plan.anatomy),
             5 | 13 => self.runaway.look(&self.plan.runaway),
@@ -351,7 +357,6 @@ impl Controller {
     fn meet(
         &mut self,
         tilt: Milliradians,
-        count: Counts,
         depth: Millimetres,
         speed: MillimetresPerSecond,
     ) -> (Transitions, Response) {
@@ -364,10 +369,14 @@ impl Controller {
         let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
         let response = {
             let (law, plan) = (&self.plan.config.patient.law, &self.plan.law);
-            let withdraws = self.withdrawal.tick(&self.plan.scale, count, speed);
-            self.memory.tick(law, plan, &self.insertion, Motion { depth, speed, withdraws })
+            self.memory.tick(law, plan, &self.insertion, Motion { depth, speed, movement: &self.movement })
         };
         transitions.barrier = response.barrier;
+        if response.open | self.insertion.opened() != 0 {
+            transitions.in_track = transitions.contact & response.open;
+            transitions.puncture |= response.ruptured;
+            self.insertion.open(response.open);
+        }
         (transitions, response)
     }
 

@@ -209,6 +209,8 @@ pub struct Transitions {
     pub flashback: bool,
     /// The needle has just been turned further than the tissue around it lets it.
     pub barrier: bool,
+    /// Of the layers in `contact`, those that had given way before: the tip is in its own track.
+    pub in_track: u8,
 }
 
 impl Transitions {

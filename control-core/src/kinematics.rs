@@ -59,31 +59,75 @@ impl Scale {
     }
 }
 
-/// Slower than this the needle rests. 1 mm/s.
-pub(crate) const REST_SPEED: I16F16 = I16F16::from_bits(1 << 16);
+/// Ticks from one look at the movement to the next.
+pub(crate) const LOOK_TICKS: u32 = 16;
+/// A needle that has not come this far has not changed its direction: 0.25 mm in Q16, more than a hand at rest trembles.
+const TURNED: u32 = 1 << 14;
+/// A needle that has not gone on for this many looks rests: 0.25 s, with which 0.1 mm/s is still a movement.
+const QUIET_LOOKS: u32 = 2_500 / LOOK_TICKS;
+/// A needle that has not gone on for this many looks, 20 ms, with 16 µm a count slower than 0.8 mm/s, has stopped …
+const STOPPED_LOOKS: u32 = 200 / LOOK_TICKS;
+/// … unless it has come back this far by then, in Q16: 0.1 mm.
+const TURNING: u32 = 6_554;
 
-/// Detects that the needle is being drawn out: fast enough, and by at least two counts. The speed alone says less, for one count in a
-/// window is faster than [`REST_SPEED`] already, and a needle at rest between two counts shows now one and now the other.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Withdrawal {
-    /// The place where it last rested or went inwards.
-    deepest: Counts,
-    is_on: bool,
+/// Where the needle goes, for the state that is reported.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Direction {
+    #[default]
+    Rests,
+    In,
+    Out,
 }
 
-impl Withdrawal {
-    /// Follows the tip, a tick later.
-    pub(crate) fn tick(&mut self, scale: &Scale, count: Counts, speed: MillimetresPerSecond) -> bool {
-        if self.is_on {
-            // Slower than half a count in a window is rest again.
-            self.is_on = speed.0.to_bits() < -(scale.window_speed_per_count.to_bits() >> 9);
-        } else {
-            if speed.0 >= -REST_SPEED {
-                self.deepest = count;
-            }
-            self.is_on = moved(count, self.deepest).0 >= 2;
+/// Tells a movement from a rest by the way that the needle goes, not by its speed: one count in a window of the speed is 1.2 mm/s
+/// already, and a hand at rest trembles as fast.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Movement {
+    direction: Direction,
+    has_stopped: bool,
+    /// The furthest place in this direction; at rest, where the rest began.
+    furthest: Millimetres,
+    quiet_looks: u32,
+}
+
+impl Default for Movement {
+    fn default() -> Self {
+        Self {
+            direction: Direction::Rests,
+            has_stopped: true,
+            furthest: Millimetres::default(),
+            quiet_looks: 0,
         }
-        self.is_on
+    }
+}
+
+impl Movement {
+    /// Where the needle went at the last look.
+    pub(crate) fn direction(&self) -> Direction {
+        self.direction
+    }
+
+    /// Whether the needle had stopped by the last look: earlier than it rests, and not while it turns round.
+    pub(crate) fn has_stopped(&self) -> bool {
+        self.has_stopped
+    }
+
+    /// Follows the tip, every [`LOOK_TICKS`].
+    pub(crate) fn look(&mut self, depth: Millimetres) {
+        let off = depth.0.saturating_sub(self.furthest.0).to_bits();
+        let gone = if self.direction == Direction::Out { off.saturating_neg() } else { off };
+        self.quiet_looks = self.quiet_looks.saturating_add(1);
+        if gone > 0 && self.direction != Direction::Rests {
+            (self.furthest, self.quiet_looks) = (depth, 0);
+        } else if off.unsigned_abs() >= TURNED {
+            self.direction = if off > 0 { Direction::In } else { Direction::Out };
+            (self.furthest, self.quiet_looks) = (depth, 0);
+        } else if self.quiet_looks == QUIET_LOOKS {
+            (self.direction, self.furthest) = (Direction::Rests, depth);
+        }
+        let is_turning = off.unsigned_abs() >= TURNING;
+        self.has_stopped =
+            self.direction == Direction::Rests || self.quiet_looks > STOPPED_LOOKS && !is_turning;
     }
 }
 
@@ -235,6 +279,7 @@ pub(crate) fn mm_per_count(roller_radius: Millimetres, counts_per_turn: u16) -> 
 }
 
 #[cfg(test)]
+#[expect(clippy::indexing_slicing, reason = "a test")]
 mod tests {
     use super::*;
     use heapless::Vec;
@@ -260,6 +305,43 @@ mod tests {
         let scale = Scale::new(I2F30::ONE / 64);
         let mut estimator = SpeedEstimator::new(SpeedMethod::EdgeTiming, Counts(0));
         counts.into_iter().map(move |count| estimator.tick(&scale, Counts(count)).0.to_num())
+    }
+
+    /// Directions that are seen on a way, in mm for each tick.
+    fn directions(way: impl Iterator<Item = f64>) -> [usize; 3] {
+        let mut movement = Movement::default();
+        let mut seen = [0; 3];
+        for (tick, mm) in way.enumerate() {
+            if tick % LOOK_TICKS as usize == 0 {
+                movement.look(Millimetres(I16F16::from_num(mm)));
+            }
+            let place = match movement.direction() {
+                Direction::Rests => 0,
+                Direction::In => 1,
+                Direction::Out => 2,
+            };
+            seen[place] += 1;
+        }
+        seen
+    }
+
+    #[test]
+    fn a_trembling_hand_that_holds_still_rests() {
+        // 0.08 mm at 10 Hz is up to 5 mm/s.
+        let tremor = |tick: u32| 0.08 * (f64::from(tick) * 0.006_283).sin();
+        assert_eq!(directions((0..100_000).map(tremor)), [100_000, 0, 0]);
+        // In at 3 mm/s, then held: a quarter of a second later it rests, for good.
+        let held = directions((0..50_000).map(|tick| 3e-4 * f64::from(tick.min(10_000)) + tremor(tick)));
+        assert!(held[0] > 35_000 && held[2] == 0, "{held:?}");
+    }
+
+    #[test]
+    fn a_slow_way_is_a_movement_in_its_direction() {
+        // 0.2 mm/s in counts of 16 µm, in and then out.
+        let count = |mm: f64| (mm / 0.016).floor() * 0.016;
+        let way = (0..200_000).map(|tick| count(2e-5 * f64::from(100_000 - (tick - 100_000_i32).abs())));
+        let seen = directions(way);
+        assert!(seen[1] > 80_000 && seen[2] > 80_000 && seen[0] < 30_000, "{seen:?}");
     }
 
     #[test]

@@ -26,6 +26,7 @@ pub mod event;
 pub mod excitation;
 pub mod friction;
 pub mod interlock;
+mod interpolator;
 pub mod kinematics;
 mod law;
 mod math;

@@ -66,9 +66,10 @@ impl Plan {
             travel: device.limits.travel.0,
             largest: largest_asked(config),
             stiffest: stiffest(config),
+            count: I16F16::saturating_from_num(mm_per_count),
         };
         let law = law::Plan::new(&patient.law, &ground)?;
-        let anatomy = layers::plan(config, &met);
+        let anatomy = layers::plan(config, &met, law.ruptures());
         let lever = device.roller_radius.0.saturating_mul(patient.scale);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;
         Ok(Self {

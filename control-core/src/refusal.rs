@@ -167,6 +167,8 @@ pub enum Field {
     TableSpeed,
     TableAngle,
     TableForce,
+    TableRupture,
+    AfterPuncture,
     VesselWidth,
     VesselOffset,
     CompensationVersion,

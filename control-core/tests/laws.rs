@@ -82,21 +82,20 @@ fn a_wall_is_pressed_then_gives_way_then_rubs() {
 }
 
 #[test]
-fn a_needle_drawn_back_slowly_is_not_withdrawn_yet() {
-    // From edges, for one count in a window is faster already.
-    let mut c = started(&Config {
-        device: Device { speed: SpeedMethod::EdgeTiming, ..Device::commissioned_virtual() },
-        ..Config::commissioned_virtual()
-    });
-    let mut at = 0.0;
-    travel(&mut c, &mut at, 7.7, 10.0, |_| ());
-    let mut drawn_back_at = |mm_per_s: f64| {
-        let (mut last, mm) = (State::Approach as u8, at - 1.0);
-        travel(&mut c, &mut at, mm, mm_per_s, |out| last = out.sample.state);
-        last
-    };
-    assert_eq!(drawn_back_at(0.7), State::Friction as u8);
-    assert_eq!(drawn_back_at(1.5), State::Withdrawal as u8);
+fn a_quarter_of_a_mm_back_is_a_withdrawal_however_slow() {
+    for speed in [SpeedMethod::Window, SpeedMethod::EdgeTiming] {
+        let device = Device { speed, ..Device::commissioned_virtual() };
+        let mut c = started(&Config { device, ..Config::commissioned_virtual() });
+        let mut at = 0.0;
+        travel(&mut c, &mut at, 7.7, 10.0, |_| ());
+        let mut drawn_back_by = |mm: f64, mm_per_s: f64| {
+            let (mut last, to) = (State::Approach as u8, at - mm);
+            travel(&mut c, &mut at, to, mm_per_s, |out| last = out.sample.state);
+            last
+        };
+        assert_eq!(drawn_back_by(0.2, 1.5), State::Friction as u8, "{speed:?}");
+        assert_eq!(drawn_back_by(0.4, 0.3), State::Withdrawal as u8, "{speed:?}");
+    }
 }
 
 #[test]

@@ -67,6 +67,7 @@ fn shoulder() -> Config {
     config.patient.law = Law::Sparte(Sparte {
         tracking: Stiffness(q(1.0)),
         relax_ms: 300,
+        after_puncture: q(0.6),
         cutting: cutting
             .iter()
             .map(|&force| Cutting { inwards: n(force), outwards: n(force * 0.3) })
@@ -104,6 +105,10 @@ struct Twin {
     wall: f64,
     bristles: f64,
     last: f64,
+    /// Ticks since the needle last went on in its direction; the furthest place; in 1, out −1, at rest 0.
+    still: u32,
+    furthest: f64,
+    direction: f64,
 }
 
 impl Twin {
@@ -121,12 +126,30 @@ impl Twin {
             wall: 0.0,
             bristles: 0.0,
             last: 0.0,
+            still: 0,
+            furthest: 0.0,
+            direction: 0.0,
+        }
+    }
+
+    /// A quarter of a mm is a new direction, a quarter of a second without going on a rest.
+    fn follow(&mut self, x: f64) {
+        let off = x - self.furthest;
+        self.still += 1;
+        if off * self.direction > 0.0 {
+            (self.furthest, self.still) = (x, 0);
+        } else if off.abs() >= 0.25 {
+            (self.direction, self.furthest, self.still) = (off.signum(), x, 0);
+        } else if self.still == 2_500 {
+            (self.direction, self.furthest) = (0.0, x);
         }
     }
 
     fn tick(&mut self, out: &TickOutput) -> f64 {
         let (x, v) = (out.depth.0.to_num::<f64>(), out.speed.0.to_num::<f64>());
         let step = x - std::mem::replace(&mut self.last, x);
+        self.follow(x);
+        let given = self.given;
         self.given += out.transitions.puncture.count_ones() as usize;
         if out.transitions.contact != 0 {
             // Late where the wall above carried it along.
@@ -151,17 +174,22 @@ impl Twin {
         }
         let innermost = self.tops[..self.touched].iter().rposition(|&top| x >= top).unwrap_or(0);
         let cut = self.sparte.cutting[innermost];
-        elastic + self.track(cut, elastic, x, v) + self.rub(step, v)
+        if self.given > given {
+            let left = cut.inwards.0.to_num::<f64>() * self.sparte.after_puncture.to_num::<f64>();
+            self.wall = x - left / self.sparte.tracking.0.to_num::<f64>();
+        }
+        elastic + self.track(cut, elastic, x) + self.rub(step, v)
     }
 
-    fn track(&mut self, cut: Cutting, elastic: f64, x: f64, v: f64) -> f64 {
+    fn track(&mut self, cut: Cutting, elastic: f64, x: f64) -> f64 {
         let stiffness = self.sparte.tracking.0.to_num::<f64>();
         let inwards = (cut.inwards.0.to_num::<f64>() - elastic).max(0.0) / stiffness;
         let outwards = cut.outwards.0.to_num::<f64>() / stiffness;
         self.wall = self.wall.max(x - inwards).min(x + outwards);
         let held = self.sparte.friction.sliding.0.to_num::<f64>() / stiffness;
         let stretch = x - self.wall;
-        if v.abs() < 1.0 && stretch.abs() > held {
+        let has_stopped = self.direction == 0.0 || self.still > 200 && (x - self.furthest).abs() < 0.1;
+        if has_stopped && stretch.abs() > held {
             let share = -(-0.1 / f64::from(self.sparte.relax_ms)).exp_m1();
             self.wall += (stretch - held * stretch.signum()) * share;
         }
@@ -194,19 +222,53 @@ fn every_layer_is_cut_at_the_force_of_the_paper() {
 }
 
 #[test]
-fn a_wall_gives_way_with_a_sharp_drop() {
+fn a_wall_gives_way_to_less_than_the_cutting_force() {
     let mut needle = Needle::new(&shoulder(), STRAIGHT);
-    let (mut before, mut after, mut peak) = (0.0, 0.0, 0.0_f64);
-    needle.go(3.2, 10.0, |out| {
-        if out.transitions.puncture == 1 {
-            after = force(out);
-        } else if after == 0.0 {
+    let (mut before, mut least, mut most) = (0.0, f64::MAX, 0.0_f64);
+    let mut has_given_way = false;
+    needle.go(4.0, 10.0, |out| {
+        has_given_way |= out.transitions.puncture == 1;
+        if has_given_way {
+            least = least.min(force(out));
+            most = most.max(force(out));
+        } else {
             before = force(out);
         }
-        peak = peak.max(force(out));
     });
     assert!((before - 1.2).abs() < 0.02, "{before} N before the skin gave way");
-    assert!(after < 0.1, "{after} N right after");
+    // 0.6 of the fat's 1.5 N, for the tip is in it when the skin has sprung back; then cutting and friction come up.
+    assert!((0.88..0.98).contains(&least), "{least} N after it");
+    assert!(most > 1.5, "{most} N while cutting");
+}
+
+#[test]
+fn the_wall_relaxes_in_the_time_that_the_profile_says() {
+    for relax_ms in [100_u16, 300, 1_000] {
+        let mut config = shoulder();
+        sparte(&mut config).relax_ms = relax_ms;
+        let mut needle = Needle::new(&config, STRAIGHT);
+        needle.go(15.0, 10.0, |_| ());
+        let (moving, held) = (force(&needle.tick()), 0.6);
+        let seconds = f64::from(relax_ms) * 1e-3;
+        let left = force(&needle.rest(seconds)) - held;
+        // The time constant: 1/e is left, with the 20 ms in which a stop is told.
+        let late = 0.02;
+        let wanted = (moving - held) * (-(seconds - late) / seconds).exp();
+        assert!((left - wanted).abs() < 0.05 * (moving - held), "{relax_ms} ms: {left} N left, not {wanted}");
+    }
+}
+
+#[test]
+fn a_trembling_hand_that_rests_reads_as_friction() {
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
+    needle.go(15.0, 10.0, |_| ());
+    needle.rest(0.5);
+    let at = needle.at_mm;
+    for tick in 0..30_000 {
+        needle.at_mm = at + 0.08 * (f64::from(tick) * 0.006_283).sin();
+        let state = needle.tick().sample.state;
+        assert_eq!(state, State::Friction as u8, "tick {tick}");
+    }
 }
 
 #[test]

@@ -23,6 +23,7 @@ export function words(event, layers) {
     case "puncture": return `${capital(name)} punctured${where(event, true)}`;
     case "flashback": return "Flashback: blood shows in the hub";
     case "far_wall": return "Through the far wall of the vessel";
+    case "in_track": return `Through ${article(name)} in the needle's own track`;
     case "barrier": return "Turned further than the tissue allows";
     case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
     case "exit": return `Needle out of ${article(name)}`;

@@ -43,7 +43,7 @@ export class Picture {
   /** Follows an event of the device. */
   happen(event) {
     if (event.layer === null || event.layer === undefined) return;
-    if (["puncture", "vessel", "far_wall", "flashback"].includes(event.kind)) this.core.tell(event.layer, 1);
+    if (["puncture", "vessel", "far_wall", "flashback", "in_track"].includes(event.kind)) this.core.tell(event.layer, 1);
     if (event.kind === "exit") this.core.tell(event.layer, 0);
   }
 

@@ -38,7 +38,7 @@ export class Tissue {
     const layer = this.layers[event.layer];
     if (!layer) return;
     if (event.kind === "contact") layer.touched = true;
-    if (event.kind === "puncture" || event.kind === "vessel") layer.touched = layer.given = true;
+    if (["puncture", "vessel", "in_track"].includes(event.kind)) layer.touched = layer.given = true;
     if (event.kind === "exit") {
       layer.touched = layer.given = false;
       if (event.layer === 0) this.flashback = false;

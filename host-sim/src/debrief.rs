@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::recording::read::Recording;
 use crate::score::gesture::{Gesture, RATE_HZ};
+use crate::score::target::{Outcome, Reached};
 use crate::score::{Insertion, Judge, Span, each};
 use crate::session::{Scene, SceneNeedle, SceneVessel, Source};
 use crate::sheet::chart::{Chart, Curve};
@@ -192,7 +193,10 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
 /// Returns a teacher's comments.
 fn in_words(one: &Insertion) -> Vec<String> {
     let mut words = Vec::new();
-    if one.through_far_wall {
+    let aims_elsewhere = one.target.as_ref().filter(|target| target.name != "lumen");
+    if let Some(target) = aims_elsewhere {
+        words.push(of_target(target));
+    } else if one.through_far_wall {
         words.push("The needle went through the vessel's far wall.".to_owned());
     } else if one.vessel {
         words.push(format!("The vessel was entered and held for {} s.", decimal(one.in_lumen_s, 1)));
@@ -201,8 +205,11 @@ fn in_words(one: &Insertion) -> Vec<String> {
     } else {
         words.push("The vessel was not met.".to_owned());
     }
-    if one.spared_hits > 0 {
-        words.push(format!("Something that was to be spared was touched {}.", times(one.spared_hits)));
+    if !one.hit.is_empty() {
+        words.push(format!("To be spared and touched, {}: {}.", times(one.spared_hits), one.hit.join(", ")));
+    }
+    if !one.spared.is_empty() {
+        words.push(format!("Spared: {}.", one.spared.join(", ")));
     }
     if one.redirections > 0 {
         words.push(format!("The needle was redirected {}.", times(one.redirections)));
@@ -217,6 +224,28 @@ fn in_words(one: &Insertion) -> Vec<String> {
     words
 }
 
+/// Whether a target was reached, in a sentence.
+fn of_target(target: &Reached) -> String {
+    let beside = match target.passed_beside {
+        0 => String::new(),
+        count => format!(" The needle passed beside it {}.", times(count)),
+    };
+    let name = &target.name;
+    let said = match target.outcome {
+        Outcome::Missed => format!("The {name} was missed."),
+        Outcome::Reached => {
+            format!("The {name} was reached and held for {} s.", decimal(target.time_s, 1))
+        }
+        Outcome::Beyond => {
+            format!(
+                "The {name} was reached, and the needle went on beyond it; {} s in it.",
+                decimal(target.time_s, 1)
+            )
+        }
+    };
+    said + &beside
+}
+
 fn times(count: u32) -> String {
     match count {
         1 => "once".into(),
@@ -228,14 +257,17 @@ fn times(count: u32) -> String {
 /// A figure of the table: its words, its value, its decimals.
 type Figure = (&'static str, fn(&Insertion) -> Option<f64>, usize);
 
-const FIGURES: [Figure; 19] = [
+const FIGURES: [Figure; 22] = [
     ("time in tissue, s", |i| Some(i.time_s), 2),
     ("time in the lumen, s", |i| Some(i.in_lumen_s), 2),
+    ("time in the target, s", |i| i.target.as_ref().map(|target| target.time_s), 2),
     ("path of the tip, mm", |i| Some(i.path_mm), 1),
     ("deepest, along the needle, mm", |i| Some(i.depth_mm), 1),
     ("vessel first touched at, mm", |i| i.vessel_contact_path_mm, 2),
     ("went on in the vessel by, mm", |i| i.overshoot_mm, 1),
     ("walls that gave way", |i| Some(f64::from(i.punctures)), 0),
+    ("layers met again in the needle's track", |i| Some(f64::from(i.met_in_track)), 0),
+    ("layers pierced once more", |i| Some(f64::from(i.pierced_again)), 0),
     ("blood in the hub, times", |i| Some(f64::from(i.flashbacks)), 0),
     ("through the far wall", |i| Some(f64::from(u8::from(i.through_far_wall))), 0),
     ("touches of what was to be spared", |i| Some(f64::from(i.spared_hits)), 0),
@@ -310,17 +342,34 @@ mod tests {
         let bad = Insertion {
             through_far_wall: true,
             spared_hits: 2,
+            hit: vec!["tendon".into()],
+            spared: vec!["cartilage".into()],
             redirections: 3,
             barriers: 1,
             angle_largest_error_deg: Some(-14.2),
             ..good
         };
         let said = in_words(&bad).join(" ");
-        for words in
-            ["far wall", "touched twice", "redirected 3 times", "tissue allows once", "too flat by up to 14°"]
-        {
+        for words in [
+            "far wall",
+            "touched, twice: tendon.",
+            "Spared: cartilage.",
+            "redirected 3 times",
+            "tissue allows once",
+            "too flat by up to 14°",
+        ] {
             assert!(said.contains(words), "{said}");
         }
         assert_eq!(in_words(&Insertion::default()), ["The vessel was not met."]);
+        let of = |outcome, passed_beside| {
+            let target = Reached { name: "bursa".into(), outcome, time_s: 0.74, passed_beside };
+            in_words(&Insertion { target: Some(target), ..Insertion::default() }).join(" ")
+        };
+        assert_eq!(of(Outcome::Missed, 1), "The bursa was missed. The needle passed beside it once.");
+        assert_eq!(of(Outcome::Reached, 0), "The bursa was reached and held for 0.7 s.");
+        assert!(
+            of(Outcome::Beyond, 2)
+                .contains("went on beyond it; 0.7 s in it. The needle passed beside it twice.")
+        );
     }
 }

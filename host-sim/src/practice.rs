@@ -3,11 +3,11 @@
 
 use crate::class::scoring::LiveScore;
 use crate::profile::Profile;
+use crate::score::Insertion;
 use crate::score::gesture::Gesture;
-use crate::score::{Insertion, Span};
+use crate::score::target::Outcome;
 use crate::session::{Publisher, Subscription};
 use control_core::config::Tissue;
-use link::frames::EventKind;
 use serde::Serialize;
 
 /// The tip has to rest in the vein for so long: blood is drawn, or a cannula put in.
@@ -22,8 +22,8 @@ const PATH_HZ: f64 = 25.0;
 enum Goal {
     /// Into the vein and not through it.
     Vein,
-    /// Into this layer, through its wall where it has one, and nothing touched that is to be spared.
-    Layer { number: u8, tissue: Tissue, has_wall: bool },
+    /// Into this structure, which the patient names as the target, and not through it.
+    Structure(Tissue),
     /// Into the skin: the patient has nothing else.
     Skin,
 }
@@ -31,23 +31,17 @@ enum Goal {
 impl Goal {
     fn of(profile: &Profile) -> Self {
         let layers = &profile.config.patient.layers;
-        let number = |wanted: Tissue| layers.iter().position(|layer| layer.tissue == wanted);
-        if number(Tissue::Vessel).is_some() {
+        if layers.iter().any(|layer| layer.tissue == Tissue::Vessel) {
             return Goal::Vein;
         }
-        // Otherwise the deepest layer that nobody asks to spare.
-        let is_spared = |index: usize| profile.spared.contains(&(index as u8));
-        let target = (1..layers.len()).rev().find(|index| !is_spared(*index));
-        target.map_or(Goal::Skin, |index| {
-            let layer = &layers[index];
-            Goal::Layer { number: index as u8, tissue: layer.tissue, has_wall: layer.wall.is_some() }
-        })
+        let target = profile.goal().and_then(|goal| layers.get(usize::from(goal.layer)));
+        target.map_or(Goal::Skin, |layer| Goal::Structure(layer.tissue))
     }
 
     fn in_words(self) -> String {
         match self {
             Goal::Vein => format!("Enter the vein, rest in it for {IN_LUMEN_S} s, and do not go through it"),
-            Goal::Layer { tissue, .. } => {
+            Goal::Structure(tissue) => {
                 format!(
                     "Reach the {} and touch nothing that is to be spared",
                     crate::session::tissue_name(tissue)
@@ -58,20 +52,21 @@ impl Goal {
     }
 
     /// Returns what an insertion lacks, in words; nothing where it has reached the goal.
-    fn missing(self, span: &Span<'_>, figures: &Insertion) -> Vec<String> {
+    fn missing(self, figures: &Insertion) -> Vec<String> {
         let mut missing = Vec::new();
-        let entered = |layer: u8, has_wall: bool| {
-            let wanted = if has_wall { EventKind::Puncture { layer } } else { EventKind::Contact { layer } };
-            span.events().any(|event| event.kind == wanted)
-        };
         match self {
             Goal::Vein if figures.through_far_wall => missing.push("it went through the far wall".into()),
             Goal::Vein if !figures.vessel => missing.push("the vein was not entered".into()),
             Goal::Vein if figures.in_lumen_s < IN_LUMEN_S => {
                 missing.push(format!("it rested in the vein for {:.1} s only", figures.in_lumen_s));
             }
-            Goal::Layer { number, tissue, has_wall } if !entered(number, has_wall) => {
-                missing.push(format!("the {} was not reached", crate::session::tissue_name(tissue)));
+            Goal::Structure(tissue) => {
+                let tissue = crate::session::tissue_name(tissue);
+                match figures.target.as_ref().map(|target| target.outcome) {
+                    Some(Outcome::Reached) => {}
+                    Some(Outcome::Beyond) => missing.push(format!("it went through the {tissue}")),
+                    Some(Outcome::Missed) | None => missing.push(format!("the {tissue} was not reached")),
+                }
             }
             Goal::Skin if figures.punctures == 0 => missing.push("the skin was not pierced".into()),
             _ => {}
@@ -152,7 +147,7 @@ impl Practice {
         let mut ended = Vec::new();
         let (goal, skin_tilt_rad) = (self.goal, self.skin_tilt_rad);
         self.live.take_each(&batch, |span, figures| {
-            let missing = goal.missing(&span, &figures);
+            let missing = goal.missing(&figures);
             ended.push((missing, path(&span.gesture(skin_tilt_rad)), figures));
         });
         for (missing, path, figures) in ended {
@@ -194,7 +189,6 @@ mod tests {
         let goal = |name: &str| Goal::of(&Profile::find(name).expect("it is built in"));
         assert_eq!(goal("adult"), Goal::Vein);
         assert_eq!(goal("dorsal-hand"), Goal::Vein);
-        let shoulder = goal("shoulder");
-        assert!(matches!(shoulder, Goal::Layer { tissue: Tissue::Bursa, .. }), "{shoulder:?}");
+        assert!(matches!(goal("shoulder"), Goal::Structure(Tissue::Bursa)), "{:?}", goal("shoulder"));
     }
 }

@@ -434,6 +434,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             if has(output.transitions.contact) {
                 self.event(tick, EventKind::Contact { layer });
             }
+            if has(output.transitions.in_track) {
+                self.event(tick, EventKind::InTrack { layer });
+            }
             if has(output.transitions.puncture) {
                 self.event(tick, EventKind::Puncture { layer });
                 match self.plan.tissue(layer) {

@@ -153,6 +153,11 @@ pub enum EventKind {
     FarWall { layer: u8 },
     /// The needle has been turned further from its direction of entry than the tissue around it lets it.
     Barrier,
+    /// The tip has come into a layer that had given way before: it is in the needle's own track, where the layer is open.
+    InTrack {
+        /// Which layer.
+        layer: u8,
+    },
 }
 
 /// The reason why a configuration was not saved.

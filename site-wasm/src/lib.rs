@@ -28,6 +28,7 @@ pub mod session;
 /// The virtual device.
 #[path = "../../host-sim/src/device"]
 pub mod device {
+    pub mod grip;
     pub mod virtual_device;
 }
 

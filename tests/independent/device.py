@@ -25,6 +25,7 @@ class Recording:
         self.force_n = -rows[:, 1] * rig["actuator"]["gain"] / (radius_mm * 1e-3)
         self.depth_mm = rows[:, 2] / counts_per_mm
         self.tilt_rad = rows[:, 3]
+        self.state = rows[:, 4].astype(int)
         self.force_step_n = rig["actuator"]["gain"] / (radius_mm * 1e-3)
         self.depth_step_mm = 1.0 / counts_per_mm
         self.score = None
@@ -70,10 +71,18 @@ class Device:
                   "--procedure", stem / "hand.toml", "--record", stem / "a.mcap", *angle)  # fmt: skip
         self._run("export", stem / "a.mcap", "--out", stem / "csv")
         rig = tomllib.loads((stem / "csv" / "rig.toml").read_text())
-        rows = numpy.loadtxt(stem / "csv" / "recording.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2, 3))
+        rows = numpy.loadtxt(stem / "csv" / "recording.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2, 3, 4))
         recording = Recording(rig, rows)
         recording.score = json.loads(self._run("score", stem / "a.mcap", "--json"))["insertions"]
         return recording
+
+
+def way_between_counts(depth_mm):
+    """The needle's way as straight lines between the ticks at which the encoder steps, where the true depth is between two counts."""
+    steps = numpy.flatnonzero(numpy.diff(depth_mm)) + 1
+    ticks = numpy.concatenate([[0], steps, [len(depth_mm) - 1]])
+    middles = 0.5 * (depth_mm[steps - 1] + depth_mm[steps])
+    return numpy.interp(numpy.arange(len(depth_mm)), ticks, numpy.concatenate([depth_mm[:1], middles, depth_mm[-1:]]))
 
 
 class Report:
@@ -94,11 +103,11 @@ class Report:
         print(f"{'pass' if ok else 'FAIL'}  {what}: {seen}", flush=True)
 
 
-def hand(steps, start_mm=-1.0, entry_deg=None):
-    """The text of a procedure by a stage that does not tremble; `steps` are tables of TOML."""
+def hand(steps, start_mm=-1.0, entry_deg=None, tremor_mm=0.0):
+    """The text of a procedure by a stage, which trembles only where it is told to; `steps` are tables of TOML."""
     entry = "" if entry_deg is None else f"entry_deg = {float(entry_deg)}\n"
     text = f'format = 1\nname = "independent"\nstart_mm = {float(start_mm)}\n{entry}' + (
-        "[hand]\nstiffness_n_per_mm = 10.0\ndamping_n_s_per_mm = 0.02\ntremor_mm = 0.0\nseed = 1\n"
+        f"[hand]\nstiffness_n_per_mm = 10.0\ndamping_n_s_per_mm = 0.02\ntremor_mm = {float(tremor_mm)}\nseed = 1\n"
         '[[step]]\nname = "until the torque has faded in"\nseconds = 0.5\n'
     )
     return text + "".join(f'[[step]]\nname = "{number}"\n{step}\n' for number, step in enumerate(steps))

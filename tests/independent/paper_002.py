@@ -3,7 +3,8 @@
 import math
 
 import numpy
-from device import TICK_S, hand
+from device import TICK_S, hand, way_between_counts
+from scipy.optimize import curve_fit
 
 LAYERS = (("skin", 0.0, 0.8), ("fat", 2.5, 1.5), ("muscle", 8.0, 2.0), ("bursa", 20.0, 2.5), ("tendon", 23.0, 3.0), ("cartilage", 29.0, 4.0))
 BACK = 0.3  # of the cutting force on the way out
@@ -31,14 +32,6 @@ def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0):
         text += f'[[layer]]\ntissue = "{tissue}"\ndepth_mm = {depth_mm}\ncutting = {{ inwards_n = {cutting_n}, outwards_n = {BACK * cutting_n} }}\n'
         text += wall if skin_wall and index == 0 else ""
     return text
-
-
-def way_between_counts(depth_mm):
-    """The needle's way as straight lines between the ticks at which the encoder steps, where the true depth is between two counts."""
-    steps = numpy.flatnonzero(numpy.diff(depth_mm)) + 1
-    ticks = numpy.concatenate([[0], steps, [len(depth_mm) - 1]])
-    middles = 0.5 * (depth_mm[steps - 1] + depth_mm[steps])
-    return numpy.interp(numpy.arange(len(depth_mm)), ticks, numpy.concatenate([depth_mm[:1], middles, depth_mm[-1:]]))
 
 
 def lugre(depth_mm, sub=8):
@@ -137,8 +130,32 @@ def skin_pushed_in(device, report):
     report.within("before the puncture the force is a polynomial of second order", residual, 0.010, "N")
     peak = force[depth < 1.3].max()
     report.within("before the puncture it rises to the patient's 1 N", peak - 1.0, 0.02, "N")
-    after = force[(depth > 1.22) & (depth < 1.3)].min()
-    report.holds("then it falls sharply", after < 0.5 * peak, f"{peak:.3f} N, then {after:.3f} N")
+    after = force[(depth > 1.2) & (depth < 1.3)].min()
+    # What goes on then is cutting, at 0.8 N: the fall ends below that, and cutting comes up to it again.
+    report.holds("then it falls sharply, below the cutting force", 0.3 < after < 0.8 and after < 0.65 * peak, f"{peak:.3f} N, then {after:.3f} N")
+
+
+def a_needle_that_stops(device, report):
+    """The wall is "smoothly updated to the needle's last position": the patient's 300 ms, until friction holds the needle alone."""
+    steps = ["to_mm = 22.0\nspeed_mm_s = 6.0", "seconds = 2.5", "to_mm = -1.0\nspeed_mm_s = 6.0"]
+    recording = device.record(shoulder(skin_wall=False), hand(steps), 0.5 + 23.0 / 6.0 + 2.5)
+    stop = int(numpy.argmax(recording.depth_mm)) + round(0.03 / TICK_S)
+    time, force = recording.time_s[stop:] - recording.time_s[stop], recording.force_n[stop:] / SCALE
+    fall = lambda t, held, more, tau: held + more * numpy.exp(-t / tau)
+    (held, more, tau), _ = curve_fit(fall, time[::50], force[::50], p0=(0.6, 1.5, 0.3))
+    report.within("a needle that stops: time constant of the wall", tau - 0.3, 0.03, "s")
+    report.within("a needle that stops: what is left, friction of wall and shaft", held - 2.0 * LUGRE["coulomb"], 0.1, "N")
+
+
+def stages_at_rest(device, report):
+    """A hand that holds still and trembles as hands do is in one stage, and it is the one of a stage that does not tremble."""
+    seen = []
+    for tremor_mm in (0.0, 0.03):
+        steps = ["to_mm = 22.0\nspeed_mm_s = 6.0", "seconds = 4.0", "to_mm = -1.0\nspeed_mm_s = 6.0"]
+        recording = device.record(shoulder(skin_wall=False), hand(steps, tremor_mm=tremor_mm), 0.5 + 23.0 / 6.0 + 4.0)
+        rest = recording.between(0.5 + 23.0 / 6.0 + 1.0, 0.5 + 23.0 / 6.0 + 3.9)
+        seen.append(sorted({int(state) for state in recording.state[rest]}))
+    report.holds("stages told apart at rest, without and with tremor", len(seen[0]) == 1 and seen[0] == seen[1], f"{seen}")
 
 
 def direction(device, report):
@@ -156,4 +173,6 @@ def check(device, report):
     skin_pushed_in(device, report)
     periodic_penetration(device, report)
     straight_injection(device, report)
+    a_needle_that_stops(device, report)
+    stages_at_rest(device, report)
     direction(device, report)

@@ -63,6 +63,7 @@ pub fn sparte(count: usize) -> Config {
         .map(|force| Cutting { inwards: Newtons(q(force)), outwards: Newtons(q(0.3 * force)) });
     config.patient.law = Law::Sparte(Sparte {
         tracking: Stiffness(q(0.8)),
+        after_puncture: q(0.6),
         relax_ms: 300,
         cutting: cutting.into_iter().take(count).collect(),
         friction: Lugre {
@@ -90,12 +91,16 @@ pub fn xr(count: usize) -> Config {
     let mut config = with_layers(count);
     let cells = 0..MAX_SPEEDS * MAX_ANGLES;
     // Rises and falls over depth, more with each cell.
-    let force = |depth: usize, cell: usize| (200 * (1 + depth % 4) + 20 * cell) as i16;
+    let force = |depth: usize, cell: usize| (200 * (1 + depth % 4) + 20 * cell) as u16;
     config.patient.law = Law::Xr(ForceTable {
-        depth_step: Millimetres(q(2.0)),
+        // 2 mm apart, and a little deeper in each cell.
+        depths: (0..MAX_DEPTHS as u16)
+            .flat_map(|depth| cells.clone().map(move |cell| 200 * depth + cell as u16))
+            .collect(),
         speeds: [2.0, 8.0, 20.0].map(|speed| MillimetresPerSecond(q(speed))).into_iter().collect(),
         angles: [524, 1_047, 1_400].map(Milliradians).into_iter().collect(),
         forces: (0..MAX_DEPTHS).flat_map(|depth| cells.clone().map(move |cell| force(depth, cell))).collect(),
+        gives_way: [3, 7, 11].into_iter().collect(),
         measured: 0b1_1110_0100,
         stiffness: Stiffness(q(1.5)),
         withdrawal: q(0.4),

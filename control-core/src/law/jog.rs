@@ -4,6 +4,7 @@ use super::{Ground, Met, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
 use crate::friction::{self, Hold};
+use crate::kinematics::Direction;
 use crate::math::{reciprocal, saturating_product, saturating_times, sine, truncating_product};
 use crate::passivity::Elements;
 use crate::refusal::{Field, Refusal, milli, within};
@@ -130,13 +131,13 @@ impl Memory {
         _: &FrictionLaw,
         forces: &Plan,
         met: &Insertion,
-        Motion { depth, withdraws, .. }: Motion,
+        Motion { depth, movement, .. }: Motion,
     ) -> Response {
         self.heal(met.given());
         let walls = self.walls(forces, met, depth);
         let friction = self.friction(forces, met, depth);
         let state = match friction {
-            Some(_) if withdraws => State::Withdrawal,
+            Some(_) if movement.direction() == Direction::Out => State::Withdrawal,
             _ if walls.pressing => State::Elastic,
             Some(_) if walls.past_vertex < I16F16::ZERO => State::Puncture,
             Some(_) => State::Friction,

@@ -4,6 +4,7 @@
 
 use crate::anatomy::Insertion;
 use crate::event::State;
+use crate::kinematics::Movement;
 use crate::math::truncating_product;
 use crate::passivity::Elements;
 use crate::refusal::Refusal;
@@ -14,12 +15,11 @@ use serde::{Deserialize, Serialize};
 
 /// How the needle moves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Motion {
+pub(crate) struct Motion<'a> {
     /// Of the tip along the needle.
     pub(crate) depth: Millimetres,
     pub(crate) speed: MillimetresPerSecond,
-    /// It is being drawn out.
-    pub(crate) withdraws: bool,
+    pub(crate) movement: &'a Movement,
 }
 
 /// A layer as the needle meets it.
@@ -43,6 +43,8 @@ pub(crate) struct Ground<'a> {
     pub(crate) largest: I16F16,
     /// Largest slope, N/mm.
     pub(crate) stiffest: I16F16,
+    /// One count of the encoder along the needle, mm.
+    pub(crate) count: I16F16,
 }
 
 /// What a law makes of where the tip is and how it moves.
@@ -57,6 +59,10 @@ pub(crate) struct Response {
     pub(crate) barrier: bool,
     /// Nothing was measured here: the force is an estimate.
     pub(crate) estimated: bool,
+    /// A bit for the layer that has just given way by this law.
+    pub(crate) ruptured: u8,
+    /// A bit for each layer that has given way by this law on the needle's way.
+    pub(crate) open: u8,
 }
 
 impl Response {
@@ -67,6 +73,8 @@ impl Response {
         lateral: Newtons(I16F16::ZERO),
         barrier: false,
         estimated: false,
+        ruptured: 0,
+        open: 0,
     };
 }
 
@@ -94,6 +102,7 @@ macro_rules! laws {
 
         /// The law that is in force.
         #[derive(Clone, Debug)]
+        #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one plan")]
         pub(crate) enum Plan { $($name($module::Plan)),+ }
 
         /// What it remembers.
@@ -111,6 +120,14 @@ macro_rules! laws {
             /// Checks `law` and prepares it for the tick.
             pub(crate) fn new(law: &Law, ground: &Ground) -> Result<Self, Refusal> {
                 match law { $(Law::$name(config) => $module::Plan::new(config, ground).map(Self::$name)),+ }
+            }
+
+            /// A bit for each layer that gives way by this law rather than by a wall of its own.
+            pub(crate) fn ruptures(&self) -> u8 {
+                match self {
+                    Plan::Xr(plan) => plan.ruptures(),
+                    Plan::Jog(_) | Plan::Sparte(_) => 0,
+                }
             }
 
             /// Of a needle that has never been in this tissue.

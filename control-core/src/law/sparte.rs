@@ -3,15 +3,17 @@
 //! layer, while LuGre friction rubs along the shaft; on the way out both act the other way, cutting with magnitudes of its
 //! own. A fixture holds the direction of entry: its lateral force is computed and told, for this device turns freely.
 //!
-//! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. While the needle rests, `w` comes
-//! after it with a time constant until only the friction that holds the needle is left.
+//! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle that has not gone on for 20 ms has
+//! stopped: `w` comes after it with a time constant until only the friction that holds the needle is left. Where a wall of the
+//! anatomy gives way, the tip cuts already: `w` is put where it makes a share of the cutting force, so that the force falls below
+//! that and rises to it again.
 //! LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s − F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped
 //! implicitly over the tick's own travel Δx, `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
 
 use super::{Ground, Met, Motion, Response, follow_share, reach};
 use crate::anatomy::Insertion;
 use crate::event::State;
-use crate::kinematics::REST_SPEED;
+use crate::kinematics::Direction;
 use crate::math::{exp_negative, saturating_multiply, share, truncating_product};
 use crate::passivity::Elements;
 use crate::proxy::Anchor;
@@ -39,6 +41,8 @@ pub struct Sparte {
     pub tracking: Stiffness,
     /// Time constant with which the tracking wall comes after a needle that rests, 10–10,000 ms.
     pub relax_ms: u16,
+    /// Share of the cutting force with which the tip goes on where a wall has just given way, 0–1.
+    pub after_puncture: I16F16,
     /// What cutting takes in each layer, outermost first.
     pub cutting: Vec<Cutting, MAX_LAYERS>,
     /// Friction along the shaft.
@@ -150,6 +154,8 @@ impl Plan {
 pub(crate) struct Memory {
     /// w.
     wall: Anchor,
+    /// Walls that had given way.
+    given: usize,
     /// z of LuGre.
     bristles: I8F24,
     last_depth: Millimetres,
@@ -165,7 +171,7 @@ impl Memory {
         config: &Sparte,
         plan: &Plan,
         met: &Insertion,
-        Motion { depth, speed, withdraws }: Motion,
+        Motion { depth, speed, movement }: Motion,
     ) -> Response {
         let step =
             depth.0.to_bits().wrapping_sub(self.last_depth.0.to_bits()).clamp(-LARGEST_STEP, LARGEST_STEP);
@@ -176,20 +182,27 @@ impl Memory {
             self.bristles = I8F24::ZERO;
             self.entry = None;
             self.is_beyond = false;
+            self.given = met.given();
             let state = if pressed.is_some() { State::Elastic } else { State::Approach };
             let force = Elements { walls: Newtons(pressed.unwrap_or_default()), ..Elements::NONE };
             return Response { force, state, ..Response::NONE };
         }
         let elastic = pressed.unwrap_or_default();
         let cut = plan.cuts.get(met.innermost(depth)).copied().unwrap_or_default();
-        let (cutting, is_full) = self.track(config, plan, cut, elastic, depth, speed);
+        if met.given() > self.given {
+            let left = truncating_product(cut.inwards.0.to_bits(), config.after_puncture.to_bits(), 16);
+            let left = Newtons(I16F16::from_bits(left));
+            self.wall.release(Millimetres(depth.0.saturating_sub(reach(left.0, plan.inverse_tracking))));
+        }
+        self.given = met.given();
+        let (cutting, is_full) = self.track(config, plan, cut, elastic, (depth, movement.has_stopped()));
         let friction = self.rub(&plan.rub, step, speed);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
-        let state = if withdraws {
+        let state = if movement.direction() == Direction::Out {
             State::Withdrawal
         } else if pressed.is_some() {
             State::Elastic
-        } else if !is_full && speed.0 > REST_SPEED {
+        } else if !is_full && movement.direction() == Direction::In {
             State::Puncture
         } else {
             State::Friction
@@ -206,17 +219,14 @@ impl Memory {
         plan: &Plan,
         cut: Cutting,
         elastic: I16F16,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
+        (depth, has_stopped): (Millimetres, bool),
     ) -> (I16F16, bool) {
         let inwards = reach(cut.inwards.0.saturating_sub(elastic).max(I16F16::ZERO), plan.inverse_tracking);
         let is_full = self.wall.stretch(depth) >= inwards;
         self.wall.drag(depth, inwards, reach(cut.outwards.0, plan.inverse_tracking));
         let stretch = self.wall.stretch(depth);
         let held = reach(plan.rub.sliding, plan.inverse_tracking);
-        if speed.0.unsigned_abs() < REST_SPEED.unsigned_abs()
-            && stretch.unsigned_abs() > held.unsigned_abs()
-        {
+        if has_stopped && stretch.unsigned_abs() > held.unsigned_abs() {
             let held = if stretch < I16F16::ZERO { -held } else { held };
             self.wall.follow(depth.0.saturating_sub(held), plan.relax);
         }
@@ -282,6 +292,7 @@ fn check(sparte: &Sparte, ground: &Ground) -> Result<(), Refusal> {
     let rub = &sparte.friction;
     within(Field::TrackingStiffness, sparte.tracking.0, milli(50), stiff)?;
     within(Field::RelaxMs, I16F16::from_num(sparte.relax_ms.min(30_000)), milli(10_000), milli(10_000_000))?;
+    within(Field::AfterPuncture, sparte.after_puncture, I16F16::ZERO, I16F16::ONE)?;
     within(Field::BristleStiffness, rub.stiffness.0, milli(50), stiff)?;
     within(Field::BristleDamping, I16F16::from_num(rub.damping.0), I16F16::ZERO, milli(1) / 2)?;
     within(Field::ViscousFriction, I16F16::from_num(rub.viscous.0), I16F16::ZERO, milli(20))?;

@@ -1,41 +1,65 @@
-//! The law of seed 000: `F(depth, speed, angle)` from a table that was fitted to insertions at constant speed and angle, linear
-//! between its knots and level beyond them. The paper says nothing of a needle that rests or is drawn back: there the force is
-//! held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it outwards.
+//! The law of paper 000: `F(depth, speed, angle)` from a table that was fitted to insertions at constant speed and angle.
+//!
+//! Knots that have the same number in every cell of speed and angle belong together: the tip's contact, the force at which a layer
+//! gives way, the end of its fall. Depth and force of a knot lie linearly between the cells, force linearly between two knots; beyond
+//! the table it is level. So a layer that gives way deeper at another speed does so in between, too.
+//!
+//! A layer *gives way once*. From there on the needle has a track: in it, the force is the lower hull of the table, what is left
+//! where nothing has to give way. Beside the track the tissue is whole. The paper says nothing of it, nor of a needle that rests or is
+//! drawn back: there the force is held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it
+//! outwards.
+
+mod cells;
+mod check;
+
+use cells::{Cells, Gaps};
 
 use super::{Ground, Motion, Response, reach};
-use crate::anatomy::{Insertion, SMALLEST_ANGLE};
+use crate::anatomy::Insertion;
 use crate::event::State;
-use crate::math::{saturating_multiply, truncating_product};
+use crate::interpolator::Interpolator;
+use crate::kinematics::Direction;
+use crate::math::{saturating_multiply, share, truncating_product, upper_half};
 use crate::passivity::Elements;
 use crate::proxy::Anchor;
-use crate::refusal::{Field, Refusal, count, milli, within};
+use crate::refusal::Refusal;
+use crate::tissue::MAX_LAYERS;
 use crate::units::{Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
 use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// The most knots of a force table: of depth, of speed, of angle.
+/// Largest number of knots of a force table along depth, speed and angle.
 pub const MAX_DEPTHS: usize = 16;
 /// See [`MAX_DEPTHS`].
 pub const MAX_SPEEDS: usize = 3;
 /// See [`MAX_DEPTHS`].
 pub const MAX_ANGLES: usize = 3;
+/// Deeper than any knot: 200 mm, in Q16.
+const DEEPEST: i32 = 200 << 16;
+const MAX_CELLS: usize = MAX_SPEEDS * MAX_ANGLES;
 
-/// The force of an insertion over depth, speed along the needle and angle to the skin; linear between its knots, level beyond
-/// them.
+/// A needle whose tip is this far from its track goes beside it: 1 mm, the width of a cannula; an assumption. In mm·mrad, Q16.
+const BESIDE: i64 = 1_000 << 16;
+/// A needle drawn out this far enters at another place, where the tissue is whole: 3 mm; an assumption.
+const ANOTHER_ENTRY: I16F16 = I16F16::from_bits(3 << 16);
+
+/// The force of an insertion over depth, speed along the needle and angle to the skin.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ForceTable {
-    /// From one depth to the next, 0.05–100 mm; the first is the skin. Depth is perpendicular to it, as the layers' are, so that
-    /// a layer is met at the same knot whatever the angle.
-    pub depth_step: Millimetres,
+    /// Of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or below the skin. Depth is perpendicular to it, as the layers' are. In
+    /// the order of `forces`, or one for each knot where it lies at the same depth in all cells.
+    pub depths: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     /// Rising.
     pub speeds: Vec<MillimetresPerSecond, MAX_SPEEDS>,
     /// To the skin, rising.
     pub angles: Vec<Milliradians, MAX_ANGLES>,
-    /// In mN, one for each depth, speed and angle: angles side by side, then speeds, then depths.
-    pub forces: Vec<i16, { MAX_DEPTHS * MAX_SPEEDS * MAX_ANGLES }>,
+    /// In mN, up to 16 N, one for each knot, speed and angle: the angles of a speed together, then speeds, then knots.
+    pub forces: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
+    /// Knots at which a layer gives way, rising; none where rupture is left to the shape of the curve.
+    pub gives_way: Vec<u8, MAX_LAYERS>,
     /// A bit for each speed and angle that was measured: bit `speed · angles + angle`. The others hold an estimate, the
-    /// product of what speed and angle do each by itself, and are told as one.
+    /// product of what speed and angle do each by itself, and are reported as one.
     pub measured: u16,
     /// K of the proxy that holds the needle at rest; no steeper slope is felt.
     pub stiffness: Stiffness,
@@ -46,48 +70,44 @@ pub struct ForceTable {
 /// What the tick needs beside the table.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// Depths of the table.
-    depths: usize,
-    /// One over the step of depth, Q24.
-    per_depth: i32,
-    /// One over the gap from each knot to the next, Q24.
-    per_speed: [i32; MAX_SPEEDS],
-    per_angle: [i32; MAX_ANGLES],
+    /// Of each knot and cell, the least force from there on: what the needle feels in its track.
+    hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
+    knots: usize,
+    /// How many depths a knot has, and how many further the next cell's is.
+    depth_row: usize,
+    depth_cell: usize,
+    cells: usize,
+    gaps: Gaps,
+    ruptures: Vec<Rupture, MAX_LAYERS>,
     inverse_stiffness: I16F16,
     walls_that_close: usize,
+    /// One count of the encoder along the needle, mm.
+    count: I16F16,
 }
 
-/// Between knot `index` and the next, and how far: Q16.
+/// A layer that gives way.
 #[derive(Clone, Copy, Debug)]
-struct Place {
-    index: usize,
-    next: usize,
+struct Rupture {
+    knot: usize,
+    /// The layer among those that the needle meets.
+    met: usize,
+    /// A bit for its layer.
+    layer: u8,
+}
+
+/// Where the tip is among the knots of its cells.
+#[derive(Clone, Copy, Debug)]
+struct Position {
+    knot: usize,
+    /// Q16.
     share: i32,
 }
 
-/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing lies beyond it.
-fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N] {
-    let mut gaps = [0; N];
-    for (gap, (from, to)) in gaps.iter_mut().zip(knots.clone().zip(knots.skip(1))) {
-        *gap = ((1_i64 << 40) / i64::from((to - from).max(1))) as i32;
+impl Position {
+    /// Knots, Q16.
+    fn q16(self) -> u32 {
+        ((self.knot as u32) << 16) + self.share.cast_unsigned()
     }
-    gaps
-}
-
-/// Where `at` lies among `knots` in Q16.
-fn place(knots: impl Iterator<Item = i32>, per_gap: &[i32], at: i32) -> Place {
-    let mut place = Place { index: 0, next: 0, share: 0 };
-    let mut count = 0;
-    for (knot, per_gap) in knots.zip(per_gap) {
-        count += 1;
-        if at < knot {
-            break;
-        }
-        let share = ((i64::from(at) - i64::from(knot)) * i64::from(*per_gap)) >> 24;
-        place = Place { index: count - 1, next: 0, share: share.min(1 << 16) as i32 };
-    }
-    // The walk ends at the knot beyond, where there is one.
-    Place { next: (place.index + 1).min(count - 1), ..place }
 }
 
 impl ForceTable {
@@ -100,66 +120,78 @@ impl ForceTable {
     fn cells(&self) -> usize {
         self.speeds.len() * self.angles.len()
     }
-
-    fn speed_knots(&self) -> impl Iterator<Item = i32> + Clone {
-        self.speeds.iter().map(|speed| speed.0.to_bits())
-    }
-
-    fn angle_knots(&self) -> impl Iterator<Item = i32> + Clone {
-        self.angles.iter().map(|angle| i32::from(angle.0) << 16)
-    }
 }
 
 impl Plan {
     /// Checks the table against what the motor gives and the stiffness that holds the needle.
     pub(crate) fn new(table: &ForceTable, ground: &Ground) -> Result<Self, Refusal> {
-        check(table, ground)?;
+        check::check(table, ground)?;
         let has_wall = ground.layers.iter().any(|met| met.layer.wall.is_some());
-        Ok(Self {
-            depths: table.forces.len() / table.cells().max(1),
-            // At least 0.05 mm: at most 20.
-            per_depth: ((1_i64 << 40) / i64::from(table.depth_step.0.to_bits().max(1))) as i32,
-            per_speed: per_gap(table.speed_knots()),
-            per_angle: per_gap(table.angle_knots()),
+        let cells = table.cells();
+        let knots = table.forces.len() / cells.max(1);
+        let in_each = table.depths.len() > knots;
+        let mut plan = Self {
+            hull: hull(&table.forces, cells),
+            knots,
+            depth_row: if in_each { cells } else { 1 },
+            depth_cell: usize::from(in_each),
+            cells,
+            gaps: Gaps::new(table),
+            ruptures: Vec::new(),
             inverse_stiffness: I16F16::ONE.saturating_div(table.stiffness.0),
             walls_that_close: usize::from(has_wall),
-        })
-    }
-
-    /// Where a depth below the skin lies among the table's, which are evenly apart.
-    fn depth(&self, depth: i32) -> Place {
-        // At most 500 mm, 20 knots in each.
-        let knots = truncating_product(depth, self.per_depth, 24);
-        let (index, last) = ((knots >> 16) as usize, self.depths.saturating_sub(1));
-        if index >= last {
-            return Place { index: last, next: last, share: 0 };
+            count: ground.count,
+        };
+        for &knot in &table.gives_way {
+            let knot = usize::from(knot);
+            let shallowest = (0..cells).map(|cell| plan.depth(table, knot, cell)).min().unwrap_or(0);
+            let above =
+                |depth: Millimetres| i64::from(depth.0.to_bits()) * 100 <= i64::from(shallowest) << 16;
+            let met = ground.layers.iter().rposition(|met| above(met.layer.depth)).unwrap_or(0);
+            let number = ground.layers.get(met).map_or(0, |met| met.number);
+            // There is room for as many as the table may have.
+            let _ = plan.ruptures.push(Rupture { knot, met, layer: 1_u8.unbounded_shl(number.into()) });
         }
-        Place { index, next: index + 1, share: knots & 0xFFFF }
+        Ok(plan)
     }
 
-    /// The table's force, and whether all that it comes from was measured. Depth in mm, speed in mm/s, angle in mrad, Q16.
-    fn force(&self, table: &ForceTable, depth: i32, speed: i32, angle: i32) -> (I16F16, bool) {
-        let depth = self.depth(depth);
-        let speed = place(table.speed_knots(), &self.per_speed, speed);
-        let angle = place(table.angle_knots(), &self.per_angle, angle);
-        let (angles, cells) = (table.angles.len(), table.cells());
-        let mut measured = true;
-        // mN in Q12: along depth, then angle, then speed.
-        let mut along = |speed: usize, angle: usize, counts: bool| {
-            let cell = speed * angles + angle;
-            measured &= !counts || table.measured >> cell & 1 == 1;
-            let at =
-                |depth: usize| i32::from(table.forces.get(depth * cells + cell).copied().unwrap_or(0)) << 12;
-            between(at(depth.index), at(depth.next), depth.share)
+    /// A bit for each layer that gives way.
+    pub(crate) fn ruptures(&self) -> u8 {
+        self.ruptures.iter().fold(0, |layers, rupture| layers | rupture.layer)
+    }
+
+    /// Depth of a knot in a cell, 0.01 mm.
+    fn depth(&self, table: &ForceTable, knot: usize, cell: usize) -> i32 {
+        let index = knot * self.depth_row + cell * self.depth_cell;
+        table.depths.get(index).copied().map_or(0, i32::from)
+    }
+
+    /// Where among the knots of these cells a depth lies. It is looked for from `near` on, a knot a tick: a needle that goes faster
+    /// than a knot a tick trips the device.
+    fn position(&self, table: &ForceTable, cells: &Cells, near: usize, depth: I16F16) -> Position {
+        // 0.01 mm in Q16: beyond the table's deepest knot, nothing changes.
+        let depth = depth.to_bits().min(DEEPEST) * 100;
+        let at = |knot: usize| {
+            cells.mix(table.depths.get(knot * self.depth_row..).unwrap_or_default(), self.depth_cell)
         };
-        let mut across = |speed: usize, counts: bool| {
-            let flat = along(speed, angle.index, counts);
-            let steep = along(speed, angle.next, counts && angle.share > 0);
-            between(flat, steep, angle.share)
-        };
-        let (slow, fast) = (across(speed.index, true), across(speed.next, speed.share > 0));
-        // mN in Q12 to N in Q16: by 16/1000, 0.016 in Q26.
-        (I16F16::from_bits(truncating_product(between(slow, fast, speed.share), 1_073_742, 26)), measured)
+        let last = self.knots.saturating_sub(1);
+        let (from, to) = (at(near), at((near + 1).min(last)));
+        if depth < from {
+            return Position { knot: near.saturating_sub(1), share: if near > 0 { 1 << 16 } else { 0 } };
+        }
+        if depth >= to {
+            return Position { knot: (near + 1).min(last), share: 0 };
+        }
+        Position { knot: near, share: share(depth - from, to - from) >> 12 }
+    }
+
+    /// The force of `forces` at `position`.
+    fn force(&self, forces: &[u16], cells: &Cells, position: Position) -> I16F16 {
+        let at = |knot: usize| cells.mix(forces.get(knot * self.cells..).unwrap_or_default(), 1);
+        let next = (position.knot + 1).min(self.knots.saturating_sub(1));
+        let millinewtons = between(at(position.knot), at(next), position.share);
+        // mN to N: by 0.001 in Q40.
+        I16F16::from_bits(upper_half(millinewtons, 1_099_511_628) >> 8)
     }
 }
 
@@ -167,11 +199,65 @@ fn between(from: i32, to: i32, share_q16: i32) -> i32 {
     from + truncating_product(to - from, share_q16, 16)
 }
 
+/// The way that the needle has made for itself.
+#[derive(Clone, Copy, Debug, Default)]
+struct Track {
+    /// Up to where it reaches, in knots, Q16.
+    front: u32,
+    /// How many layers have given way on it.
+    given: usize,
+    /// A bit for each of them.
+    open: u8,
+    /// The angle to the skin at which the first did.
+    angle: Milliradians,
+}
+
+impl Track {
+    /// Follows a tip that is `at` a knot, Q16, and `along` the needle past the skin. A bit for the layer that gives way now.
+    fn follow(&mut self, plan: &Plan, at: u32, along: I16F16, angle: Milliradians) -> u8 {
+        let off = i64::from((i32::from(angle.0) - i32::from(self.angle.0)).abs());
+        if self.given > 0 && off * i64::from(along.to_bits()) > BESIDE {
+            self.leave(plan, at, angle);
+        }
+        let mut ruptured = 0;
+        if let Some(next) = plan.ruptures.get(self.given)
+            && at >= (next.knot as u32) << 16
+        {
+            if self.given == 0 {
+                self.angle = angle;
+            }
+            self.given += 1;
+            ruptured = next.layer & !self.open;
+            self.open |= next.layer;
+        }
+        if let Some(last) = self.given.checked_sub(1).and_then(|last| plan.ruptures.get(last)) {
+            // In the fall the track reaches as far as the tip has been.
+            self.front = self.front.max(at.min((last.knot as u32 + 1) << 16));
+        }
+        ruptured
+    }
+
+    /// The tip is beside the track: what lies deeper is whole.
+    #[inline(never)]
+    fn leave(&mut self, plan: &Plan, at: u32, angle: Milliradians) {
+        self.front = self.front.min(at);
+        let is_above = |rupture: &&Rupture| (rupture.knot as u32) << 16 <= at;
+        self.given = plan.ruptures.iter().take(self.given).take_while(is_above).count();
+        self.open = plan.ruptures.iter().take(self.given).fold(0, |open, rupture| open | rupture.layer);
+        self.angle = angle;
+    }
+}
+
 /// What the needle has done so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     /// w.
     anchor: Anchor,
+    way: Interpolator,
+    cells: Cells,
+    /// The knot that the tip was at.
+    knot: usize,
+    track: Track,
 }
 
 impl Memory {
@@ -181,25 +267,36 @@ impl Memory {
         table: &ForceTable,
         plan: &Plan,
         met: &Insertion,
-        Motion { depth, speed, withdraws }: Motion,
+        Motion { depth, speed, movement }: Motion,
     ) -> Response {
+        let (fine, steady) = self.way.tick(depth, speed, plan.count);
+        self.cells.follow(table, &plan.gaps, steady, met.angle());
         if depth.0 < met.top(0) {
-            self.anchor.release(depth);
-            return Response::NONE;
+            self.anchor.release(fine);
+            if depth.0 < met.top(0).saturating_sub(ANOTHER_ENTRY) {
+                (self.track, self.knot) = (Track::default(), 0);
+            }
+            return Response { open: self.track.open, ..Response::NONE };
         }
-        let inside = depth.0.saturating_sub(met.top(0)).to_bits();
-        let inside = truncating_product(inside, met.depth_per_path().to_bits(), 30);
-        let angle = i32::from(met.angle().0) << 16;
-        let (most, measured) = plan.force(table, inside, speed.0.saturating_abs().to_bits(), angle);
-        let is_inside = met.given() >= plan.walls_that_close;
+        let along = fine.0.saturating_sub(met.top(0)).max(I16F16::ZERO);
+        let inside = truncating_product(along.to_bits(), met.depth_per_path().to_bits(), 30);
+        let position = plan.position(table, &self.cells, self.knot, I16F16::from_bits(inside));
+        self.knot = position.knot;
+        let ruptured = self.track.follow(plan, position.q16(), along, met.angle());
+        let is_in_track = position.q16() < self.track.front;
+        let most = plan.force(if is_in_track { &plan.hull } else { &table.forces }, &self.cells, position);
+        let has_opened = plan.ruptures.is_empty() || self.track.given > 0;
+        let is_inside = met.given() >= plan.walls_that_close && has_opened;
         // A wall that has not given way pushes back and does not hold.
         let share = if is_inside { table.withdrawal } else { I16F16::ZERO };
         let least = I16F16::from_bits(truncating_product(most.to_bits(), share.to_bits(), 16));
-        self.anchor.drag(depth, reach(most, plan.inverse_stiffness), reach(least, plan.inverse_stiffness));
-        let force = saturating_multiply(self.anchor.stretch(depth), table.stiffness.0);
-        let state = if is_inside && withdraws {
+        self.anchor.drag(fine, reach(most, plan.inverse_stiffness), reach(least, plan.inverse_stiffness));
+        let force = saturating_multiply(self.anchor.stretch(fine), table.stiffness.0);
+        let state = if is_inside && movement.direction() == Direction::Out {
             State::Withdrawal
-        } else if met.presses() {
+        } else if !is_in_track && self.falls(plan, position) {
+            State::Puncture
+        } else if met.presses() || self.presses(plan, met, depth) {
             State::Elastic
         } else if is_inside {
             State::Friction
@@ -211,47 +308,30 @@ impl Memory {
         } else {
             Elements { walls: Newtons(force), ..Elements::NONE }
         };
-        Response { force, state, estimated: !measured, ..Response::NONE }
+        let estimated = self.cells.is_estimated();
+        Response { force, state, estimated, ruptured, open: self.track.open, ..Response::NONE }
+    }
+
+    /// Whether the tip is where the layer that gave way last falls.
+    fn falls(&self, plan: &Plan, position: Position) -> bool {
+        let last = self.track.given.checked_sub(1).and_then(|last| plan.ruptures.get(last));
+        last.is_some_and(|last| last.knot == position.knot)
+    }
+
+    /// Whether the tip pushes in the layer that gives way next.
+    fn presses(&self, plan: &Plan, met: &Insertion, depth: Millimetres) -> bool {
+        plan.ruptures.get(self.track.given).is_some_and(|next| depth.0 >= met.top(next.met))
     }
 }
 
-fn check(table: &ForceTable, ground: &Ground) -> Result<(), Refusal> {
-    let (stiff, largest) = (ground.stiffest, ground.largest);
-    within(Field::FrictionStiffness, table.stiffness.0, milli(50), stiff)?;
-    within(Field::Withdrawal, table.withdrawal, I16F16::ZERO, I16F16::ONE)?;
-    let knots = |field, low: I16F16, high: I16F16, knots: &mut dyn Iterator<Item = I16F16>| {
-        let mut from = low;
-        let mut count = 0;
-        for knot in knots {
-            // At least a hundredth apart: the slopes between them are computed.
-            let least = if count == 0 { low } else { from.saturating_add(milli(10)) };
-            within(field, knot, least, high)?;
-            (from, count) = (knot, count + 1);
-        }
-        if count == 0 { Err(Refusal::Count { field, found: 0, wanted: 1 }) } else { Ok(()) }
-    };
-    let angles = || table.angles.iter().map(|angle| I16F16::from_num(angle.0));
-    within(Field::TableDepth, table.depth_step.0, milli(50), milli(100_000))?;
-    knots(Field::TableSpeed, I16F16::ZERO, milli(1_000_000), &mut table.speeds.iter().map(|speed| speed.0))?;
-    knots(Field::TableAngle, I16F16::from_num(SMALLEST_ANGLE.0), milli(1_571_000), &mut angles())?;
-    let cells = table.cells();
-    let depths = table.forces.len() / cells;
-    count(Field::TableForce, table.forces.len(), cells * depths.max(2))?;
-    for (index, &force) in table.forces.iter().enumerate() {
-        let force = I16F16::from_num(force) / 1000;
-        within(Field::TableForce, force, I16F16::ZERO, milli(32_767))?;
-        if force > largest {
-            return Err(Refusal::TooStrong { layer: 0, force, limit: largest });
-        }
-        // The slope from the knot above; along a slanted needle it is less.
-        let Some(above) = index.checked_sub(cells).and_then(|above| table.forces.get(above)) else {
-            continue;
-        };
-        let rise = force.saturating_sub(I16F16::from_num(*above) / 1000);
-        let slope = rise.saturating_div(table.depth_step.0);
-        if slope > table.stiffness.0 {
-            return Err(Refusal::TooStiff { layer: 0, slope, limit: table.stiffness.0 });
+/// Of each knot and cell, the least of its force and those of the knots below it.
+fn hull(forces: &[u16], cells: usize) -> Vec<u16, { MAX_DEPTHS * MAX_CELLS }> {
+    let mut hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }> = forces.iter().copied().collect();
+    for index in (0..hull.len().saturating_sub(cells)).rev() {
+        let below = hull.get(index + cells).copied().unwrap_or(u16::MAX);
+        if let Some(force) = hull.get_mut(index) {
+            *force = (*force).min(below);
         }
     }
-    Ok(())
+    hull
 }

@@ -30,8 +30,8 @@ enum Way {
     Beside { depth: Millimetres },
 }
 
-/// Prepares what has been checked.
-pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
+/// Prepares what has been checked; `ruptures` has a bit for each layer that gives way by the law of force.
+pub(super) fn plan(config: &Config, met: &Meeting, ruptures: u8) -> Anatomy {
     let mut anatomy =
         Anatomy { vessel: None, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
     for (index, Met { number, layer }) in met.layers.iter().enumerate() {
@@ -41,6 +41,7 @@ pub(super) fn plan(config: &Config, met: &Meeting) -> Anatomy {
             depth: layer.depth,
             walls_above: anatomy.walls.len(),
             has_wall: layer.wall.is_some(),
+            opens: ruptures & 1_u8.unbounded_shl(u32::from(*number)),
         });
         if let Some(wall) = &layer.wall {
             let relief = wall.relief.vertex.0.saturating_sub(wall.puncture_travel.0);

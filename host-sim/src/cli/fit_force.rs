@@ -67,12 +67,14 @@ fn report(fit: &Fit) {
         (squares / fit.judged.len().max(1) as f64).sqrt()
     };
     say!(
-        "insertions={} cells={} measured={} judged={} force_rms_n={:.4} unseen_rms_n={:.4}",
+        "insertions={} cells={} measured={} judged={} force_rms_n={:.4} unseen_rms_n={:.4} gives_way={} worst_peak_percent={:.1}",
         fit.insertions.len(),
         fit.table.speeds_mm_s.len() * fit.table.angles_deg.len(),
         fit.table.cells.iter().flatten().filter(|c| c.origin == Origin::Measured).count(),
         fit.judged.len(),
         mean(|j| j.size_n),
-        mean(|j| j.unseen_n)
+        mean(|j| j.unseen_n),
+        fit.table.gives_way.len(),
+        force_fit::worst_peak(&fit.judged).unwrap_or(0.0) * 100.0
     );
 }

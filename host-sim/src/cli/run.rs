@@ -164,7 +164,8 @@ impl Run {
         let outcome = match &mut serial {
             Some(port) => station.run_in_real_time(port, seconds, progress)?,
             None => {
-                let mut device = VirtualDevice::new(&profile, procedure);
+                let mut device =
+                    VirtualDevice::held(&profile, procedure, part.as_ref().and_then(|part| part.grip));
                 if !self.fast {
                     device.take_times();
                 }

@@ -1,6 +1,7 @@
 //! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial port.
 
 pub mod compensated;
+pub mod grip;
 pub mod part;
 pub mod serial;
 pub mod virtual_device;

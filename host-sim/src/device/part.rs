@@ -3,6 +3,7 @@
 //! out: the built-in device's value stands then.
 
 use super::compensated::Compensated;
+use super::grip::Grip;
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::profile::fix;
@@ -24,6 +25,8 @@ pub struct DevicePart {
     pub device: Device,
     /// Under which the device has told it, where one has.
     seal: Option<u32>,
+    /// What its rollers hold, where it was measured.
+    pub grip: Option<Grip>,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
@@ -43,7 +46,7 @@ impl DevicePart {
         }
         let device = file.device().map_err(refuse)?;
         Plan::new(&device, &Patient::nobody()).map_err(|why| refuse(why.to_string()))?;
-        Ok(Self { name: file.name, device, seal: file.seal, source })
+        Ok(Self { name: file.name, device, seal: file.seal, grip: file.grip, source })
     }
 
     /// The command that gives it to a device.
@@ -78,6 +81,7 @@ struct File {
     #[serde(default)]
     mechanism: Moving,
     compensation: Option<Compensated>,
+    grip: Option<Grip>,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -183,6 +187,9 @@ impl File {
         if let Some(compensation) = &self.compensation {
             device.compensation = compensation.compensation()?;
         }
+        if let Some(grip) = self.grip {
+            grip.bound(&mut device, self.limits.torque_mnm)?;
+        }
         Ok(device)
     }
 
@@ -230,6 +237,8 @@ impl File {
                 dry_friction_n: Some(device.mechanism.dry_friction.0.to_num()),
                 delay_us: Some(device.mechanism.delay_us),
             },
+            // It is the ceiling of torque that a device keeps of it.
+            grip: None,
             compensation: device.compensation.is_some().then(|| Compensated::new(&device.compensation)),
         }
     }
@@ -311,6 +320,29 @@ mod tests {
         let part = parse(&to_toml("mine", &record).expect("it can be written")).expect("sound");
         assert_eq!(part.device, device);
         assert_eq!(part.command(), Command::RestoreDevice(record));
+    }
+
+    #[test]
+    fn no_torque_is_given_that_the_rollers_do_not_hold() {
+        // 6 N of pressing at 0.35 hold 2.1 N: 21 mN·m on a roller of 10 mm, instead of 28.8.
+        let gripped =
+            "format = 1\nname = \"x\"\ncommissioned = true\n[grip]\npressing_n = 6.0\nfriction = 0.35\n";
+        let part = parse(gripped).expect("sound");
+        assert!((part.device.limits.torque.0.to_num::<f64>() - 21.0).abs() < 1e-3);
+        // The shoulder at its scale asks for 2.86 N: refused before it starts. An adult's 1.0 N is fine.
+        let refused =
+            crate::profile::Profile::find_for("shoulder", &part.device).expect_err("too strong").to_string();
+        assert!(refused.contains("N") && !refused.contains('\n'), "{refused}");
+        assert!(crate::profile::Profile::find_for("adult", &part.device).is_ok());
+        // A firm grip takes nothing away; a stated ceiling above a loose one is refused.
+        let firm = parse(&gripped.replace("6.0", "20.0")).expect("sound");
+        assert_eq!(firm.device.limits.torque, Device::default().limits.torque);
+        let stated =
+            parse(&format!("{gripped}[limits]\ntorque_mnm = 25.0\n")).expect_err("above").to_string();
+        assert!(stated.contains("slips at 2.10 N") && stated.contains("device.toml"), "{stated}");
+        for (wrong, hint) in [("6.0", "0.0"), ("6.0", "nan"), ("0.35", "5.0")] {
+            assert!(parse(&gripped.replacen(wrong, hint, 1)).is_err(), "{hint}");
+        }
     }
 
     #[test]

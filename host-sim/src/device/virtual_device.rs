@@ -1,6 +1,7 @@
 //! The device without the hardware: the control core, tick by tick, against the plant, behind the same end of the link that
 //! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
 
+use super::grip::Grip;
 use crate::plant::{Plant, PlantConfig};
 use crate::procedure::{Procedure, Target};
 use crate::profile::Profile;
@@ -62,6 +63,11 @@ pub struct VirtualDevice {
 impl VirtualDevice {
     /// Powered down, the needle where `procedure` begins, the device configured as it leaves the bench: with the defaults.
     pub fn new(profile: &Profile, procedure: Procedure) -> Self {
+        Self::held(profile, procedure, None)
+    }
+
+    /// The same, with rollers that let the needle slip at another force than usual.
+    pub fn held(profile: &Profile, procedure: Procedure, grip: Option<Grip>) -> Self {
         let device = &profile.config.device;
         // A device that is too weak for the default patient waits for the one that it is for.
         let plan = Plan::new(device, &Patient::default()).unwrap_or_else(|_| profile.plan.clone());
@@ -70,6 +76,8 @@ impl VirtualDevice {
             device.counts_per_turn,
             device.full_scale_torque.0.to_num::<f64>() * 1e-3,
         );
+        let mechanism =
+            PlantConfig { grip_force: grip.map_or(mechanism.grip_force, Grip::slips_at_n), ..mechanism };
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
         plant.set_tilt(procedure.entry_rad.unwrap_or(profile.entry_rad) + profile.skin_tilt_rad());
         Self {

@@ -1,25 +1,25 @@
 //! From insertions at several speeds and angles to the force table of seed 000, and how good it is on insertions that it has not seen.
 //!
-//! [`insertions`] reads recordings, [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may not run a
-//! device, and it takes a force as it was measured, whoever measured it.
+//! [`insertions`] reads recordings, [`falls`], [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may
+//! not run a device, and it takes a force as it was measured, whoever measured it. What is judged is the table that is written.
 
 pub mod curve;
+pub mod falls;
 pub mod insertions;
 pub mod page;
 pub mod table;
 pub mod written;
 
+use control_core::config::MAX_LAYERS;
+use curve::{Landmarks, Overlaid};
+use falls::{Fall, falls};
 use insertions::Insertion;
-use table::{Knots, Table};
+use table::{Measured, Table};
 
 /// Speeds that differ by less than this share are one speed of the design.
 const SAME_SPEED: f64 = 0.2;
 /// Angles that differ by less than this are one angle of the design, °.
 const SAME_ANGLE_DEG: f64 = 4.0;
-/// The smallest distance between knots, mm: finer than a puncture's fall is not felt.
-const FINEST_STEP_MM: f64 = 0.2;
-/// The most knots: as many as the device has room for.
-pub const MOST_KNOTS: usize = 64;
 
 /// How well an insertion is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +38,20 @@ pub struct Judgement {
     pub seen_n: Option<f64>,
     /// Whether the table had another insertion at this speed and angle.
     pub has_neighbours: bool,
+    /// Of each layer that gives way, the force at which it does: measured and in the table, N.
+    pub peaks_n: Vec<(f64, f64)>,
+}
+
+impl Judgement {
+    /// The largest share by which a peak is missed; none where no layer gives way.
+    pub fn worst_peak(&self) -> Option<f64> {
+        self.peaks_n.iter().map(|(measured, table)| (table / measured - 1.0).abs()).max_by(f64::total_cmp)
+    }
+}
+
+/// The largest share by which a peak of any of them is missed.
+pub fn worst_peak(judged: &[Judgement]) -> Option<f64> {
+    judged.iter().filter_map(Judgement::worst_peak).max_by(f64::total_cmp)
 }
 
 /// A fitted table and what is known of it.
@@ -77,6 +91,13 @@ fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>
         (other.speed_mm_s / one.speed_mm_s - 1.0).abs() < SAME_SPEED
             && (other.angle_deg - one.angle_deg).abs() < SAME_ANGLE_DEG
     };
+    let found = falls(&one.points);
+    // Where a layer was seen that the table does not have, or the other way, peaks cannot be told apart.
+    let curve = table.curve(one.speed_mm_s, one.angle_deg);
+    let is_same = found.len() == table.gives_way.len();
+    let peaks = table.gives_way.iter().map(|knot| curve.forces_n[*knot]);
+    let peaks_n =
+        if is_same { found.iter().map(|fall| fall.peak_n).zip(peaks).collect() } else { Vec::new() };
     Judgement {
         name: one.name.clone(),
         speed_mm_s: one.speed_mm_s,
@@ -85,38 +106,83 @@ fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>
         unseen_n: rms(table, one),
         seen_n,
         has_neighbours: seen.iter().any(beside),
+        peaks_n,
     }
 }
 
 /// Root mean square of measured less fitted, N.
 fn rms(table: &Table, one: &Insertion) -> f64 {
-    let squares = one.points.iter().map(|(depth, force)| {
-        let left = force - table.force_n(*depth, one.speed_mm_s, one.angle_deg);
-        left * left
-    });
+    let curve = table.curve(one.speed_mm_s, one.angle_deg);
+    let squares = one.points.iter().map(|(depth, force)| (force - curve.at(*depth)).powi(2));
     (squares.sum::<f64>() / one.points.len().max(1) as f64).sqrt()
 }
 
 fn fit_table(insertions: &[Insertion]) -> Option<Table> {
     let speeds = groups(insertions.iter().map(|i| i.speed_mm_s), |mean, v| v < mean * (1.0 + SAME_SPEED));
     let angles = groups(insertions.iter().map(|i| i.angle_deg), |mean, a| a < mean + SAME_ANGLE_DEG);
-    let mut points = vec![vec![Vec::new(); angles.len()]; speeds.len()];
-    for one in insertions {
-        let cell = &mut points[nearest(&speeds, one.speed_mm_s)][nearest(&angles, one.angle_deg)];
-        cell.extend_from_slice(&one.points);
+    let deepest = insertions.iter().flat_map(|i| i.points.iter().map(|p| p.0)).fold(0.0, f64::max);
+    if deepest <= 0.0 {
+        return None;
     }
-    Table::fit(speeds, angles, &points, knots(insertions)?)
+    let found = same_falls(insertions);
+    let cell_of = |one: &Insertion| (nearest(&speeds, one.speed_mm_s), nearest(&angles, one.angle_deg));
+    let cell = |s: usize, a: usize| {
+        let there: Vec<usize> =
+            (0..insertions.len()).filter(|index| cell_of(&insertions[*index]) == (s, a)).collect();
+        let marks = |falls: &[Fall]| landmarks(falls, deepest);
+        // An insertion in which a layer was not seen to give way is laid over the others as they do.
+        let usual = mean_falls(there.iter().filter_map(|index| found[*index].as_deref()))
+            .or_else(|| mean_falls(found.iter().flatten().map(Vec::as_slice)))?;
+        let mut points = Overlaid::new(marks(&usual).pieces());
+        for &index in &there {
+            points.add(&marks(found[index].as_deref().unwrap_or(&usual)), &insertions[index].points);
+        }
+        (!there.is_empty()).then(|| Measured { marks: marks(&usual), points })
+    };
+    let cells: Vec<Vec<_>> =
+        (0..speeds.len()).map(|s| (0..angles.len()).map(|a| cell(s, a)).collect()).collect();
+    Table::fit(speeds, angles, &cells)
 }
 
-/// From the skin to the deepest place that anybody reached.
-fn knots(insertions: &[Insertion]) -> Option<Knots> {
-    let depths = insertions.iter().flat_map(|i| i.points.iter().map(|p| p.0));
-    let deepest = depths.fold(0.0, f64::max);
-    (deepest > 0.0).then(|| {
-        let step_mm = FINEST_STEP_MM.max(deepest / (MOST_KNOTS - 1) as f64);
-        let count = (deepest / step_mm).ceil() as usize + 1;
-        Knots { first_mm: 0.0, step_mm, count: count.clamp(2, MOST_KNOTS) }
-    })
+/// As many falls for each insertion as most of them have, the largest ones; none for one that has fewer.
+fn same_falls(insertions: &[Insertion]) -> Vec<Option<Vec<Fall>>> {
+    let all: Vec<Vec<Fall>> = insertions.iter().map(|one| falls(&one.points)).collect();
+    let mut counts: Vec<usize> = all.iter().map(Vec::len).collect();
+    counts.sort_unstable();
+    let usual = counts.get(counts.len() / 2).copied().unwrap_or(0).min(MAX_LAYERS);
+    let largest = |mut falls: Vec<Fall>| {
+        falls.sort_by(|a, b| b.drop_n.total_cmp(&a.drop_n));
+        falls.truncate(usual);
+        falls.sort_by(|a, b| a.peak_mm.total_cmp(&b.peak_mm));
+        (falls.len() == usual).then_some(falls)
+    };
+    all.into_iter().map(largest).collect()
+}
+
+/// The means of falls that belong together; none where there is no insertion.
+fn mean_falls<'a>(all: impl Iterator<Item = &'a [Fall]>) -> Option<Vec<Fall>> {
+    let all: Vec<&[Fall]> = all.collect();
+    let first = all.first()?;
+    let mean = |index: usize, of: fn(&Fall) -> f64| {
+        all.iter().map(|falls| of(&falls[index])).sum::<f64>() / all.len() as f64
+    };
+    let falls = (0..first.len()).map(|index| Fall {
+        peak_mm: mean(index, |fall| fall.peak_mm),
+        end_mm: mean(index, |fall| fall.end_mm),
+        peak_n: mean(index, |fall| fall.peak_n),
+        drop_n: mean(index, |fall| fall.drop_n),
+    });
+    Some(falls.collect())
+}
+
+/// The skin, the beginning and the end of each fall, the deepest place.
+fn landmarks(falls: &[Fall], deepest_mm: f64) -> Landmarks {
+    let mut marks = vec![0.0];
+    marks.extend(falls.iter().flat_map(|fall| [fall.peak_mm, fall.end_mm]));
+    // A little beyond the last fall at the least, and beyond the deepest point, so that it counts.
+    let last = marks.last().copied().unwrap_or(0.0);
+    marks.push(deepest_mm.max(last + 0.2) + 1e-6);
+    Landmarks(marks)
 }
 
 /// Means of groups of values that lie together, rising.

@@ -41,6 +41,7 @@ pub fn html(fit: &Fit) -> String {
             "left unseen, N rms",
             "left seen, N rms",
             "another there",
+            "worst peak, %",
         ],
         &judged.iter().map(row).collect::<Vec<_>>(),
     );
@@ -96,9 +97,8 @@ fn charts(fit: &Fit) -> Vec<(String, String)> {
                     ..Curve::default()
                 }));
                 let cell = &table.cells[s][a];
-                let knots = cell.force.values.iter().enumerate();
-                let points =
-                    knots.map(|(k, v)| (cell.force.first + k as f64 * cell.force.step, *v)).collect();
+                let knots = cell.force.depths_mm.iter().zip(&cell.force.forces_n);
+                let points = knots.map(|(mm, n)| (*mm, *n)).collect();
                 let filled = cell.origin != Origin::Measured;
                 let name = format!("{} mm/s{}", decimal(*speed, 1), if filled { ", no data" } else { "" });
                 curves.push(Curve { name, colour, dashed: filled, points });
@@ -124,5 +124,6 @@ fn row(one: &Judgement) -> Vec<Field> {
         Field::number(Some(one.unseen_n), 3),
         Field::number(one.seen_n, 3),
         Field::text(if one.has_neighbours { "yes" } else { "no" }),
+        Field::number(one.worst_peak().map(|share| share * 100.0), 1),
     ]
 }

@@ -3,11 +3,17 @@
 
 use super::{Layer, fix};
 use control_core::config::{
-    Cutting, Fixture, ForceTable, FrictionLaw, Law, Lugre, MAX_ANGLES, MAX_DEPTHS, MAX_SPEEDS, Sparte,
+    Cutting, Fixture, ForceTable, FrictionLaw, Law, Lugre, MAX_ANGLES, MAX_DEPTHS, MAX_LAYERS, MAX_SPEEDS,
+    Sparte,
 };
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
 use fixed::types::I8F24;
 use serde::Deserialize;
+
+/// The largest force that a table holds.
+const MOST_MILLINEWTONS: f64 = 16_383.0;
+/// Its deepest knot, 0.01 mm.
+const MOST_HUNDREDTHS: f64 = 16_383.0;
 
 /// The law of force, by the name that `--model` has for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +55,11 @@ impl Model {
     }
 }
 
+/// Share of the cutting force that is left where a wall has just given way; an assumption where it is left out: the paper gives none.
+fn after_puncture() -> f64 {
+    0.6
+}
+
 /// `[law]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "model", rename_all = "kebab-case")]
@@ -56,7 +67,14 @@ pub(super) enum Table {
     /// Its friction stands in `[friction]`.
     Jog {},
     /// The polynomials of its walls and the forces of cutting stand in the layers.
-    Sparte { tracking_n_per_mm: f64, relax_ms: u16, friction: Bristles, fixture: Direction },
+    Sparte {
+        tracking_n_per_mm: f64,
+        relax_ms: u16,
+        #[serde(default = "after_puncture")]
+        after_puncture: f64,
+        friction: Bristles,
+        fixture: Direction,
+    },
     /// Its table stands in `[force_table]`, as `fit-force` writes it.
     Xr { stiffness_n_per_mm: f64, withdrawal: f64 },
 }
@@ -83,13 +101,26 @@ pub(super) struct Direction {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Forces {
-    depth_step_mm: f64,
+    /// From one knot to the next; or each knot in `depths_mm`.
+    depth_step_mm: Option<f64>,
+    depths_mm: Option<Depths>,
     speeds_mm_s: Vec<f64>,
     angles_deg: Vec<f64>,
     /// True for each speed and angle that was measured; the angles of a speed together.
     measured: Vec<bool>,
     /// As many rows, a force for each depth.
     force_n: Vec<Vec<f64>>,
+    /// Knots, counted from 0, at which a layer gives way; without it, none does.
+    #[serde(default)]
+    gives_way: Vec<u8>,
+}
+
+/// `depths_mm`: the same knots for all speeds and angles, or a row for each, like `force_n`.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Depths {
+    Shared(Vec<f64>),
+    Each(Vec<Vec<f64>>),
 }
 
 /// `[friction]`, of the jog law.
@@ -123,13 +154,16 @@ pub(super) fn law(
             Some(friction) => Law::Jog(friction.law()?),
             None => usual.clone(),
         },
-        Some(Table::Sparte { tracking_n_per_mm, relax_ms, friction, fixture }) => Law::Sparte(Sparte {
-            tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
-            relax_ms: *relax_ms,
-            cutting: cutting(layers)?.into_iter().collect(),
-            friction: friction.lugre()?,
-            fixture: fixture.fixture()?,
-        }),
+        Some(Table::Sparte { tracking_n_per_mm, relax_ms, after_puncture, friction, fixture }) => {
+            Law::Sparte(Sparte {
+                tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
+                relax_ms: *relax_ms,
+                after_puncture: fix("after_puncture", *after_puncture)?,
+                cutting: cutting(layers)?.into_iter().collect(),
+                friction: friction.lugre()?,
+                fixture: fixture.fixture()?,
+            })
+        }
         Some(Table::Xr { stiffness_n_per_mm, withdrawal }) => {
             let forces = forces
                 .ok_or("[force_table] is missing; law.model xr needs the table that fit-force writes")?;
@@ -247,15 +281,22 @@ impl Forces {
         for depth in 0..depths {
             for row in &self.force_n {
                 let millinewtons = (row[depth] * 1e3).round();
-                if !(0.0..=f64::from(i16::MAX)).contains(&millinewtons) {
-                    return Err(format!("force_n holds {}; a force must be from 0 to 32.767", row[depth]));
+                if !(0.0..=MOST_MILLINEWTONS).contains(&millinewtons) {
+                    return Err(format!("force_n holds {}; a force must be from 0 to 16.383", row[depth]));
                 }
-                forces.push(millinewtons as i16);
+                forces.push(millinewtons as u16);
             }
+        }
+        if self.gives_way.len() > MAX_LAYERS {
+            return Err(format!(
+                "gives_way has {} knots; at most {MAX_LAYERS} are possible",
+                self.gives_way.len()
+            ));
         }
         let bits = self.measured.iter().enumerate().filter(|(_, is)| **is);
         Ok(ForceTable {
-            depth_step: Millimetres(fix("depth_step_mm", self.depth_step_mm)?),
+            depths: self.depths(depths)?.into_iter().collect(),
+            gives_way: self.gives_way.iter().copied().collect(),
             measured: bits.fold(0, |bits, (cell, _)| bits | 1_u16.checked_shl(cell as u32).unwrap_or(0)),
             stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness)?),
             withdrawal: fix("withdrawal", withdrawal)?,
@@ -264,6 +305,38 @@ impl Forces {
             speeds: speeds.into_iter().collect(),
             angles: angles.into_iter().collect(),
         })
+    }
+}
+
+impl Forces {
+    /// Of each of `count` knots in hundredths of a mm, in the order of the forces, or once for all cells.
+    fn depths(&self, count: usize) -> Result<Vec<u16>, String> {
+        if let Some(step) = self.depth_step_mm.filter(|step| !step.is_finite()) {
+            return Err(format!("depth_step_mm is {step}; it must be a number"));
+        }
+        let hundredths = |mm: f64| {
+            let hundredths = (mm * 100.0).round();
+            if (0.0..=MOST_HUNDREDTHS).contains(&hundredths) {
+                Ok(hundredths as u16)
+            } else {
+                Err(format!("[force_table] has a knot at {mm} mm; it must lie from 0 to 163.83"))
+            }
+        };
+        match (self.depth_step_mm, &self.depths_mm) {
+            (Some(step), None) => (0..count).map(|knot| hundredths(step * knot as f64)).collect(),
+            (None, Some(Depths::Shared(row))) if row.len() == count => {
+                row.iter().map(|mm| hundredths(*mm)).collect()
+            }
+            (None, Some(Depths::Each(rows)))
+                if rows.len() == self.force_n.len() && rows.iter().all(|row| row.len() == count) =>
+            {
+                (0..count).flat_map(|knot| rows.iter().map(move |row| hundredths(row[knot]))).collect()
+            }
+            (None, Some(_)) => Err(format!(
+                "depths_mm must have {count} values, as many as a row of force_n, or a row of them for each row of force_n"
+            )),
+            _ => Err("[force_table] needs either depth_step_mm or depths_mm".into()),
+        }
     }
 }
 

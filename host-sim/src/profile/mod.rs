@@ -2,8 +2,10 @@
 //! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
 //! refuses is refused here too.
 
+mod goal;
 mod law;
 mod person;
+mod rupture;
 
 use crate::failure::Failure;
 use crate::library::{self, Text};
@@ -14,6 +16,7 @@ use control_core::{Device, Patient, Plan, plan};
 use fixed::types::I16F16;
 use serde::Deserialize;
 
+pub use goal::Goal;
 pub use law::Model;
 use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
@@ -46,6 +49,8 @@ pub struct Profile {
     pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
+    /// What the needle is to reach.
+    goal: Option<goal::Written>,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
@@ -75,12 +80,14 @@ impl Profile {
         }
         check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
         file.patient.check().map_err(refuse)?;
+        file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
         let config = Config { device: *device, patient: file.config().map_err(refuse)? };
         let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
         let spared =
             (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
         Ok(Self {
             spared: spared.collect(),
+            goal: file.target,
             procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
             person: file.patient,
             name: file.name,
@@ -98,14 +105,22 @@ impl Profile {
 
     /// Returns the scene for a picture.
     pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
-        let layers = self.config.patient.layers.iter().map(|layer| SceneLayer {
+        let ruptures = rupture::ruptures(&self.config.patient, self.entry_rad);
+        let sine = libm::sin(self.entry_rad);
+        let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
             name: tissue_name(layer.tissue).to_owned(),
             is_vessel: layer.tissue == Tissue::Vessel,
             is_far_wall: layer.tissue == Tissue::FarWall,
             depth_mm: layer.depth.0.to_num(),
-            puncture_travel_mm: layer.wall.map(|wall| wall.puncture_travel.0.to_num()),
+            puncture_travel_mm: match layer.wall {
+                Some(wall) => Some(wall.puncture_travel.0.to_num()),
+                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.below_mm / sine),
+            },
             spring_back: layer.wall.map(|wall| wall.spring_back.to_num()),
-            puncture_force_n: layer.wall.map(|wall| force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
+            puncture_force_n: match layer.wall {
+                Some(wall) => Some(force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
+                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.force_n),
+            },
             friction_n_per_mm: layer.friction.0.to_num(),
         });
         let deepest_mm = self.config.patient.layers.last().map_or(0.0, |layer| layer.depth.0.to_num::<f64>());
@@ -118,6 +133,7 @@ impl Profile {
             roller_radius_mm: self.config.device.roller_radius.0.to_num(),
             travel_mm: self.config.device.limits.travel.0.to_num(),
             largest_force_n: self.plan.largest_force().0.to_num(),
+            force_scale: self.config.patient.scale.to_num(),
             tilt_rad: self.tilt_rad(),
             skin_tilt_rad: self.skin_tilt_rad(),
             vessel: self.vessel(),
@@ -129,6 +145,17 @@ impl Profile {
     pub fn at_angle(self, degrees: f64) -> Result<Self, Failure> {
         check_angle("--angle", degrees).map_err(Failure::input)?;
         Ok(Self { entry_rad: degrees.to_radians(), ..self })
+    }
+
+    /// What people call layer `number`.
+    pub fn layer_name(&self, number: u8) -> Option<String> {
+        let layer = self.config.patient.layers.get(usize::from(number))?;
+        Some(tissue_name(layer.tissue).to_owned())
+    }
+
+    /// What the needle is to reach: what the file says, else the vessel's lumen where there is a vessel.
+    pub fn goal(&self) -> Option<Goal> {
+        goal::goal(self.goal, &self.config.patient, self.entry_rad)
     }
 
     /// Inclination of the needle laid on the skin, in rad.
@@ -216,6 +243,7 @@ struct File {
     force_table: Option<law::Forces>,
     layer: Vec<Layer>,
     vessel: Option<Vessel>,
+    target: Option<goal::Written>,
 }
 
 #[derive(Deserialize)]

@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::recording::export::{Stretch, stretches};
 use crate::recording::read::Recording;
+use crate::score::target::Reached;
 use crate::score::{Judge, spans};
 use control_core::TICK_HZ;
 use link::frames::EventKind;
@@ -76,6 +77,41 @@ impl Trace {
     pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
         let judge = Judge::new(profile, self.stretch.first_tick);
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
+    }
+
+    /// Index at which the needle has come to rest after `from`: not a count for a tenth of a second.
+    pub(super) fn at_rest(&self, from: usize) -> usize {
+        let samples = self.stretch.samples.get(from..).unwrap_or_default();
+        let tenth = TICK_HZ as usize / 10;
+        let still = samples.windows(tenth).position(|part| {
+            let first = part.first().map_or(0, |s| s.count);
+            part.iter().all(|s| s.count == first)
+        });
+        from + still.unwrap_or(0)
+    }
+
+    /// What became of the patient's target in the first insertion.
+    pub(super) fn target(&self, profile: &Profile) -> Option<Reached> {
+        let judge = Judge::new(profile, self.stretch.first_tick);
+        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
+    }
+
+    /// Way of the tip in mm, and the force across the needle that would hold its direction of entry, N: `per_rad` for each radian off it,
+    /// up to `most_rad`; from the first contact to the last exit.
+    pub(super) fn lateral_over_way(&self, per_rad: f64, most_rad: f64) -> Vec<(f64, f64)> {
+        let Some(begin) = self.event(0, is_contact_with(0)) else { return Vec::new() };
+        let end = self.event(begin, is_exit_from(0)).unwrap_or_else(|| self.len());
+        let entry = self.angle_at(begin);
+        let mut way_mm = 0.0;
+        let mut last = self.depth_at(begin);
+        (begin..end)
+            .step_by(100)
+            .map(|index| {
+                let depth = self.depth_at(index);
+                way_mm += (depth - std::mem::replace(&mut last, depth)).abs();
+                (way_mm, per_rad * (self.angle_at(index) - entry).clamp(-most_rad, most_rad))
+            })
+            .collect()
     }
 
     /// Index of the deepest place.

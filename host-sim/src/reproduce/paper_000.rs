@@ -1,9 +1,10 @@
-//! Seed 000, layered tissue in extended reality: force against depth at its speeds and angles (Fig. 2), and Table 1.
+//! Paper 000, layered tissue in extended reality: force against depth at its speeds and angles (Fig. 2), and Table 1.
 
-use super::measure::{Trace, is_contact_with};
+use super::measure::{Trace, is_contact_with, is_puncture_of};
 use super::{Row, Whose, numbers, row};
 use crate::failure::Failure;
-use crate::force_fit::{self, Judgement, insertions};
+use crate::force_fit::insertions::{self, Insertion};
+use crate::force_fit::{self, Judgement};
 use crate::procedure::Procedure;
 use crate::profile::Profile;
 use crate::rehearsal;
@@ -42,7 +43,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         cuts.push(Cut { speed, angle, trace, file });
     }
     let mut sheet = Sheet::new(
-        "A Hybrid Virtual Reality-Haptic Simulation Framework for Layer-aware Needle Insertion in Extended Reality (seed 000)",
+        "A Hybrid Virtual Reality-Haptic Simulation Framework for Layer-aware Needle Insertion in Extended Reality (paper 000)",
         "The paper prints its protocol and Table 1, and no force: its force function is a picture of a screen, and its measurements are curves \
          without numbers in the text. Its curves count here as shape only.",
     );
@@ -51,9 +52,19 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
          patient's file says: the paper prints none. Protocol, layers, vessel test and the fit of a table are those of the paper.",
     );
     sheet.heading("Numbers");
-    let mut rows = rows(&profile, &cuts);
-    rows.extend(fitted(&cuts)?);
-    numbers(&mut sheet, &rows);
+    numbers(&mut sheet, &rows(&profile, &cuts));
+    sheet.heading("Cells that the paper measured");
+    numbers(&mut sheet, &largest(&cuts, true));
+    sheet.heading("Cells that the paper did not measure: extrapolated");
+    numbers(&mut sheet, &largest(&cuts, false));
+    let (compared, fit) = fitted(&cuts)?;
+    sheet.heading("The generated profile against the insertions (Fig. 4 against Fig. 2)");
+    sheet.paragraph(
+        "The paper says that the trend of its generated profile resembles that of its measurements. The same comparison here: the insertions of its five cells, \
+         recorded with the phantom's table, and the table that fit-force makes of them. Both come from our phantom; no real insertion is in it.",
+    );
+    numbers(&mut sheet, &compared);
+    sheet.paragraph(&fit);
     sheet.heading("Fig. 2 and 4: force against depth");
     let of = |wanted: &dyn Fn(&Cut) -> bool, name: &dyn Fn(&Cut) -> String, title: &str| {
         let curves = cuts.iter().filter(|c| wanted(c)).zip(0..);
@@ -69,6 +80,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
                     points: c.trace.force_over_depth(0..c.trace.deepest()),
                 })
                 .collect(),
+            marks: cuts.iter().find(|c| wanted(c)).map_or_else(Vec::new, |c| marks(&profile, c)),
             ..Chart::default()
         }
         .svg()
@@ -112,6 +124,8 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     for words in [
         "The force function is “described in Figure 3”, which is a picture of a screen. Here the force is a table over depth, speed and angle, which fit-force fits to insertions.",
         "Five of nine cells of speed and angle were measured. The other four are taken as separable; nothing in the paper says that they are.",
+        "No real insertion was compared with: every curve here comes from the phantom's table.",
+        "What a needle feels in a track that it has made already, and beside it: here a layer gives way once, and in its track the force is the lower hull of the table.",
         "Whether speed matters is disputed between sources: it is a parameter of the table.",
     ] {
         sheet.paragraph(words);
@@ -119,27 +133,75 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     Ok(sheet)
 }
 
-/// What fit-force makes of the paper's five cells, and how it tells the four that the paper did not measure.
-fn fitted(cuts: &[Cut]) -> Result<Option<Row>, Failure> {
+/// Where the layers are met and where they give way on one of the curves, mm along the needle.
+fn marks(profile: &Profile, cut: &Cut) -> Vec<(f64, String)> {
+    let of = |number: u8, tissue: Tissue| {
+        let named = |index: Option<usize>, what: &str| {
+            index.map(|at| (cut.trace.depth_mm(at), format!("{} {what}", tissue_name(tissue))))
+        };
+        let met = named(cut.trace.event(0, is_contact_with(number)), "met");
+        let gives_way = named(cut.trace.event(0, is_puncture_of(number)), "gives way");
+        met.into_iter().chain(gives_way)
+    };
+    (0..).zip(&profile.config.patient.layers).flat_map(|(number, layer)| of(number, layer.tissue)).collect()
+}
+
+/// The largest force of each cell that the paper measured, or of each of the others.
+fn largest(cuts: &[Cut], measured: bool) -> Vec<Row> {
+    let of = |cut: &Cut| {
+        row(
+            &format!("largest force, {} mm/s, {}°", cut.speed, cut.angle),
+            if measured { "a curve without numbers" } else { "not measured" },
+            format!("{} N", decimal(cut.trace.largest_n(0..cut.trace.deepest()), 2)),
+            Whose::NoneGiven,
+        )
+    };
+    cuts.iter().filter(|cut| cut.is_the_papers() == measured).map(of).collect()
+}
+
+/// What fit-force makes of the paper's five cells, beside the insertions that it was made from, and in a sentence how it tells the other four.
+fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Failure> {
     let read = |wanted: bool| -> Result<Vec<_>, Failure> {
         let files = cuts.iter().filter(|c| c.is_the_papers() == wanted).map(|c| insertions::read(&c.file));
         Ok(files.collect::<Result<Vec<_>, _>>()?.concat())
     };
-    let fit = force_fit::fit(read(true)?, &read(false)?);
-    Ok(fit.map(|fit| {
-        let rms = |value: fn(&Judgement) -> f64| {
-            let squares: f64 = fit.judged.iter().map(|j| value(j).powi(2)).sum();
-            (squares / fit.judged.len().max(1) as f64).sqrt()
-        };
-        let said =
-            format!("{} N rms of {} N", decimal(rms(|j| j.unseen_n), 3), decimal(rms(|j| j.size_n), 2));
-        row(
-            "what a table fitted to the paper's five cells leaves of the other four",
-            "“the trend resembles”",
-            said,
-            Whose::NoneGiven,
-        )
-    }))
+    let Some(fit) = force_fit::fit(read(true)?, &read(false)?) else {
+        return Ok((Vec::new(), String::new()));
+    };
+    let compared = |one: &Insertion| {
+        let curve = fit.table.curve(one.speed_mm_s, one.angle_deg);
+        let pairs: Vec<(f64, f64)> = one.points.iter().map(|(mm, n)| (*n, curve.at(*mm))).collect();
+        let said = format!(
+            "correlation {}, {} N rms apart",
+            decimal(correlation(&pairs), 3),
+            decimal((pairs.iter().map(|(a, b)| (a - b).powi(2)).sum::<f64>() / pairs.len() as f64).sqrt(), 3)
+        );
+        let what = format!("{} mm/s, {}°", decimal(one.speed_mm_s, 0), decimal(one.angle_deg, 0));
+        row(&what, "“the trend resembles”", said, Whose::NoneGiven)
+    };
+    let rms = |value: fn(&Judgement) -> f64| {
+        let squares: f64 = fit.judged.iter().map(|j| value(j).powi(2)).sum();
+        (squares / fit.judged.len().max(1) as f64).sqrt()
+    };
+    let said = format!(
+        "The four other cells, which the table has not seen: {} N rms apart, of {} N.",
+        decimal(rms(|j| j.unseen_n), 3),
+        decimal(rms(|j| j.size_n), 2)
+    );
+    Ok((fit.insertions.iter().map(compared).collect(), said))
+}
+
+/// Pearson's coefficient.
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len() as f64;
+    let (a, b) = pairs.iter().fold((0.0, 0.0), |(a, b), pair| (a + pair.0 / n, b + pair.1 / n));
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        ab += (x - a) * (y - b);
+        aa += (x - a).powi(2);
+        bb += (y - b).powi(2);
+    }
+    ab / (aa * bb).sqrt()
 }
 
 fn names(profile: &Profile) -> String {
@@ -155,15 +217,6 @@ fn rows(profile: &Profile, cuts: &[Cut]) -> Vec<Row> {
         row("angles", "30, 45 and 60°", "30, 45 and 60°", Whose::Papers),
         row("layers", "3: skin, vessel, skin", names(profile), Whose::Ours),
     ];
-    for cut in cuts {
-        let largest = cut.trace.largest_n(0..cut.trace.deepest());
-        rows.push(row(
-            &format!("largest force, {} mm/s, {}°", cut.speed, cut.angle),
-            if cut.is_the_papers() { "a curve without numbers" } else { "not measured" },
-            format!("{} N", decimal(largest, 2)),
-            Whose::NoneGiven,
-        ));
-    }
     if let Some(vessel) = vessel {
         for cut in cuts.iter().filter(|c| c.speed == 5) {
             let contact = cut.trace.event(0, is_contact_with(vessel as u8));
@@ -176,6 +229,12 @@ fn rows(profile: &Profile, cuts: &[Cut]) -> Vec<Row> {
                 ours,
                 Whose::NoneGiven,
             ));
+            let gives_way = cut.trace.event(0, is_puncture_of(vessel as u8));
+            let ours = gives_way.map_or("–".into(), |at| {
+                format!("{} mm along the needle", decimal(cut.trace.depth_mm(at), 1))
+            });
+            let what = format!("vessel gives way at {}°", cut.angle);
+            rows.push(row(&what, "“tissue rupture”, no number", ours, Whose::NoneGiven));
         }
     }
     rows

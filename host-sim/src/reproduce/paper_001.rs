@@ -1,9 +1,10 @@
-//! Seed 001, the roller device for venepuncture: Fig. 5 (the profile of an intravenous injection) and the hold of eq. 2.
+//! Paper 001, the roller device for venepuncture: Fig. 5 (the profile of an intravenous injection) and the hold of eq. 2.
 
 use super::measure::{Trace, is_puncture_of};
 use super::{Row, Whose, numbers, row};
 use crate::failure::Failure;
 use crate::library::Text;
+use crate::plant::motor::Motor;
 use crate::procedure::Procedure;
 use crate::profile::Profile;
 use crate::rehearsal;
@@ -33,7 +34,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     let as_printed = run(&printed, "hold", "paper-001-hold-printed.mcap")?;
 
     let mut sheet = Sheet::new(
-        "Needle Insertion Simulator with Haptic Feedback (seed 001)",
+        "Needle Insertion Simulator with Haptic Feedback (paper 001)",
         "The paper prints the motor's and the encoder's figures and no force: its Fig. 5 is a shape, and its two equations have no values. \
          What it does not print is ours, from the sources in the patient's file.",
     );
@@ -42,10 +43,12 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     sheet.heading("Fig. 5 and the hold of eq. 2");
     sheet.figures(&[
         (profile_chart(&cone, &injection), "Fig. 5: elasticity of the skin, friction in the tissue between (the paper's muscle), elasticity of the vessel. Way in and way out; the paper's axes have no numbers.".into()),
-        (hold_chart(&with_cone, &as_printed), "A needle held still between skin and vessel. Eq. 2 as printed lets go of it within a tenth of a second; a friction cone holds it, as seed 002 asks (its need 4).".into()),
+        (hold_chart(&with_cone, &as_printed), "A needle held still between skin and vessel. Eq. 2 as printed lets go of it within a tenth of a second; a friction cone holds it, as paper 002 asks (its need 4).".into()),
     ]);
     sheet.heading("What the paper leaves open");
     for words in [
+        "24 V, 0.6 A and 28.8 mN·m do not belong to one of the RE25's windings: at 0.6 A the 24 V winding makes 14 mN·m, half of what the paper says. \
+         Here the torque is the paper's and the current follows from the winding; the amplifier must give it.",
         "P_curr_f is called the current position. Taken so, eq. 2 has no state; we read it as an anchor that follows the needle, and P_pre as the \
          anchor of the tick before, as the equation's last line sets it.",
         "S_f1 and S_f2 have no values, and from position to torque a factor is missing. Ours: S_f1 23 mm, S_f2 from a time constant of 50 ms, 0.25 N/mm.",
@@ -63,6 +66,7 @@ fn number(profile: &Profile, tissue: Tissue) -> Option<u8> {
 
 fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> Vec<Row> {
     let device = &profile.config.device;
+    let motor = Motor::re25(device.full_scale_torque.0.to_num::<f64>() * 1e-3);
     let newtons = |n: f64| format!("{} N", decimal(n, 2));
     let mut rows = vec![
         row(
@@ -73,10 +77,15 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
         ),
         row("counts in a turn of the roller", "4000", device.counts_per_turn.to_string(), Whose::Papers),
         row("rate of the control loop", "10 kHz", format!("{} kHz", TICK_HZ / 1000), Whose::Papers),
+        row("supply of the motor", "24 V", format!("{} V", decimal(motor.supply, 0)), Whose::Papers),
         row(
-            "supply",
-            "24 V, 0.6 A",
-            "not simulated: the amplifier gives the current that it is asked for",
+            "current of the motor at that torque",
+            "0.6 A",
+            format!(
+                "{} A: the RE25's 24 V winding makes {} mN·m for each ampere",
+                decimal(device.full_scale_torque.0.to_num::<f64>() * 1e-3 / motor.torque_constant, 2),
+                decimal(motor.torque_constant * 1e3, 1)
+            ),
             Whose::Papers,
         ),
         row(
@@ -113,7 +122,8 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
         let (begin, end) = held(trace);
         let tenth = TICK_HZ as usize / 10;
         let at = |from: usize| newtons(trace.mean_n(from..from + tenth).unwrap_or(0.0));
-        let said = format!("{} at first, {} after {HELD_S:.0} s", at(begin), at(end - tenth));
+        let rested_s = (end - begin) as f64 / f64::from(TICK_HZ);
+        let said = format!("{} at first, {} after {} s", at(begin), at(end - tenth), decimal(rested_s, 1));
         rows.push(row(&format!("force on a needle held still, {law}"), "–", said, Whose::NoneGiven));
     }
     rows
@@ -122,7 +132,8 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
 /// When the needle is held still: from when it has come to rest until it is drawn back.
 fn held(trace: &Trace) -> (usize, usize) {
     let end = trace.index(0.5 + 1.5 + HELD_S);
-    (trace.index(0.5 + 1.5), end)
+    // Friction lets the needle go on a little after the hand has stopped.
+    (trace.at_rest(trace.index(0.5 + 1.5)).min(end), end)
 }
 
 fn profile_chart(profile: &Profile, trace: &Trace) -> String {
@@ -149,6 +160,7 @@ fn profile_chart(profile: &Profile, trace: &Trace) -> String {
 
 fn hold_chart(cone: &Trace, printed: &Trace) -> String {
     let from = cone.index(1.0);
+    let rests_s = (held(cone).0 - from) as f64 / f64::from(TICK_HZ);
     let curve = |name: &str, colour, trace: &Trace| Curve {
         name: name.into(),
         colour,
@@ -160,7 +172,7 @@ fn hold_chart(cone: &Trace, printed: &Trace) -> String {
         x_label: "time, s".into(),
         y_label: "force, N".into(),
         curves: vec![curve("friction cone", 0, cone), curve("eq. 2 as printed", 1, printed)],
-        marks: vec![(1.0, "held still from here".into())],
+        marks: vec![(rests_s, "at rest from here".into())],
         ..Chart::default()
     }
     .svg()

@@ -1,4 +1,4 @@
-//! Seed 002, the joint injection simulator: the plateaus of both injections and of the withdrawal (its Fig. 5 and 6).
+//! Paper 002, the joint injection simulator: the plateaus of both injections and of the withdrawal (its Fig. 5 and 6).
 
 use super::measure::{Trace, is_contact_with, is_exit_from};
 use super::{Row, Whose, numbers, row};
@@ -7,10 +7,12 @@ use crate::failure::Failure;
 use crate::procedure::Procedure;
 use crate::profile::Profile;
 use crate::rehearsal;
+use crate::score::target::Outcome;
 use crate::session::{Source, tissue_name};
 use crate::sheet::chart::{Chart, Curve};
 use crate::sheet::section::{Section, Way};
 use crate::sheet::{Sheet, decimal};
+use control_core::TICK_HZ;
 use control_core::config::{Law, Tissue};
 use std::path::Path;
 
@@ -40,7 +42,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     let mut sheet = Sheet::new(
-        "Development of haptic simulator for practicing the intraarticular needle injection under echography (seed 002)",
+        "Development of haptic simulator for practicing the intraarticular needle injection under echography (paper 002)",
         "The paper prints one force for each layer and the largest force of its device. Its figures of the two injections have no numbers in \
          the text; here both are run, on the same layers.",
     );
@@ -57,10 +59,14 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         vec![(section(&profile, &traces), "Fig. 5: ways of the tip, in section, to scale.".to_owned())];
     for (trace, (_, title)) in traces.iter().zip(INJECTIONS) {
         figures.push((
-            over_time(trace, title),
-            "Fig. 6: positive resists insertion, negative holds the needle back on its way out.".into(),
+            over_time(&profile, trace, title),
+            "Fig. 6: positive resists insertion, negative holds the needle back on its way out. Marks: the layer that the tip comes to, and where it is drawn back.".into(),
         ));
     }
+    figures.push((
+        clamping(&profile, &traces),
+        "Fig. 5: the clamping force along the way. It is computed and told: this device turns freely.".into(),
+    ));
     figures.push((
         over_depth(&traces),
         "The same over depth: a plateau a layer, and the opposite sign on the way out.".into(),
@@ -70,7 +76,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     for words in [
         "The forces of the withdrawal are “of the same kind, in the opposite direction”: no number. Ours have their own magnitudes in the patient's file.",
         "The coefficients of the polynomial before the puncture and of the friction are other papers'. Depths of the layers are not given: ours stand in the patient's file with their sources.",
-        "The bursa cannot be missed in layers that go on for ever: in the first injection the needle is drawn back by 20 mm after it, turned by 8° and pushed in again.",
+        "Where the bursa lies along the skin: the patient's file says from where to where. In the first injection the needle goes in at 37° and passes beside it, is drawn back by 20 mm, turned to 45°, and reaches it. Layers of the device go on for ever: beside the bursa the hand feels its cutting force all the same.",
         "Need 1 asks for a free entry point, and the conclusion says that it is fixed: here the procedure chooses it.",
     ] {
         sheet.paragraph(words);
@@ -132,6 +138,22 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
         each(&|t| t.largest_lateral_n(profile)),
         Whose::NoneGiven,
     ));
+    for (trace, (_, title)) in traces.iter().zip(INJECTIONS) {
+        let Some(target) = trace.target(profile) else { continue };
+        let beside = if target.passed_beside > 0 { "passed beside, then " } else { "" };
+        let outcome = match target.outcome {
+            Outcome::Missed => "missed",
+            Outcome::Reached => "reached",
+            Outcome::Beyond => "reached, then on to the cartilage",
+        };
+        let paper = if beside.is_empty() {
+            "all layers until the cartilage"
+        } else {
+            "missed on purpose, then reached"
+        };
+        let said = format!("{beside}{outcome}; {} s in it", decimal(target.time_s, 2));
+        rows.push(row(&format!("{}, {title}", target.name), paper, said, Whose::NoneGiven));
+    }
     let largest = profile.plan.largest_force().0.to_num::<f64>();
     rows.push(row(
         "largest force of the device",
@@ -173,12 +195,40 @@ fn section(profile: &Profile, traces: &[Trace]) -> String {
     Section { title: "Trajectories".into(), bands, vessel, ways: ways.map(way).collect(), needle: None }.svg()
 }
 
-fn over_time(trace: &Trace, title: &str) -> String {
+fn over_time(profile: &Profile, trace: &Trace, title: &str) -> String {
+    let deepest = trace.deepest();
+    let seconds = |index: usize| index as f64 / f64::from(TICK_HZ);
+    let met = CUTTING.iter().filter_map(|(tissue, _)| {
+        let at = trace.last_event(deepest, is_contact_with(number(profile, *tissue)?))?;
+        Some((seconds(at), tissue_name(*tissue).to_owned()))
+    });
+    let back = (seconds(trace.drawn_back(deepest)), "withdrawal".to_owned());
     Chart {
         title: title.into(),
         x_label: "time, s".into(),
         y_label: "force, N".into(),
         curves: vec![Curve { points: trace.force_over_time(0..trace.len()), ..Curve::default() }],
+        marks: met.chain([back]).collect(),
+        ..Chart::default()
+    }
+    .svg()
+}
+
+fn clamping(profile: &Profile, traces: &[Trace]) -> String {
+    let Law::Sparte(law) = &profile.config.patient.law else { return String::new() };
+    let per_rad = law.fixture.per_mrad.0.to_num::<f64>() * 1e3;
+    let most_rad = f64::from(law.fixture.largest.0) * 1e-3;
+    let curve = |(trace, ((_, name), colour)): (&Trace, ((&str, &str), u8))| Curve {
+        name: name.into(),
+        colour,
+        dashed: false,
+        points: trace.lateral_over_way(per_rad, most_rad),
+    };
+    Chart {
+        title: "Clamping force".into(),
+        x_label: "way of the tip, mm".into(),
+        y_label: "force across the needle, N".into(),
+        curves: traces.iter().zip(INJECTIONS.into_iter().zip(0..)).map(curve).collect(),
         ..Chart::default()
     }
     .svg()

@@ -3,10 +3,12 @@
 
 pub mod gesture;
 pub mod smoothness;
+pub mod target;
+pub mod track;
 pub mod vessel;
 
 use crate::failure::Failure;
-use crate::profile::Profile;
+use crate::profile::{Goal, Profile};
 use crate::recording::export::{Stretch, stretches};
 use crate::recording::read::Recording;
 use control_core::TICK_HZ;
@@ -16,6 +18,7 @@ use gesture::{Gesture, Place};
 use link::frames::{Event, EventKind};
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
+use target::Reached;
 use vessel::Targets;
 
 /// What the score is called in JSON.
@@ -51,10 +54,20 @@ pub struct Insertion {
     pub in_lumen_s: f64,
     /// How often blood came into the hub.
     pub flashbacks: u32,
+    /// Layers that were open in the needle's own track when it met them again.
+    pub met_in_track: u32,
+    /// Layers that gave way once more, for instance beside the track.
+    pub pierced_again: u32,
     /// Whether the needle went through the vessel's far wall.
     pub through_far_wall: bool,
     /// How often something that was to be spared was touched.
     pub spared_hits: u32,
+    /// What became of the patient's target; none where there is none.
+    pub target: Option<Reached>,
+    /// What was to be spared and was touched, by name.
+    pub hit: Vec<String>,
+    /// What was to be spared and was not touched, by name.
+    pub spared: Vec<String>,
     /// How often the needle was turned beyond the largest angle that the patient's fixture allows.
     pub barriers: u32,
     /// Largest force across the needle that would have held its direction of entry, N; none where the patient has no fixture.
@@ -166,6 +179,9 @@ pub struct Judge {
     entry_rad: f64,
     skin_tilt_rad: f64,
     targets: Targets,
+    goal: Option<Goal>,
+    /// Number and name of each layer to be spared.
+    spared: Vec<(u8, String)>,
     fixture: Option<Fixture>,
     zero_tick: u64,
 }
@@ -183,6 +199,8 @@ impl Judge {
                 far_wall: number(Tissue::FarWall),
                 spared: profile.spared.clone(),
             },
+            goal: profile.goal(),
+            spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
             fixture: match &profile.config.patient.law {
                 Law::Sparte(law) => Some(law.fixture),
                 Law::Jog(_) | Law::Xr(_) => None,
@@ -209,6 +227,16 @@ impl Judge {
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
         let passage = vessel::passage(&span.stretch.events, (begin, end), &self.targets);
+        let along_mm = |tick: u64| {
+            let sample = span.stretch.samples.get(span.at(tick))?;
+            let angle_rad = f64::from(sample.tilt_mrad) * 1e-3 - self.skin_tilt_rad;
+            Some(f64::from(sample.count) * hello.mm_per_count * angle_rad.cos())
+        };
+        let target = self.goal.as_ref().map(|goal| {
+            target::reached(&span.stretch.events, (begin, end), goal, along_mm, 1.0 / f64::from(TICK_HZ))
+        });
+        let (hit, spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
+        let again = track::met_again(&span.stretch.events, (begin, end));
         let inside = given().next().map_or(&[][..], |e| &span.stretch.samples[span.at(e.tick)..span.at(end)]);
         let first = inside.first();
         let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.skin_tilt_rad);
@@ -229,8 +257,13 @@ impl Judge {
             overshoot_mm: entry_mm.map(|entry| (depth_mm - entry).max(0.0)),
             in_lumen_s: seconds(passage.in_lumen_ticks),
             flashbacks: passage.flashbacks,
+            met_in_track: again.in_track,
+            pierced_again: again.whole,
             through_far_wall: passage.through_far_wall,
             spared_hits: passage.spared_hits,
+            target,
+            hit,
+            spared,
             barriers: span.events().filter(|e| e.kind == EventKind::Barrier).count() as u32,
             largest_lateral_n: self.lateral_n(inside),
             passes: passes.passes,

@@ -56,6 +56,8 @@ pub fn passage(events: &[Event], (begin, end): (u64, u64), targets: &Targets) ->
                 leave();
                 passage.through_far_wall = true;
             }
+            // Through a far wall that is open already.
+            EventKind::InTrack { layer } if Some(layer) == targets.far_wall => leave(),
             EventKind::Exit { layer } if Some(layer) == targets.vessel => leave(),
             _ => {}
         }
@@ -114,6 +116,21 @@ mod tests {
             ..expected
         };
         assert_eq!(passage(&told, (0, 200), &targets()), cut);
+    }
+
+    /// In again through both walls that have given way before: from 100 to 300 in the lumen.
+    #[test]
+    fn in_its_track_the_lumen_ends_at_the_open_far_wall() {
+        let told = events(&[
+            (100, EventKind::Contact { layer: VESSEL }),
+            (100, EventKind::InTrack { layer: VESSEL }),
+            (100, EventKind::Flashback { layer: VESSEL }),
+            (300, EventKind::Contact { layer: FAR }),
+            (300, EventKind::InTrack { layer: FAR }),
+            (900, EventKind::Exit { layer: VESSEL }),
+        ]);
+        let passage = passage(&told, (0, 1_000), &targets());
+        assert_eq!((passage.in_lumen_ticks, passage.flashbacks), (200, 1));
     }
 
     #[test]

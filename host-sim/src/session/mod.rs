@@ -289,6 +289,7 @@ mod tests {
             roller_radius_mm: 10.0,
             travel_mm: 60.0,
             largest_force_n: 2.88,
+            force_scale: 1.0,
             tilt_rad: 0.0,
             skin_tilt_rad: 0.0,
             vessel: None,

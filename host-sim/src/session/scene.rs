@@ -21,6 +21,8 @@ pub struct Scene {
     pub travel_mm: f64,
     /// Largest force at the roller in N.
     pub largest_force_n: f64,
+    /// Share of the law's forces that the hand gets, where the motor is too weak for all of them: a pose's `force_n` times this is felt.
+    pub force_scale: f64,
     /// Inclination below the horizontal that the procedure begins with, in rad.
     pub tilt_rad: f64,
     /// Inclination of the needle laid on the skin, in rad; the angle to the skin is what is left of the tilt.

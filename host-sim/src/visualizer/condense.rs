@@ -135,6 +135,7 @@ impl Condenser {
             EventKind::Flashback { layer } => ("flashback", Some(layer), None, None),
             EventKind::FarWall { layer } => ("far_wall", Some(layer), None, None),
             EventKind::Barrier => ("barrier", None, None, None),
+            EventKind::InTrack { layer } => ("in_track", Some(layer), None, None),
         };
         messages::Event {
             t_s: self.seconds(event.tick),

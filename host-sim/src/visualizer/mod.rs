@@ -27,6 +27,7 @@ pub(crate) fn test_scene() -> crate::session::Scene {
         roller_radius_mm: 10.0,
         travel_mm: 60.0,
         largest_force_n: 2.88,
+        force_scale: 1.0,
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,

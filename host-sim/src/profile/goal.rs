@@ -1,0 +1,66 @@
+//! `[target]` of a patient: the structure that the needle is to reach.
+
+use super::rupture::ruptures;
+use super::{Layer, TissueName};
+use crate::session::tissue_name;
+use control_core::Patient;
+use control_core::config::Tissue;
+use serde::Deserialize;
+
+/// A structure to be reached. Layers of the device go on for ever: where it ends to either side, that is for whoever judges.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Goal {
+    /// What it is called.
+    pub name: String,
+    /// The layer that it is, or that begins with its wall.
+    pub layer: u8,
+    /// It is entered where its wall gives way, else where it is touched.
+    pub has_wall: bool,
+    /// The layer below, and whether that has a wall.
+    pub below: Option<(u8, bool)>,
+    /// From where to where it reaches along the skin, mm from the point of entry; none where it goes on for ever.
+    pub reach_mm: Option<(f64, f64)>,
+}
+
+/// As the file has it.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Written {
+    tissue: TissueName,
+    from_mm: Option<f64>,
+    to_mm: Option<f64>,
+}
+
+impl Written {
+    /// Whether it is one of the layers and where it ends makes sense.
+    pub(super) fn check(self, layers: &[Layer]) -> Result<(), String> {
+        if !layers.iter().any(|layer| layer.tissue == self.tissue) {
+            return Err("target.tissue is none of the layers; name one of them".into());
+        }
+        match (self.from_mm, self.to_mm) {
+            (None, None) => Ok(()),
+            (Some(from), Some(to)) if from < to && from.is_finite() && to.is_finite() => Ok(()),
+            _ => Err("target needs both from_mm and to_mm, the smaller one first, or neither".into()),
+        }
+    }
+}
+
+/// What the file says, else the lumen of the vessel; none where there is no vessel either.
+pub(super) fn goal(written: Option<Written>, patient: &Patient, entry_rad: f64) -> Option<Goal> {
+    let layers = &patient.layers;
+    let tissue = written.map_or(Tissue::Vessel, |goal| goal.tissue.into());
+    let index = layers.iter().position(|layer| layer.tissue == tissue)?;
+    let ruptures = ruptures(patient, entry_rad);
+    let has_wall = |index: usize| {
+        layers.get(index).is_some_and(|layer| layer.wall.is_some())
+            || ruptures.iter().any(|rupture| rupture.layer == index)
+    };
+    let name = if tissue == Tissue::Vessel { "lumen" } else { tissue_name(tissue) };
+    Some(Goal {
+        name: name.to_owned(),
+        layer: index as u8,
+        has_wall: has_wall(index),
+        below: (index + 1 < layers.len()).then(|| (index as u8 + 1, has_wall(index + 1))),
+        reach_mm: written.and_then(|goal| goal.from_mm.zip(goal.to_mm)),
+    })
+}
