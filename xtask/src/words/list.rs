@@ -16,7 +16,7 @@ const fn phrase(banned: &'static str, plain: &'static str, why: &'static str) ->
 const WORD_ORDER: &str = "the number follows it: at least 3";
 const NO_NUMBER: &str = "say what the thing is not: not finite, not a record, does not exist";
 
-pub(super) const PHRASES: [Phrase; 9] = [
+pub(super) const PHRASES: [Phrase; 12] = [
     phrase("at the least", "at least", WORD_ORDER),
     phrase("at the most", "at most", WORD_ORDER),
     phrase("is for good", "is permanent", "it also reads as praise"),
@@ -26,15 +26,19 @@ pub(super) const PHRASES: [Phrase; 9] = [
     phrase("tells apart", "distinguishes", "the verb is distinguish"),
     phrase("that is none", "that does not exist", NO_NUMBER),
     phrase("that are none", "that are not", NO_NUMBER),
+    phrase("from which on", "the smallest … at which, above which", "the thing first, then its condition"),
+    phrase("in its place", "instead, replaces it", "shorter, and not a place"),
+    phrase("in their place", "instead, replaces them", "shorter, and not a place"),
 ];
 
 /// Words that do not open the first sentence of a doc comment: it says what is returned, true or stored.
 pub(super) const OPENINGS: [&str; 5] = ["What", "Whether", "How", "Where", "Of"];
 
 /// Folders and files whose doc comments still open otherwise; a clean one leaves this list.
-pub(super) const STILL_TO_CLEAN: [&str; 9] = [
+pub(super) const STILL_TO_CLEAN: [&str; 10] = [
     "control-core/",
-    "diagnosis/",
+    "diagnosis/src/pipeline/",
+    "diagnosis/src/report/",
     "firmware/",
     "host-sim/src/force_fit/",
     "host-sim/src/import/",
