@@ -50,7 +50,7 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
         } else if kind.is_file() && below != LIST {
             let Some(prose) = prose::reader(name) else { continue };
             let Ok(text) = fs::read_to_string(entry.path()) else { continue };
-            findings.extend(phrases(&prose(&text), &list::PHRASES).iter().map(|found| found.message(&below)));
+            findings.extend(phrases(&prose(&text), list::PHRASES).iter().map(|found| found.message(&below)));
             if name.ends_with(".rs") && !STILL_TO_RENAME.iter().any(|folder| below.starts_with(folder)) {
                 findings.extend(long_names(&text).into_iter().map(|(line, name)| {
                     format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")

@@ -16,7 +16,7 @@ const fn phrase(banned: &'static str, plain: &'static str, why: &'static str) ->
 const WORD_ORDER: &str = "the number follows it: at least 3";
 const NO_NUMBER: &str = "say what the thing is not: not finite, not a record, does not exist";
 
-pub(super) const PHRASES: [Phrase; 16] = [
+pub(super) const PHRASES: &[Phrase] = &[
     phrase("at the least", "at least", WORD_ORDER),
     phrase("at the most", "at most", WORD_ORDER),
     phrase("is for good", "is permanent", "it also reads as praise"),
@@ -36,10 +36,10 @@ pub(super) const PHRASES: [Phrase; 16] = [
 ];
 
 /// Words that do not open the first sentence of a doc comment: it says what is returned, true or stored.
-pub(super) const OPENINGS: [&str; 5] = ["What", "Whether", "How", "Where", "Of"];
+pub(super) const OPENINGS: &[&str] = &["What", "Whether", "How", "Where", "Of"];
 
 /// Folders and files whose doc comments still open otherwise; a clean one leaves this list.
-pub(super) const STILL_TO_CLEAN: [&str; 11] = [
+pub(super) const STILL_TO_CLEAN: &[&str] = &[
     "control-core/",
     "diagnosis/src/pipeline/",
     "diagnosis/src/report/",
@@ -54,7 +54,7 @@ pub(super) const STILL_TO_CLEAN: [&str; 11] = [
 ];
 
 /// Folders and files with longer names of tests; a clean one leaves this list.
-pub(super) const STILL_TO_RENAME: [&str; 8] = [
+pub(super) const STILL_TO_RENAME: &[&str] = &[
     "control-core/",
     "diagnosis/",
     "firmware/",
