@@ -19,7 +19,7 @@ use crate::units::{Millimetres, Milliradians};
 use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 
-/// The smallest angle to the skin that is told apart: 5°. Below it, layers stay where they are met at 5°.
+/// The smallest angle to the skin that is distinguished: 5°. Below it, layers stay where they are met at 5°.
 pub const SMALLEST_ANGLE: Milliradians = Milliradians(87);
 /// Straight in.
 pub const LARGEST_ANGLE: Milliradians = Milliradians(1_571);

@@ -89,7 +89,7 @@ pub(crate) const FORM_SURE_Z: f64 = 3.0;
 pub(crate) const NEARLY_ALL_OF_FORM: f64 = 0.9;
 /// Part of the innovations' mean square that a force of any form must explain to be reported.
 pub(crate) const FORM_TOLD: f64 = 0.005;
-/// Part of an effect's gain that physics outside the library must gain in its place: a law of slightly another form gains a little.
+/// Part of an effect's gain that physics outside the library must gain instead: a law of slightly another form gains a little.
 pub(crate) const OUTSIDE_PART: f64 = 0.1;
 /// Share that physics outside the library must explain alone to be reported.
 pub(crate) const OUTSIDE_ALONE: f64 = 0.5;

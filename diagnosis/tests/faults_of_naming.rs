@@ -1,5 +1,5 @@
 //! Faults of naming that recordings of real machines and a second generator showed, each on a small simulated machine: names given
-//! where another cause, wrong values or chance were there, and what was said in their place.
+//! where another cause, wrong values or chance were there, and what was said instead.
 
 #[path = "common/axis.rs"]
 mod axis;

@@ -201,7 +201,7 @@ fn the_sources_hold_no_file_beside_the_folders_but_the_numbers_that_decide() {
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
 }
 
-/// Where code outside `effects/` may name effects, and why. What an effect is belongs into its file: ask its `Definition`.
+/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into its file: ask its `Definition`.
 const MAY_NAME: [(&str, &str); 0] = [];
 
 /// The effects, as the code names them: `stribeck_friction` is `StribeckFriction`.
@@ -225,7 +225,7 @@ fn without_tests(text: &str) -> (Vec<&str>, Vec<String>) {
     (lines, files)
 }
 
-/// Whether a line of code names an effect, by `EffectName` or by what a file calls it.
+/// True if a line of code names an effect, by `EffectName` or by its name in a file.
 fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
     let code = line.split("//").next().unwrap_or("");
     let is_word = |c: char| c.is_alphanumeric() || c == '_';

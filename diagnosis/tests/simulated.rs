@@ -177,7 +177,7 @@ fn a_load_that_changes_at_once_is_no_drift_and_the_report_says_what_it_resembles
         let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size: 0.2, ..setup("heavier_load") });
         assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
         assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
-        // In open loop it is told by its time or, where no drift stands in its place, by its inputs; under a loop gain and friction
+        // In open loop it is told by its time or, where no drift replaces it, by its inputs; under a loop gain and friction
         // are both seen to change, alike.
         let told = &outcome.report.sentence;
         let is_told = told.contains("at once, at 5.4 s")

@@ -64,7 +64,7 @@ export class BodyView {
     renderer.lost?.then(() => this.replaceLimb());
   }
 
-  /** WebGPU is gone: a canvas that it has had takes nothing else, so another one comes in its place. */
+  /** WebGPU is gone: a canvas that it has had takes nothing else, so another one replaces it. */
   async replaceLimb() {
     const canvas = byId("limb");
     this.limb = null;

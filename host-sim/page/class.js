@@ -85,7 +85,7 @@ class Card {
   }
 }
 
-/** What a card is called, in words, and its tone. */
+/** Returns a card's title, in words, and its tone. */
 function condition(member) {
   if (member.gone) return ["gone", `Gone for ${Math.floor(member.silent_s)} s`, "off"];
   if (!member.connected) return ["stuck", "Device silent", "warn"];

@@ -2,9 +2,9 @@
 
 /** Arrow keys move the hand so far, with Shift ten times. */
 const KEY_STEP_MM = 0.2;
-/** How far the hand may draw the tip back from the entry point; inwards it goes until the hub meets the skin. */
+/** The limit to which the hand may draw the tip back from the entry point; inwards the limit is the hub on the skin. */
 const DRAWN_BACK_MM = -15;
-/** What uses the space bar itself. */
+/** The elements that use the space bar themselves. */
 const CONTROLS = "button, input, select, textarea, summary, a";
 /** A phone has none. */
 const KEYS = matchMedia("(any-pointer: fine)").matches ? ", or arrow keys" : "";
@@ -63,7 +63,7 @@ export class Hand {
     this.say();
   }
 
-  /** What the server says of who moves the needle, and where it is. */
+  /** Takes the server's message of who moves the needle, and its position. */
   follow(hand, depth, tilt) {
     this.actual = depth;
     const degrees = (((tilt - this.skinTilt) * 180) / Math.PI).toFixed(0);

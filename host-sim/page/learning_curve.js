@@ -10,9 +10,9 @@ const ERROR = 0.1;
 
 const P = Math.log(UNACCEPTABLE / ACCEPTABLE);
 const Q = Math.log((1 - ACCEPTABLE) / (1 - UNACCEPTABLE));
-/** What an attempt that reaches the goal lowers the sum by; one that misses raises it by 1 less this. */
+/** The amount by which a successful attempt lowers the sum; a failed one raises it by 1 less this. */
 export const STEP = Q / (P + Q);
-/** How far below its highest place the sum has to come. */
+/** The distance below its highest value that the sum has to reach. */
 export const PASS = Math.log((1 - ERROR) / ERROR) / (P + Q);
 
 /** The sum after each attempt, and after how many the pass mark was reached (0: not yet). */

@@ -7,7 +7,7 @@ import { ALONG_MM, HALF_WIDTH_MM, LIMB_RADIUS_MM } from "./picture.js";
 export const LIMB_MM = [-60, 80];
 export const DEEP_MM = 34;
 const AROUND = 20;
-/** Where the limb's skin ends, as an angle about its axis. */
+/** The edge of the limb's skin, as an angle about its axis. */
 const LOWEST = Math.acos(1 - DEEP_MM / LIMB_RADIUS_MM);
 
 /** Angles in even steps. */
@@ -53,7 +53,7 @@ function limb(side) {
   return { places, normals, triangles };
 }
 
-/** What closes the limb behind the needle's plane at both of its ends. */
+/** The surfaces that close the limb behind the needle's plane at both of its ends. */
 function limbEnds() {
   const places = [];
   const normals = [];

@@ -56,7 +56,7 @@ void main() {
   result = vec4(base * lit + gloss, colour.a);
 }`;
 
-/** How a mesh covers what lies behind it: see `mesh`. */
+/** The blending of a mesh with what is behind it: see `mesh`. */
 const PASSES = {
   opaque: { blend: false, offset: false },
   clear: { blend: true, offset: false },

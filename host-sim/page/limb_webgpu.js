@@ -170,7 +170,7 @@ export class WebGpu {
     device.queue.submit([encoder.finish()]);
   }
 
-  /** Where it is drawn before the canvas gets it, as large as the canvas. */
+  /** The target that is drawn to before the canvas gets it, as large as the canvas. */
   targets() {
     const { width, height } = this.canvas;
     if (this.textures?.[0].width !== width || this.textures[0].height !== height) {

@@ -32,12 +32,12 @@ const body = new BodyView(palette);
 let scene = null;
 let tissue = null;
 let linkStatus = null;
-/** What is drawn; the latest of everything. */
+/** The newest state, which is drawn. */
 const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, lateral: 0, vessel: "outside", state: "idle",
   hand: 0, person: false, canDrag: false, seconds: 0, ghost: NaN,
 };
-/** How often a recording that is played had jumped when this was drawn. */
+/** The number of jumps of the played recording when this was drawn. */
 let jumps = 0;
 
 const receive = {
@@ -123,7 +123,7 @@ const ownForces = new OwnForces(link);
 const patient = new PatientEditor(link);
 const practice = new Practice(link, palette);
 
-/** What a test or a curious person reads: pictures a second, age of the last message, what is drawn, when first. */
+/** The values for tests and curious people: pictures per second, age of the last message, what is drawn, when first. */
 const stats = {
   fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, handMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN,
   drawn: section.drawn, vessel: "outside", flashback: false,

@@ -5,7 +5,7 @@
 const MM_PER_N = 4;
 /** The tip waits so far outside before an insertion, mm along the needle; pictures have room for it. */
 export const WAITING_MM = -5;
-/** Where the hub has reached its full width, mm behind its front. */
+/** The distance behind its front at which the hub has its full width, mm. */
 export const HUB_CONE_MM = 2;
 /** The chamber in the hub in which blood shows, mm behind its front. */
 const CHAMBER_MM = { from: 3, to: 6 };
@@ -55,7 +55,7 @@ export function drawNeedle(g, colours, scale, needle, { flashback, inLumen }) {
   g.stroke();
 }
 
-/** Where the hand wants the hub, `ahead` mm in front of where it is. */
+/** Draws the hub at its target position, `ahead` mm in front of its present one. */
 export function drawWish(g, colours, scale, needle, ahead) {
   g.save();
   g.translate(ahead * scale, 0);
@@ -67,7 +67,7 @@ export function drawWish(g, colours, scale, needle, ahead) {
   g.restore();
 }
 
-/** Where the needle of another insertion was at this time, `ahead` mm in front of this one: an outline. */
+/** Draws the outline of another insertion's needle at this time, `ahead` mm in front of this one. */
 export function drawGhost(g, colours, scale, needle, ahead) {
   g.save();
   g.translate(ahead * scale, 0);

@@ -45,7 +45,7 @@ export function number(value, digits) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
-/** What a screen reader says of a slider: its value with the unit. */
+/** Sets a screen reader's text for a slider: its value with the unit. */
 function sayValue(slider) {
   const text = `${slider.value} ${slider.dataset.unit}`;
   if (slider.getAttribute("aria-valuetext") !== text) slider.setAttribute("aria-valuetext", text);

@@ -9,7 +9,7 @@ export const KINDS = { skinBehind: 0, skinBefore: 1, section: 2, vesselBehind: 3
 export const LINES = 256;
 export const SAMPLES = 1024;
 export const SLICES = 64;
-/** What is drawn of the limb along the insertion, as tissue/src/configuration.rs has it. */
+/** The part of the limb along the insertion that is drawn, as in tissue/src/configuration.rs. */
 export const ALONG_MM = [-9.1, 26];
 export const HALF_WIDTH_MM = 10.4;
 export const LIMB_RADIUS_MM = 42;
@@ -63,7 +63,7 @@ export class Picture {
 
   get lumen() { return this.floats(this.core.lumen(), 2 * SLICES); }
 
-  /** What is drawn: `{ kind, layer, triangles }`; the triangles are copies. */
+  /** Returns the surfaces to draw: `{ kind, layer, triangles }`; the triangles are copies. */
   surfaces() {
     return Array.from({ length: this.core.surfaces() }, (_, i) => {
       const [pointer, count] = [this.core.surface_triangles(i), 3 * this.core.surface_triangle_count(i)];
@@ -72,7 +72,7 @@ export class Picture {
     });
   }
 
-  /** How deep the ultrasound image reaches in this anatomy, mm. */
+  /** Returns the depth of the ultrasound image in this anatomy, mm. */
   get imageDepth() { return this.core.image_depth(); }
 
   /** An ultrasound image: brightness, line after line. */
@@ -82,7 +82,7 @@ export class Picture {
     return new Uint8Array(this.core.memory.buffer, pointer, LINES * SAMPLES);
   }
 
-  /** How much of the needle the last image shows, and did so far. */
+  /** Returns how much of the needle the last image shows, and the mean so far. */
   get seen() {
     const seen = (what) => this.core.seen(what);
     return { share: seen(0), tip: seen(1) === 1, beside: seen(2), tipShare: seen(3), meanShare: seen(4), inserted: seen(5) };

@@ -104,7 +104,7 @@ export class Practice {
     if (event.kind === "exit" && event.layer === 0) this.touchedAt = NaN;
   }
 
-  /** Where the tip of the best insertion was so long after its first touch, mm; NaN where there is none to be shown. */
+  /** Returns the tip's place of the best insertion at this time after its first touch, mm; NaN if there is none to show. */
   ghost(now) {
     const path = this.best?.path;
     const since = now - this.touchedAt;

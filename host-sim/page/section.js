@@ -30,7 +30,7 @@ export class Section {
     this.size = { width: 0, height: 0 };
     /** While a person drags the needle: what a pixel means stays as it was when it was taken. */
     this.held = false;
-    /** What a test reads: where the layers, the tip and the end of the hub are drawn and how steep the needle, in CSS pixels and rad. */
+    /** The values for tests: the drawn places of layers, tip and the hub's end and the needle's angle, in CSS pixels and rad. */
     this.drawn = { tops: [], entry: this.origin, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
   }
 
@@ -56,7 +56,7 @@ export class Section {
     this.note(view, tissue);
   }
 
-  /** Where the picture looks: tip and hub are in it, and the layers stay where they are while the needle goes in. */
+  /** Sets the view: tip and hub are in it, and the layers do not move while the needle goes in. */
   look(view, tissue, width, height) {
     const resized = width !== this.size.width || height !== this.size.height;
     Object.assign(this.size, { width, height });

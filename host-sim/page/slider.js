@@ -1,7 +1,7 @@
 // A slider that the server moves as well: what a hand sets goes out a few times a second, and what the server says of it is left alone
 // while it is being dragged.
 
-/** What the server says of the value just after a drag is still the old one. */
+/** The time after a drag for which the server's value is still the old one. */
 const NEWS_MS = 400;
 /** Between two wishes while the slider is dragged. */
 const STEP_MS = 60;
@@ -25,7 +25,7 @@ export class Slider {
     });
   }
 
-  /** Whether a hand has just moved it. */
+  /** True if a hand has just moved it. */
   get isHeld() {
     return performance.now() - this.movedAt < NEWS_MS;
   }

@@ -1,9 +1,9 @@
 // What the needle does to the layers in the picture: which are touched, which have given way, how far each is dented, where the tip
 // is as seen from the vessel. Only a picture: the force comes from the device, and this follows its events and depths.
 
-/** How fast tissue springs back after a puncture. */
+/** The time in which tissue springs back after a puncture, s. */
 const RECOVERY_S = 0.12;
-/** How far a dent reaches sideways, in mm. */
+/** The sideways reach of a dent, in mm. */
 const REACH_SKIN_MM = 4;
 const REACH_VESSEL_MM = 1.6;
 /** Friction drags a punctured surface along: mm for each N. */
@@ -66,13 +66,13 @@ export class Tissue {
     }
   }
 
-  /** What the vessel lies in: the layer above its near wall. */
+  /** Returns the tissue around the vessel: the layer above its near wall. */
   get around() {
     const vessel = this.layers.findIndex((layer) => layer.is_vessel);
     return this.layers[vessel - 1]?.name ?? "other";
   }
 
-  /** Whether the tip is in the vessel's lumen. */
+  /** True if the tip is in the vessel's lumen. */
   get inLumen() {
     return this.place === "in_lumen";
   }

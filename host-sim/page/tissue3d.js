@@ -6,7 +6,7 @@ import { WAITING_MM, wholeLength } from "./needle.js";
 import { ALONG_MM, IMAGE_WIDTH_MM, KINDS, LIMB_RADIUS_MM } from "./picture.js";
 
 const MOST_PIXELS_PER_POINT = 2;
-/** How much one sees from top to bottom, rad. */
+/** The vertical field of view, rad. */
 const FIELD = 0.6;
 /** Free around tip and hub, mm. */
 const MARGIN_MM = 3;
@@ -19,7 +19,7 @@ export class Tissue3d {
     this.canvas = canvas;
     this.colours = colours;
     this.renderer = renderer;
-    /** Where one looks from, rad, and how much farther away than needle and hub need. */
+    /** The direction of view, rad, and the factor by which the view is farther away than needle and hub need. */
     this.orbit = { yaw: 0.35, pitch: 0.42, away: 1 };
     this.layers = [];
     this.static = this.upload(shapes());
@@ -98,7 +98,7 @@ export class Tissue3d {
     this.renderer.end();
   }
 
-  /** Where one looks from and at: tip, hub and the deepest wall are in the picture. */
+  /** Returns the camera's place and target: tip, hub and the deepest wall are in the picture. */
   camera({ depth, angle }, aspect) {
     const { yaw, pitch, away } = this.orbit;
     const [s, c] = [Math.sin(angle), Math.cos(angle)];
@@ -162,7 +162,7 @@ export class Tissue3d {
     }
   }
 
-  /** What one sees through, from the back to the front. */
+  /** Draws the transparent parts, from back to front. */
   clear(probe) {
     const wall = { colour: [...rgb(this.colours["vessel-wall"]), 0.22], shine: 0.3, pass: "clear" };
     const skin = { colour: [...rgb(this.colours.skin), 0.16], shine: 0.15, pass: "clear" };

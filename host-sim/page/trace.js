@@ -20,7 +20,7 @@ export class Trace {
     return this.end > this.begin ? this.t[this.slot(this.end - 1)] : NaN;
   }
 
-  /** Where entry `i`, counted from the first ever, is kept. */
+  /** Returns the place of entry `i`, counted from the first ever. */
   slot(i) {
     return i % CAPACITY;
   }

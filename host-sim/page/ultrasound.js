@@ -3,7 +3,7 @@
 import { IMAGE_WIDTH_MM, LINES, SAMPLES } from "./picture.js";
 import { surface } from "./canvas.js";
 
-/** How far the probe may be moved, mm and rad. */
+/** The range of the probe, mm and rad. */
 const REACH = { along: [4, 22], across: [-8, 8], azimuth: [-Math.PI / 2, Math.PI / 2], lean: [-0.6, 0.6] };
 const ALONG_VIEW = { along: 13, across: 0, azimuth: 0, lean: 0 };
 /** Between two images: 30 a second look smooth, and leave time for the rest. */

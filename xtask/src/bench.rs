@@ -38,7 +38,7 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
     if let Some(unknown) = names.iter().find(|name| ROWS.iter().all(|row| row.name != **name)) {
         let all: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
         return Err(Failure::usage(format!(
-            "`{unknown}` is no row of the bench; they are: {}",
+            "`{unknown}` is not a row of the bench; the rows are: {}",
             all.join(" ")
         )));
     }
@@ -257,7 +257,7 @@ fn stream() -> Result<Values, Failure> {
     let samples =
         text.split_whitespace().rev().find_map(|word| word.strip_prefix("samples=")?.parse::<f64>().ok());
     let samples =
-        samples.ok_or_else(|| Failure::new("`run --headless` did not say how many samples there were"))?;
+        samples.ok_or_else(|| Failure::new("`run --headless` did not print the number of samples"))?;
     Ok(Values::from([("stream_samples_per_s".into(), format!("{:.0}", samples / seconds))]))
 }
 

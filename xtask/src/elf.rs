@@ -51,7 +51,7 @@ impl Elf {
     }
 
     fn broken(&self) -> Failure {
-        Failure::new(format!("{} is no image for the board; build it again", self.path.display()))
+        Failure::new(format!("{} is not an image for the board; build it again", self.path.display()))
     }
 
     fn slice(&self, offset: u32, size: u32) -> Result<&[u8], Failure> {

@@ -1,7 +1,7 @@
 //! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask test` and nothing else, and
 //! each of its steps is runnable by hand under its own name.
 //!
-//! Built before everything else, hence no dependencies; it may not know how a crate works inside, only what to run.
+//! Built before everything else, hence no dependencies; it knows which commands to run, and nothing of the crates' insides.
 
 mod bench;
 mod board_test;
@@ -68,9 +68,9 @@ fn main() -> ExitCode {
         "board-test" => for_board(rest, board_test::run),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
-        other => Err(Failure::usage(format!(
-            "`{other}` is no chore of this project; `cargo xtask help` lists them"
-        ))),
+        other => {
+            Err(Failure::usage(format!("`{other}` is not a command of xtask; `cargo xtask help` lists them")))
+        }
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -90,9 +90,7 @@ fn help() -> Result<(), Failure> {
 fn no_more(rest: &[String]) -> Result<(), Failure> {
     match rest.first() {
         None => Ok(()),
-        Some(extra) => {
-            Err(Failure::usage(format!("`{extra}` is not understood here; see `cargo xtask help`")))
-        }
+        Some(extra) => Err(Failure::usage(format!("unexpected argument `{extra}`; see `cargo xtask help`"))),
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
     let quick = arguments.iter().any(|argument| argument == QUICK_OPTION);
     let names: Vec<&String> = arguments.iter().filter(|argument| *argument != QUICK_OPTION).collect();
     if quick && !names.is_empty() {
-        return Err(Failure::usage(format!("{QUICK_OPTION} chooses the steps itself; name none beside it")));
+        return Err(Failure::usage(format!("{QUICK_OPTION} chooses the steps itself; do not name any")));
     }
     let all: &[Step] = if quick { &QUICK } else { &STEPS };
     let chosen = choose(all, &names, "step of the tests")?;
@@ -64,7 +64,10 @@ pub(crate) fn nightly(arguments: &[String]) -> Result<(), Failure> {
 fn choose<'a>(all: &'a [Step], names: &[&String], what: &str) -> Result<Vec<&'a Step>, Failure> {
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|step| step.name != name.as_str())) {
         let known: Vec<&str> = all.iter().map(|step| step.name).collect();
-        return Err(Failure::usage(format!("`{unknown}` is not a {what}; they are: {}", known.join(" "))));
+        return Err(Failure::usage(format!(
+            "`{unknown}` is not a {what}; the known ones are: {}",
+            known.join(" ")
+        )));
     }
     Ok(all.iter().filter(|step| names.is_empty() || names.iter().any(|name| *name == step.name)).collect())
 }

@@ -50,13 +50,15 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
         } else if kind.is_file() && below != LIST {
             let Some(prose) = prose::reader(name) else { continue };
             let Ok(text) = fs::read_to_string(entry.path()) else { continue };
-            findings.extend(phrases(&prose(&text), &list::PHRASES).iter().map(|found| found.message(&below)));
+            findings.extend(phrases(&prose(&text), list::PHRASES).iter().map(|found| found.message(&below)));
             if name.ends_with(".rs") && !STILL_TO_RENAME.iter().any(|folder| below.starts_with(folder)) {
                 findings.extend(long_names(&text).into_iter().map(|(line, name)| {
                     format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
                 }));
             }
-            if name.ends_with(".rs") && !STILL_TO_CLEAN.iter().any(|folder| below.starts_with(folder)) {
+            if [".rs", ".js"].iter().any(|end| name.ends_with(end))
+                && !STILL_TO_CLEAN.iter().any(|folder| below.starts_with(folder))
+            {
                 findings.extend(openings(&text).into_iter().map(|(line, word)| {
                     format!(
                         "{below}:{line}: a doc comment opens with \"{word}\": write a sentence, such as \"Returns …\", \"True if …\" or \
@@ -119,19 +121,19 @@ fn long_names(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Returns the lines of Rust in `text` that begin a doc comment with a word of [`OPENINGS`], each with the word.
+/// Returns the lines of Rust or JavaScript in `text` that begin a doc comment with a word of [`OPENINGS`], each with the word.
 fn openings(text: &str) -> Vec<(usize, &'static str)> {
     let mut found = Vec::new();
     let mut is_inside = false;
     for (number, line) in text.lines().enumerate() {
         let line = line.trim_start();
-        let doc = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+        let doc = ["///", "//!", "/**"].iter().find_map(|marker| line.strip_prefix(marker));
         if let (Some(doc), false) = (doc, is_inside) {
             let first = doc.trim_start().split(|letter: char| !letter.is_alphabetic()).next();
             found
                 .extend(OPENINGS.iter().filter(|word| Some(**word) == first).map(|word| (number + 1, *word)));
         }
-        is_inside = doc.is_some();
+        is_inside = doc.is_some() && !line.ends_with("*/");
     }
     found
 }
@@ -189,6 +191,7 @@ mod tests {
     fn only_the_first_line_of_a_doc_comment_is_an_opening() {
         let text = "//! What it is.\n\n/// Returns it.\n/// What follows.\nfn f() {}\n    /// Whether so.\n/// Whatever.";
         assert_eq!(openings(text), [(1, "What"), (6, "Whether")]);
+        assert_eq!(openings("/** What it is. */\n  /** How it is. */"), [(1, "What"), (2, "How")]);
         assert_eq!(openings("// What is it?\n/// Whatever it is, it is returned."), []);
     }
 

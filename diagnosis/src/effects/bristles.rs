@@ -30,7 +30,7 @@ impl Bristles {
         Self { elements: lengths(effect).into_iter().map(|length| (length, 0.0)).collect() }
     }
 
-    /// How far they are bent on the mean while `travel` passes, −1 to 1, and by how much more at its end than at its start;
+    /// Returns their mean bend while `travel` passes, −1 to 1, and the difference of the bend between its end and its start;
     /// 1 where all slide forward.
     pub(crate) fn bend(&mut self, travel: f64) -> (f64, f64) {
         let slides = self.elements.len() > 1;

@@ -41,7 +41,7 @@ pub struct Formula {
     name: &'static str,
     words: &'static str,
     expression: FlatEx<f64>,
-    /// Where each of the expression's variables comes from.
+    /// The source of each of the expression's variables.
     sources: Vec<Source>,
     /// Parameters that it is linear in; `scale` alone where there are none.
     linear: Vec<String>,

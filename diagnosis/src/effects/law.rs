@@ -3,7 +3,7 @@
 use super::definition::ForceLaw;
 use super::{Effect, EffectName};
 
-/// Where the plant is during one step.
+/// The plant's state during one step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct State {
     /// Position from the start of the recording or simulation, rad or m.

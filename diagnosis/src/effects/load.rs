@@ -1,7 +1,7 @@
 //! The part of the machine beyond a gap or a grip: a second mass that is seen only by what the motor feels of it.
 //!
 //! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J and f = F/J against the
-//! motion. A load that brakes itself by a, reached through a force T, makes of it r·(d − y − (f − a) − e/r) more, where
+//! motion. A load that brakes itself by a, reached through a force T, adds r·(d − y − (f − a) − e/r), where
 //! y = T/(p·J) and e = E/J of the forces E that act on the load. The motor's lead w over its load follows
 //! w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the same way, and the load's friction turns with the load.
 //! Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to a ceiling. Both are driven by

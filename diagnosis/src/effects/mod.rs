@@ -58,7 +58,7 @@ macro_rules! registry {
             /// The name in reports.
             pub fn as_str(self) -> &'static str { match self { $(Self::$variant => stringify!($module),)* Self::Formula(id) => id.get().name() } }
 
-            /// What it is.
+            /// Returns its definition.
             pub(crate) fn definition(self) -> &'static dyn Definition {
                 match self { $(Self::$variant => &$module::Defined,)* Self::Formula(id) => id.get() }
             }
@@ -144,7 +144,7 @@ impl fmt::Display for EffectName {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "InFile", into = "InFile")]
 pub struct Effect {
-    /// Which effect.
+    /// The name of the effect.
     pub name: EffectName,
     /// Values that enter non-linearly, by name; SI units, command units or cycles per turn.
     pub shape: BTreeMap<String, f64>,

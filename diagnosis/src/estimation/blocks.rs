@@ -14,7 +14,7 @@ use crate::io::rig::Rig;
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     pub(crate) file: String,
-    /// How much of the file was left out before the first row, s.
+    /// The time left out before the first row, s.
     pub(crate) lead_s: f64,
     /// Travel per turn of the motor where it is known, rad or m.
     pub(crate) turn: Option<f64>,
@@ -205,7 +205,7 @@ impl Blocks {
             .push(scale * scale * (1.0 / 12.0 / (1.0 + moved.min(count - 1.0)) + noise * noise / count));
     }
 
-    /// Where a count lasts several blocks its error is the same in all of them: count it once.
+    /// Inflates the errors of slow counts: if a count lasts several blocks, its error is the same in all of them and counts once.
     fn inflate_where_slow(&mut self, count: f64) {
         let n = self.span.len();
         let reach = 20.min(n / 4).max(1);

@@ -34,7 +34,7 @@ pub(crate) struct Observed<'a> {
     /// Mean over the rows of the time since the block's start, s, and of half its square, s².
     pub(crate) tau1: &'a [f64],
     pub(crate) tau2: &'a [f64],
-    /// How the reading lags, where the rig declares a filter in it.
+    /// The lag of the reading, if the rig declares a filter in it.
     pub(crate) reading_lag: &'a [LagStep],
     /// Mean reading, and its variance from quantisation alone.
     pub(crate) z: &'a [f64],
@@ -196,7 +196,7 @@ struct Walk<'a, const L: usize> {
     lag: [f64; L],
 }
 
-/// What inputs do over a block: changes of speed, of position and of the reading.
+/// The effect of inputs over a block: changes of speed, of position and of the reading.
 struct Change<const L: usize> {
     dv: [f64; L],
     dq: [f64; L],

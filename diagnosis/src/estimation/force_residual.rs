@@ -98,7 +98,7 @@ impl Estimator {
     }
 
     /// Returns the residual that reading whole counts alone causes on rows that move, root mean square: the smoothed motion is
-    /// read anew and goes through the estimator. Slow motion makes of it a sawtooth that no formula for white noise has.
+    /// read anew and goes through the estimator. Slow motion turns it into a sawtooth that no formula for white noise has.
     pub(crate) fn counting(&self, tracks: &[BlockedRecording], noise: &Noise, count: f64) -> f64 {
         let errors: Vec<Vec<f64>> = tracks
             .iter()

@@ -20,7 +20,7 @@ pub(crate) struct Asked {
 impl Asked {
     /// Before it is known that counts get lost: more than any jump that noise makes in a recording, and more than one.
     pub(crate) const UNKNOWN: Self = Self { gain: 14.0, least: 0.7, fewest: 2 };
-    /// Where counts do get lost, one block in some hundreds: what makes another loss likelier than none.
+    /// The prior once counts are known to get lost, in one block of some hundreds.
     pub(crate) const KNOWN: Self = Self { gain: 8.0, least: 0.55, fewest: 1 };
 }
 
@@ -31,7 +31,7 @@ const MOST: usize = 80;
 const REACH: usize = 40;
 /// Fewest blocks after a jump that tell it from an impact.
 const FEWEST_AFTER: usize = 6;
-/// How often what is left is looked through again: a large jump hides its neighbours.
+/// The number of passes over the residual: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
 
 /// The counts that a recording seems to have lost.
@@ -98,7 +98,7 @@ pub(crate) fn find(
 
 /// Time before a jump in which the command is looked at, s: a belt or a joint gives way at once.
 const JUST_BEFORE_S: f64 = 0.02;
-/// Mean rank of the command's change before jumps, among all moving blocks, from which on jumps follow the command; by chance
+/// Mean rank of the command's change before jumps, among all moving blocks, above which jumps follow the command; by chance
 /// it is a half.
 const FOLLOWS: f64 = 0.8;
 /// Fewest jumps whose places say something, and standard errors by which they must.
@@ -180,7 +180,7 @@ fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: 
 struct Pair {
     first: f64,
     second: f64,
-    /// Of log-likelihood.
+    /// The gain in log-likelihood.
     gain: f64,
 }
 
@@ -235,7 +235,7 @@ impl Jump {
         now.iter().zip(next).map(|(now, next)| (1.0 - self.later) * now + self.later * next).collect()
     }
 
-    /// Of log-likelihood.
+    /// Returns the gain in log-likelihood.
     fn gain(&self) -> f64 {
         let response = self.response();
         0.5 * self.size * self.size * dot(&response, &response)

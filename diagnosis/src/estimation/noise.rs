@@ -1,4 +1,4 @@
-//! How large sensor noise and disturbance are: maximum likelihood of the innovations, by a deterministic pattern search.
+//! The size of sensor noise and disturbance: maximum likelihood of the innovations, by a deterministic pattern search.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, Observed, robust_loss};
@@ -80,7 +80,7 @@ fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
     each.iter().sum()
 }
 
-/// Which disturbance is allowed for.
+/// The assumed disturbance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Colour {
     /// White force: every frequency of the band counts the same, as in a plain force error. Ranks effects.

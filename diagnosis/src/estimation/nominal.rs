@@ -67,11 +67,11 @@ impl Machine {
     }
 }
 
-/// How many standard deviations a nominal value may move in a refit.
+/// The number of standard deviations by which a nominal value may move in a refit.
 const REACH: f64 = 3.0;
 /// The same of gain over inertia: a refit that stops at the end of it makes a drift of the rest.
 const RATIO_REACH: f64 = 3.5;
-/// How many standard deviations a nominal value may be below the truth.
+/// The number of standard deviations by which a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
 
 /// Least part of the truth that a nominal value of some relative standard deviation may be.

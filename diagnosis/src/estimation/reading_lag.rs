@@ -6,12 +6,12 @@
 /// The terms of the lag at some time in a block, per unit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LagTerms {
-    /// Of the lag at the block's start.
+    /// The effect of the lag at the block's start.
     pub(crate) lag: f64,
-    /// Of the speed at the block's start, s, and of an acceleration held over the block, s².
+    /// The effect of the speed at the block's start, s, and of an acceleration held over the block, s².
     pub(crate) speed: f64,
     pub(crate) acceleration: f64,
-    /// Of the change of position and of speed that an input makes over the block (none and s).
+    /// The effect of the change of position and of speed that an input makes over the block (no unit and s).
     pub(crate) dq: f64,
     pub(crate) dv: f64,
 }

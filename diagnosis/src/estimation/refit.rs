@@ -13,7 +13,7 @@ use crate::numerics::linear::{Prior, Square, bounded};
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
 const MARGIN: usize = 1;
 
-/// No count for this long is rest, s: the steadiest slow motion that is told from it makes fifty counts a second.
+/// No count for this long is rest, s: the slowest motion that is distinguished from it makes fifty counts a second.
 const STILL_S: f64 = 0.02;
 
 /// Counts that a smoothed motion passes and the encoder does not before they contradict each other: the motion rests there.
@@ -87,7 +87,7 @@ pub(crate) fn estimate_motion(
 /// Relative standard deviation of gain over inertia above which the rig hardly knows it.
 const LOOSE: f64 = 0.5;
 
-/// Where the rig hardly knows the inertia, slow motion under a speed loop is explained as well by an axis too heavy to
+/// Anchors the inertia if the rig hardly knows it: slow motion under a speed loop is explained as well by an axis too heavy to
 /// be moved as by forces in balance. Regressing the command on the motion, rather than the motion on the command, has
 /// no such way out; what it finds anchors the fits that follow.
 fn anchor(nominal: &mut Nominal, fit: &Fit) {

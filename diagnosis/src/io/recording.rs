@@ -43,9 +43,9 @@ fn foreign(header: &str) -> Option<String> {
 
 /// The rows of a recording as they are read.
 struct Rows {
-    /// Where each known column is in a row.
+    /// The place of each known column in a row.
     place: [Option<usize>; 6],
-    /// Which known column each field of a row is.
+    /// The known column in each field of a row.
     wanted: Vec<Option<usize>>,
     columns: [Vec<f64>; 6],
     /// The first empty line: an error if a row comes after it.

@@ -143,7 +143,7 @@ pub struct Rig {
     pub kind: Kind,
     /// The nominal values.
     pub model: Model,
-    /// How well they are known.
+    /// The uncertainty of the values.
     #[serde(default)]
     pub uncertainty: Uncertainty,
     /// The drive.

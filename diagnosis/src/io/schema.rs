@@ -40,7 +40,7 @@ impl Parameter {
     }
 }
 
-/// Where a recording shows something.
+/// A stretch of a recording in which something shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
     /// The recording's file name.
@@ -60,7 +60,7 @@ pub struct Region {
     pub high: f64,
 }
 
-/// Where simulation and recording differ.
+/// The place where simulation and recording differ.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// In time.
@@ -82,7 +82,7 @@ pub struct Named {
     pub confidence: f64,
     /// Values by the contract's names.
     pub parameters: BTreeMap<String, Parameter>,
-    /// Where it shows.
+    /// The place where it shows.
     #[serde(rename = "where")]
     pub place: Place,
     /// The recording that would decide within the class.
@@ -101,7 +101,7 @@ pub struct Both {
 }
 
 impl Both {
-    /// Where nothing was fitted.
+    /// The errors if nothing was fitted.
     pub const NONE: Self = Self { fit: f64::NAN, holdout: f64::NAN };
 }
 
@@ -139,12 +139,12 @@ pub struct Simulation {
     pub free_run: ByModel,
     /// In windows.
     pub windows: Vec<WindowsOff>,
-    /// Where the patched simulation follows the motion less well than the refitted one, in a sentence.
+    /// A sentence if the patched simulation follows the motion less well than the refitted one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub worse: Option<String>,
 }
 
-/// How well the three models fit.
+/// The fit of the three models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitTable {
     /// `force_rmse`.
@@ -176,7 +176,7 @@ pub struct Hypothesis {
     /// Every effect that the data cannot tell from it, itself included; only where it came through the search.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub class: Vec<EffectName>,
-    /// Why it lost; missing where it was named.
+    /// The reason why it was rejected; absent if it was named.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub rejected_because: Option<String>,
 }
@@ -225,7 +225,7 @@ pub struct Report {
     /// The gain of a force of any form in addition to the named effects.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub free_form: Option<FreeForm>,
-    /// Where the mismatch is, when nothing was named.
+    /// The place of the mismatch, if nothing was named.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none", default)]
     pub place: Option<Place>,
     /// The recording to make next, when the recordings cannot tell.
@@ -234,7 +234,7 @@ pub struct Report {
     /// The three models run forward beside the held-out recordings.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub simulation: Option<Simulation>,
-    /// Why the recordings cannot tell, or what is left where no effect is.
+    /// The reason why the recordings cannot decide, or the residual if no effect is named.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub reason: Option<String>,
 }

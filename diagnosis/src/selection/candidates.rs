@@ -1,4 +1,4 @@
-//! Which shapes of each effect are worth trying on given recordings: the grids from which refinement starts.
+//! The candidate shapes of each effect for given recordings: the grids from which refinement starts.
 
 use crate::effects::definition::{Believed, Movable, NominalTerm, Span};
 use crate::effects::{Effect, EffectName as N};

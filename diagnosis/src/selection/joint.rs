@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// From how many of the best places a search goes downhill, and how many of the ends are settled.
 const STARTS: usize = 4;
 const SETTLED: usize = 2;
-/// How often the machine is taken from the fit, and the gain of log-likelihood below which it is not worth going on.
+/// The number of refits of the machine, and the gain of log-likelihood below which they stop.
 const ROUNDS: usize = 8;
 const ENOUGH: f64 = 1.0;
 

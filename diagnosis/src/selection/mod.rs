@@ -1,4 +1,4 @@
-//! Which effects are candidates, which shape of each is best, and how models compare on the fitted recordings. Nothing here
+//! The candidate effects, the best shape of each, and the comparison of models on the fitted recordings. Nothing here
 //! sees a held-out recording.
 
 pub(crate) mod candidates;

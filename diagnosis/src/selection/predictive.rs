@@ -1,4 +1,4 @@
-//! How well a fitted model predicts blocks of the fitted recordings that were left out of its fit (K-fold cross-validation).
+//! The prediction of blocks of the fitted recordings that were left out of the fit (K-fold cross-validation).
 //!
 //! Noise and shapes stay as they were fitted to all blocks; every coefficient, each recording's offset and phases among them, is fitted
 //! anew without the blocks that it is judged on. A model with more freedom pays for it here by itself.

@@ -14,18 +14,18 @@ use crate::selection::score_statistic;
 use crate::selection::shape_search::descend;
 use rayon::prelude::*;
 
-/// How many effects are fitted in full at each step.
+/// The number of effects that are fitted in full at each step.
 const FINALISTS: usize = 8;
-/// How many of them have their shapes moved in full fits.
+/// The number of those whose shapes are refined in full fits.
 const POLISHED: usize = 3;
 /// Factors at which optima are looked for that lie apart.
 const APART: [f64; 8] = [0.4, 0.55, 0.7, 0.85, 1.2, 1.45, 1.8, 2.4];
-/// How many values of a shape the score test moves, and moves again.
+/// The number of values of a shape that the score test refines, and refines again.
 const MOVED: usize = 3;
 const MOVED_AGAIN: usize = 2;
-/// How often they are looked for farther away.
+/// The number of searches farther away.
 const FARTHER: usize = 4;
-/// How often waves are looked for again under the noise that they leave.
+/// The number of searches for waves under the noise that they leave.
 const SEARCHES: usize = 3;
 /// The largest value along one value of a shape between two ends, in its logarithm, and the effect that has it.
 fn along(

@@ -28,14 +28,14 @@ pub struct Simulated {
 /// Errors of a model, root mean square.
 #[derive(Debug, Clone, Serialize)]
 pub struct Figures {
-    /// Of the whole recording.
+    /// The error over the whole recording.
     pub free_run: Off,
-    /// Of windows started from the measured state.
+    /// The errors in windows started from the measured state.
     pub windows: Vec<Window>,
     /// Under the recorded reference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub under_reference: Option<Off>,
-    /// Where the first row lies on the mechanism, fitted where the model has periodic effects, rad or m.
+    /// The first row's place on the mechanism, fitted if the model has periodic effects, rad or m.
     pub start: f64,
 }
 

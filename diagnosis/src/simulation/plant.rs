@@ -22,7 +22,7 @@ pub struct Plant {
     position: f64,
     velocity: f64,
     time: f64,
-    /// How far the reading lags behind the position in the filter of the sensor that the rig knows.
+    /// The lag of the reading behind the position in the sensor's filter that the rig declares.
     lag: f64,
     sensor: f64,
 }

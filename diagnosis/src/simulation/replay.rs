@@ -62,7 +62,7 @@ pub struct Beside<'a> {
     pub recording: &'a Recording,
     /// Its motion.
     pub motion: Motion,
-    /// Where on the mechanism the first row lies, rad or m: nothing but what depends on the travel knows.
+    /// The first row's place on the mechanism, rad or m: only terms that depend on the travel use it.
     pub start: f64,
 }
 

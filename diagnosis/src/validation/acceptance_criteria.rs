@@ -14,13 +14,13 @@ use std::ops::Range;
 #[derive(Clone)]
 pub(crate) struct EffectEvidence {
     pub(crate) effect: Effect,
-    /// Others fitted in its place; none before they are.
+    /// The others fitted instead; empty before they are.
     pub(crate) rivals: Vec<Rival>,
     /// Held-out gain of the full model over the model without it.
     pub(crate) holdout: Gain,
     /// The same on blocks of the fitted recordings that were left out of its fit.
     pub(crate) fit: Gain,
-    /// How much less force it leaves on held-out recordings, over the square of what is left.
+    /// The reduction of the force residual on held-out recordings, over the square of the remaining one.
     pub(crate) force: Gain,
     /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the fitted or on held-out recordings,
     /// whichever are fewer; zero where it may be named without it.
@@ -183,7 +183,7 @@ pub(crate) struct Rival {
     /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
     pub(crate) lead: f64,
     pub(crate) held_out_lead: f64,
-    /// Why it may not be named although it explains as much.
+    /// The reason why it may not be named although it explains as much.
     pub(crate) absence: Option<Rejection>,
 }
 

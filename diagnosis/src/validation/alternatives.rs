@@ -1,4 +1,4 @@
-//! Rivals: every effect found is taken out, others are fitted in its place, and how far they stay behind makes its class.
+//! Rivals: every found effect is removed and others are fitted instead; those that fit nearly as well form its class.
 
 use crate::effects::definition::Shown;
 use crate::effects::{Effect, EffectName};
@@ -20,7 +20,7 @@ use crate::validation::known_travel::known;
 use crate::validation::parameters;
 use rayon::prelude::*;
 
-/// How many rivals of each effect are fitted in full.
+/// The number of rivals of each effect that are fitted in full.
 const RIVALS: usize = 4;
 /// Standard errors behind within which a rival's shape is worth polishing.
 const WITHIN_REACH: f64 = 8.0;
@@ -34,7 +34,7 @@ fn costs(candidate: &FittedModel, nominal: &Nominal, holdout: &[BlockedRecording
     out
 }
 
-/// Fits the rivals of each effect in its place and says how far behind they are.
+/// Fits the rivals of each effect instead of it, and returns how far behind they are.
 pub(crate) fn fit_rivals(
     context: &FitContext,
     last: &FittedModel,

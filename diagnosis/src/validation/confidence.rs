@@ -1,4 +1,4 @@
-//! How sure a name is: a logistic score of its evidence, calibrated on recordings whose truth is known.
+//! The confidence in a name: a logistic score of its evidence, calibrated on recordings whose truth is known.
 //!
 //! `prove --calibrate` finds such weights from the evidence that reports carry. The seeds that they come from may not
 //! judge.

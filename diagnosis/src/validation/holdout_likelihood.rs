@@ -138,7 +138,7 @@ pub(crate) fn evaluate_all(
     tracks.iter().map(|track| evaluate(c, nominal, track, noise)).collect()
 }
 
-/// How often the force that is there all the time is found anew.
+/// The number of times that the constant force is estimated again.
 const BIASES: usize = 2;
 
 fn evaluate_once(

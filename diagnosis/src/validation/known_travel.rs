@@ -30,16 +30,16 @@ pub(crate) fn known<'a>(
     Cow::Owned(tracks)
 }
 
-/// Part of a recording beyond the fitted travel from which on it is told.
+/// The smallest part of a recording beyond the fitted travel that is reported.
 const TOLD: f64 = 0.05;
 
 /// Travel over which held-out recordings go and fitted ones do not, rad or m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BeyondFitted {
-    /// Where the held-out recordings go.
+    /// The range of the held-out recordings.
     pub(crate) from: f64,
     pub(crate) to: f64,
-    /// Where the fitted ones go.
+    /// The range of the fitted ones.
     pub(crate) low: f64,
     pub(crate) high: f64,
 }

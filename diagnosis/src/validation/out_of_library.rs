@@ -45,7 +45,7 @@ pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &Holdout
     is_sure.then_some(Foreign { what: best.what, share: found.share.min(1.0) })
 }
 
-/// Physics without a name that a fitted effect would rather be, where some in its place explains surely more; `gain` is the
+/// Returns the physics without a name that explains more, with certainty, than a fitted effect; `gain` is the
 /// effect's own.
 pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, gain: f64) -> Option<Rather> {
     let more = |foreign: &Unnamed| {

@@ -1,10 +1,10 @@
-//! Why an effect is not named: the requirement that it does not meet, with its figures. `report::text` makes sentences of it.
+//! The reason why an effect is not named: the criterion that it does not meet, with its figures. `report::text` turns it into a sentence.
 
 use crate::effects::EffectName;
 use crate::numerics::bootstrap::Gain;
 use crate::selection::free_form::Inputs;
 
-/// Why an effect is not named.
+/// The reason why an effect is not named.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Rejection {
     /// A slow disturbance explains as much.
@@ -47,7 +47,7 @@ pub(crate) enum Rejection {
     Improbable { probability: f64, weakness: Weakness },
     /// The recordings cannot tell it from a named effect.
     Indistinguishable { from: EffectName },
-    /// Another effect in its place explains more.
+    /// Another effect explains more instead.
     Behind { winner: EffectName, z: f64 },
 }
 

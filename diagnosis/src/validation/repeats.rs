@@ -6,9 +6,9 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::numerics::linear::correlation;
 
-/// Correlation of the motion from which on one stretch repeats another.
+/// The smallest correlation of the motion at which one stretch repeats another.
 const SAME_MOTION: f64 = 0.97;
-/// Correlation of the residuals from which on they repeat, and standard errors by which it must be more than chance.
+/// The smallest correlation of residuals that repeat, and the standard errors by which it must exceed chance.
 const REPEATS: f64 = 0.5;
 const SURELY: f64 = 4.0;
 /// Shortest stretch that is compared, s, and shift within which recordings are aligned, s.

@@ -1,4 +1,4 @@
-//! Where the residual sits: maps over states that carry from the fitted to the held-out recordings, and intervals of time.
+//! The place of the residual: maps over states that carry from the fitted to the held-out recordings, and intervals of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::numerics::bootstrap::{Gain, bootstrap};

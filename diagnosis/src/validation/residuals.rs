@@ -87,7 +87,7 @@ pub(crate) fn residuals(
     }
 }
 
-/// Mean square of a residual above what chance makes of it, and at least this part of its own.
+/// Returns the mean square of a residual above that of chance, and at least this part of its own.
 pub(crate) fn above(residual: f64, chance: f64, least: f64) -> f64 {
     let whole = residual * residual;
     (whole - chance * chance).max(least * whole)

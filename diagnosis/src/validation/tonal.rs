@@ -34,7 +34,7 @@ pub(crate) struct TonalDisturbance {
     pub(crate) taken: f64,
 }
 
-/// Part from which on a swing is what was left out.
+/// The smallest part at which a swing is the missing physics.
 const DOMINANT: f64 = 0.4;
 
 impl TonalDisturbance {

@@ -49,7 +49,7 @@ pub const AXIS: Machine = Machine {
     disturbance: 0.05,
 };
 
-/// How it is recorded: rows a second, seconds, the state it starts in, and counts per unit of travel.
+/// The recording: rows per second, seconds, the state it starts in, and counts per unit of travel.
 #[derive(Clone, Copy)]
 pub struct Taken {
     pub rate: f64,

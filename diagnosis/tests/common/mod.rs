@@ -51,7 +51,7 @@ pub fn rig(off: [f64; 4], extra: &str) -> Rig {
     Rig::parse(&text, "simulated").expect("the rig is right")
 }
 
-/// What the plant has beside the nominal model.
+/// The plant's physics beyond the nominal model.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup {
     pub effect: &'static str,

@@ -1,4 +1,4 @@
-//! A score test for every candidate in turn, and nothing that speaks against it: no rival in its place, no free form, no
+//! A score test for every candidate in turn, and no test against other explanations: no rival, no free form, no
 //! held-out recording. The variance of a score is the scatter of its blocks with the candidate in the model, so that
 //! autocorrelated noise counts once.
 

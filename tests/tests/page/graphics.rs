@@ -34,7 +34,7 @@ fn visit() -> Result<(), Failure> {
     page.wait("WebGPU in the page", SOME_TIME, "__body.graphics === 'webgpu' && __body.frames > 5")?;
     page.evaluate("window.before = __body.frames, device.destroy()")?;
     let on = "__body.graphics === 'webgl2' && __body.frames > before + 20";
-    page.wait("WebGL in its place", SOME_TIME, on)?;
+    page.wait("WebGL instead", SOME_TIME, on)?;
     page.photograph(&scratch.join("after-loss.png"))?;
     let note = page.text("document.getElementById('body-note').textContent")?;
     if note.is_empty() { Ok(()) } else { Err(format!("the page says: {note}")) }

@@ -1,4 +1,4 @@
-//! What an effect is: everything that anyone asks of one, in a trait each for its law, for the search and for the report. A file
+//! The definition of an effect, in a trait each for its law, for the search and for the report. A file
 //! of `effects` defines each effect. Nothing here may know how an effect is found.
 
 mod law;

@@ -1,4 +1,4 @@
-//! What a report says of an effect.
+//! The description of an effect in a report.
 
 use crate::effects::{Effect, EffectName, Subsystem};
 
@@ -72,7 +72,7 @@ pub(crate) fn sized(pairs: &[(f64, f64)]) -> (f64, f64) {
     (size, sd)
 }
 
-/// What a report says of an effect.
+/// The description of an effect in a report.
 pub(crate) trait EffectReport {
     /// Returns the subsystem that it belongs to.
     fn subsystem(&self) -> Subsystem;

@@ -1,4 +1,4 @@
-//! What the search must know of an effect: its shapes, their bounds, and what it may be confused with.
+//! The description of an effect for the search: its shapes, their bounds, and what it may be confused with.
 
 use crate::effects::{Effect, EffectName};
 
@@ -122,7 +122,7 @@ pub(crate) type Movable = (&'static str, f64, f64);
 /// A value of a shape by its key, and factors on it.
 pub(crate) type Factors = (&'static str, &'static [f64]);
 
-/// What the search must know of an effect.
+/// The description of an effect for the search.
 pub(crate) trait EffectSearch {
     /// True if it changes a dry friction, which must be there first.
     fn needs_dry(&self) -> bool {
@@ -194,7 +194,7 @@ pub(crate) trait EffectSearch {
         true
     }
 
-    /// How many coefficients are fitted, over so many recordings.
+    /// Returns the number of coefficients that are fitted, over so many recordings.
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         1
     }

@@ -69,7 +69,7 @@ impl Inputs {
     }
 }
 
-/// Where the axis is during one block, or a place of a table.
+/// The axis's state during one block, or a place of a table.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Point {
     /// Sign of the velocity; zero where that is not known.

@@ -61,7 +61,7 @@ pub(crate) struct Against {
     pub(crate) inputs: Inputs,
     /// Gain of the form in the effect's place or in addition to it, whichever is more, nats.
     pub(crate) most: f64,
-    /// How much more that is than the effect takes.
+    /// The gain of that beyond the effect's.
     beyond: Gain,
 }
 
@@ -89,7 +89,7 @@ impl Densities {
         all
     }
 
-    /// How an effect that is a force of `variable` alone, if it is, stands, given the densities of the model without it. A form
+    /// Compares an effect, a force of `variable` alone if given, with the forms, given the densities of the model without it. A form
     /// of that variable and of another one has every such law in it, so that none takes anything beyond: it says nothing.
     pub(crate) fn standing(&self, without: &Self, variable: Option<Variable>) -> Standing {
         let own = self.alone.over(&without.alone);

@@ -10,7 +10,7 @@ pub(crate) struct Shape {
     pub(crate) table: Table,
     /// Standard deviation of each place's force, N·m or N.
     pub(crate) deviation: Vec<f64>,
-    /// How many blocks of the fitted recordings were nearest to each place.
+    /// The number of blocks of the fitted recordings that were nearest to each place.
     pub(crate) visits: Vec<f64>,
 }
 
