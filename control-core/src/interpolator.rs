@@ -1,7 +1,7 @@
 //! Where the needle is between two counts of the encoder, and how fast it goes without the steps of a window of counts.
 //!
 //! At an edge the place is known: the border of two counts. From there on it moves with the steady speed and never leaves its count. So the
-//! law sees a way without steps, late by nothing, and off by half a count at the most.
+//! law sees a way without steps, late by nothing, and off by half a count at most.
 
 use crate::math::saturating_product;
 use crate::units::{Millimetres, MillimetresPerSecond};

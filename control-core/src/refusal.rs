@@ -246,6 +246,8 @@ impl fmt::Display for Field {
             Self::CuttingForce => "cutting",
             Self::Withdrawal => "withdrawal",
             Self::TableDepth => "depth_step_mm",
+            Self::TableRupture => "gives_way",
+            Self::AfterPuncture => "after_puncture",
             Self::TableSpeed => "speeds_mm_s",
             Self::TableAngle => "the angles in mrad",
             Self::TableForce => "the forces in N",

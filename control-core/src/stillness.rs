@@ -132,7 +132,7 @@ const LOADED_SHARE: u32 = 8;
 /// A torque that moves a needle which nobody holds is at least so many times the dry friction.
 const TIMES_FRICTION: u32 = 3;
 
-/// The torque from which on a needle without a count is looked at, in mN·m: an eighth of the limit, or three times the dry
+/// The smallest torque at which a needle without a count is looked at, in mN·m: an eighth of the limit, or three times the dry
 /// friction, and what stands even where no force is felt.
 pub(crate) fn loaded_torque(limit: I16F16, dry_friction: U16F16, at_rest: U16F16) -> U16F16 {
     let share = limit.unsigned_abs() / LOADED_SHARE;

@@ -224,7 +224,7 @@ fn in_words(one: &Insertion) -> Vec<String> {
     words
 }
 
-/// Whether a target was reached, in a sentence.
+/// Says in a sentence whether a target was reached.
 fn of_target(target: &Reached) -> String {
     let beside = match target.passed_beside {
         0 => String::new(),

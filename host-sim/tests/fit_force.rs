@@ -18,7 +18,7 @@ const LAYERS: [(f64, f64, f64); 2] = [(0.0, 0.30, 0.62), (4.2, 0.55, 0.55)];
 struct Phantom {
     speed: f64,
     angle_deg: f64,
-    /// Of this specimen, to the mean one's.
+    /// The toughness of this specimen over the mean one's.
     toughness: f64,
 }
 
@@ -27,7 +27,7 @@ impl Phantom {
         k * (1.0 + 0.12 * self.speed.ln_1p()) * (0.6 + 0.4 * self.angle_deg.to_radians().sin())
     }
 
-    /// How far a layer is pushed in when it tears: its energy is k·δ^2.5/2.5 then.
+    /// Returns the indentation at which a layer tears: its energy is k·δ^2.5/2.5 then.
     fn tears_at(&self, (_, k, energy): (f64, f64, f64)) -> f64 {
         let energy = energy * self.toughness * (1.0 + 0.25 * self.speed.sqrt());
         (2.5 * energy / self.stiffness(k)).powf(0.4)

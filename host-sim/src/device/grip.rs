@@ -1,4 +1,4 @@
-//! What the rollers hold: paper 001 transmits force by the friction between two rollers and the needle, without loss "within maximum static
+//! The force that the rollers hold: Paper 001 transmits force by the friction between two rollers and the needle, without loss "within maximum static
 //! frictional force". Beyond it the needle slips, and what the hand feels is friction instead of the law.
 
 use control_core::Device;
@@ -28,7 +28,7 @@ impl Grip {
             [("pressing_n", self.pressing_n, 0.1, 200.0), ("friction", self.friction, 0.05, 2.0)]
         {
             if !(low..=high).contains(&value) {
-                return Err(format!("grip.{key} is {value}; it must lie from {low} to {high}"));
+                return Err(format!("grip.{key} is {value}; it must be from {low} to {high}"));
             }
         }
         let radius_mm = device.roller_radius.0.to_num::<f64>();

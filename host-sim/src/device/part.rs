@@ -25,7 +25,7 @@ pub struct DevicePart {
     pub device: Device,
     /// Under which the device has told it, where one has.
     seal: Option<u32>,
-    /// What its rollers hold, where it was measured.
+    /// The force that its rollers hold, if measured.
     pub grip: Option<Grip>,
     /// The text that it came from, for recordings.
     pub source: Text,

@@ -179,7 +179,7 @@ fn mean_falls<'a>(all: impl Iterator<Item = &'a [Fall]>) -> Option<Vec<Fall>> {
 fn landmarks(falls: &[Fall], deepest_mm: f64) -> Landmarks {
     let mut marks = vec![0.0];
     marks.extend(falls.iter().flat_map(|fall| [fall.peak_mm, fall.end_mm]));
-    // A little beyond the last fall at the least, and beyond the deepest point, so that it counts.
+    // At least a little beyond the last fall, and beyond the deepest point, so that it counts.
     let last = marks.last().copied().unwrap_or(0.0);
     marks.push(deepest_mm.max(last + 0.2) + 1e-6);
     Landmarks(marks)

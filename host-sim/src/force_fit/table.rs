@@ -56,7 +56,7 @@ pub struct Measured {
 
 /// Rounds in which base and factors are found from each other; they settle in three or four.
 const ROUNDS: usize = 12;
-/// Knots of a table are this far apart at the least, mm.
+/// Knots of a table are at least this far apart, mm.
 const LEAST_GAP_MM: f64 = 0.05;
 
 impl Table {

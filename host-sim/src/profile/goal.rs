@@ -10,7 +10,7 @@ use serde::Deserialize;
 /// A structure to be reached. Layers of the device go on for ever: where it ends to either side, that is for whoever judges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The layer that it is, or that begins with its wall.
     pub layer: u8,
@@ -32,7 +32,7 @@ pub(super) struct Written {
 }
 
 impl Written {
-    /// Whether it is one of the layers and where it ends makes sense.
+    /// Checks that it is one of the layers and ends below its beginning.
     pub(super) fn check(self, layers: &[Layer]) -> Result<(), String> {
         if !layers.iter().any(|layer| layer.tissue == self.tissue) {
             return Err("target.tissue is none of the layers; name one of them".into());
@@ -45,7 +45,7 @@ impl Written {
     }
 }
 
-/// What the file says, else the lumen of the vessel; none where there is no vessel either.
+/// Returns the goal of the file, else the lumen of the vessel; none without a vessel.
 pub(super) fn goal(written: Option<Written>, patient: &Patient, entry_rad: f64) -> Option<Goal> {
     let layers = &patient.layers;
     let tissue = written.map_or(Tissue::Vessel, |goal| goal.tissue.into());

@@ -309,7 +309,7 @@ impl Forces {
 }
 
 impl Forces {
-    /// Of each of `count` knots in hundredths of a mm, in the order of the forces, or once for all cells.
+    /// Returns the depth of each of `count` knots in hundredths of a mm, in the order of the forces, or once for all cells.
     fn depths(&self, count: usize) -> Result<Vec<u16>, String> {
         if let Some(step) = self.depth_step_mm.filter(|step| !step.is_finite()) {
             return Err(format!("depth_step_mm is {step}; it must be a number"));
@@ -319,7 +319,7 @@ impl Forces {
             if (0.0..=MOST_HUNDREDTHS).contains(&hundredths) {
                 Ok(hundredths as u16)
             } else {
-                Err(format!("[force_table] has a knot at {mm} mm; it must lie from 0 to 163.83"))
+                Err(format!("[force_table] has a knot at {mm} mm; it must be from 0 to 163.83"))
             }
         };
         match (self.depth_step_mm, &self.depths_mm) {

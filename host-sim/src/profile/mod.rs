@@ -49,7 +49,7 @@ pub struct Profile {
     pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
-    /// What the needle is to reach.
+    /// The needle's target.
     goal: Option<goal::Written>,
     /// The text that it came from, for recordings.
     pub source: Text,
@@ -147,13 +147,13 @@ impl Profile {
         Ok(Self { entry_rad: degrees.to_radians(), ..self })
     }
 
-    /// What people call layer `number`.
+    /// Returns the name of layer `number`.
     pub fn layer_name(&self, number: u8) -> Option<String> {
         let layer = self.config.patient.layers.get(usize::from(number))?;
         Some(tissue_name(layer.tissue).to_owned())
     }
 
-    /// What the needle is to reach: what the file says, else the vessel's lumen where there is a vessel.
+    /// Returns the needle's target: that of the file, else the vessel's lumen if there is a vessel.
     pub fn goal(&self) -> Option<Goal> {
         goal::goal(self.goal, &self.config.patient, self.entry_rad)
     }

@@ -1,4 +1,4 @@
-//! Where the layers of a force table give way, for pictures and procedures: the control law finds it by itself.
+//! Depths at which the layers of a force table give way, for pictures and procedures: the control law finds it by itself.
 
 use control_core::Patient;
 use control_core::config::{ForceTable, Law};
@@ -8,13 +8,13 @@ use control_core::config::{ForceTable, Law};
 pub(super) struct Rupture {
     /// Its number.
     pub(super) layer: usize,
-    /// How far below its outer face it gives way, perpendicular to the skin, mm.
+    /// The distance below its outer face at which it gives way, perpendicular to the skin, mm.
     pub(super) below_mm: f64,
     /// The force at which it does, N.
     pub(super) force_n: f64,
 }
 
-/// Of a needle at this angle to the skin and the middle one of the table's speeds; none of a law without a table.
+/// Returns the ruptures of a needle at this angle to the skin and the middle one of the table's speeds; none of a law without a table.
 pub(super) fn ruptures(patient: &Patient, angle_rad: f64) -> Vec<Rupture> {
     let Law::Xr(table) = &patient.law else { return Vec::new() };
     let cell = nearest_cell(table, angle_rad);

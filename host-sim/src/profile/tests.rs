@@ -116,8 +116,8 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (phantom.replace("depth_step_mm = 0.8", "depths_mm = [0.0, 1.0]"), "depths_mm must have 16 values"),
         (phantom.replace("depth_step_mm = 0.8", ""), "either depth_step_mm or depths_mm"),
         (phantom.replace("depth_step_mm = 0.8", "depth_step_mm = 40.0"), "a knot at 200 mm"),
-        (phantom.replace("gives_way = [3, 6, 10]", "gives_way = [3, 4]"), "TableRupture is 4"),
-        (phantom.replace("gives_way = [3, 6, 10]", "gives_way = [15]"), "TableRupture is 15"),
+        (phantom.replace("gives_way = [3, 6, 10]", "gives_way = [3, 4]"), "gives_way is 4"),
+        (phantom.replace("gives_way = [3, 6, 10]", "gives_way = [15]"), "gives_way is 15"),
         (phantom.replace("[0.000,", "[nan,"), "force_n holds NaN"),
         (BUILT_IN[0].1.replacen("friction_n_per_mm = 0.02\n", "", 1), "friction_n_per_mm is missing"),
     ] {

@@ -42,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_track_layers_are_open_and_beside_it_they_give_way_again() {
+    fn layers_are_open_in_the_track_and_give_way_again_beside_it() {
         let first = [
             Contact { layer: 0 },
             Puncture { layer: 0 },

@@ -178,7 +178,7 @@ fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
         }
         let newtons = |codes: u16| f64::from(codes) / 2_047.0 * 2.88;
         println!("| {name}, held for 20 s | {:.2} to {:.2} N |", newtons(codes.0), newtons(codes.1));
-        // The tissue has relaxed below an eighth of the limit, from which on the check is awake.
+        // The tissue has relaxed below an eighth of the limit, the smallest torque that is looked at.
         press_until(&mut rig, &needle, HELD_CODES);
         rig.board.at_stop(|stopped| stopped.set_wires(Wires { supply_off: true, ..Wires::default() }));
         let time = rig.time_to_safe(200 * MILLISECOND);

@@ -15,7 +15,7 @@ pub(super) fn check(table: &ForceTable, ground: &Ground) -> Result<(), Refusal> 
         let mut from = low;
         let mut count = 0;
         for knot in knots {
-            // A hundredth apart at the least: the slopes between them are computed.
+            // At least a hundredth apart: the slopes between them are computed.
             let least = if count == 0 { low } else { from.saturating_add(milli(10)) };
             within(field, knot, least, high)?;
             (from, count) = (knot, count + 1);
