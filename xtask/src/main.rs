@@ -20,6 +20,7 @@ mod stack;
 mod steps;
 mod test;
 mod wasm;
+mod wiring;
 mod words;
 
 use boards::Board;
@@ -39,6 +40,7 @@ The project's chores.
   cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
   cargo xtask site              the whole simulator as one folder without a server: target/site
+  cargo xtask wiring            draws both boards' wiring from the tables in docs/hardware.md
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask mutants [CRATE…]  changes the code a thousand times and sees that the tests notice: half an hour
@@ -66,6 +68,7 @@ fn main() -> ExitCode {
         "site" => no_more(rest).and_then(|()| site::run()),
         "nightly" => test::nightly(rest),
         "board-test" => for_board(rest, board_test::run),
+        "wiring" => no_more(rest).and_then(|()| wiring::run()),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
         other => {

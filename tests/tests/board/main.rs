@@ -15,3 +15,4 @@ mod silicon;
 mod store;
 mod sustained;
 mod usb;
+mod wiring;
