@@ -105,7 +105,12 @@ struct Twin {
     wall: f64,
     bristles: f64,
     last: f64,
-    /// Ticks since the needle last went on in its direction; the furthest place; in 1, out −1, at rest 0.
+    /// Ticks so far, and whether something happened in the last one: the movement is looked at every 16 ticks, in the tenth of them,
+    /// unless there is more to do.
+    ticks: u32,
+    is_busy: bool,
+    has_stopped: bool,
+    /// Looks since the needle last went on in its direction; the furthest place; in 1, out −1, at rest 0.
     still: u32,
     furthest: f64,
     direction: f64,
@@ -126,6 +131,10 @@ impl Twin {
             wall: 0.0,
             bristles: 0.0,
             last: 0.0,
+            // One before the start.
+            ticks: 1,
+            is_busy: false,
+            has_stopped: true,
             still: 0,
             furthest: 0.0,
             direction: 0.0,
@@ -140,15 +149,26 @@ impl Twin {
             (self.furthest, self.still) = (x, 0);
         } else if off.abs() >= 0.25 {
             (self.direction, self.furthest, self.still) = (off.signum(), x, 0);
-        } else if self.still == 2_500 {
+        } else if self.still == 2_500 / 16 {
             (self.direction, self.furthest) = (0.0, x);
         }
+        self.has_stopped = self.direction == 0.0 || self.still > 200 / 16 && off.abs() < 0.1;
     }
 
     fn tick(&mut self, out: &TickOutput) -> f64 {
+        let force = self.force(out);
+        self.ticks += 1;
+        let happened = out.transitions.contact | out.transitions.puncture | out.transitions.exit != 0;
+        if self.ticks % 16 == 10 && !self.is_busy && !happened {
+            self.follow(out.depth.0.to_num());
+        }
+        self.is_busy = happened;
+        force
+    }
+
+    fn force(&mut self, out: &TickOutput) -> f64 {
         let (x, v) = (out.depth.0.to_num::<f64>(), out.speed.0.to_num::<f64>());
         let step = x - std::mem::replace(&mut self.last, x);
-        self.follow(x);
         let given = self.given;
         self.given += out.transitions.puncture.count_ones() as usize;
         if out.transitions.contact != 0 {
@@ -188,8 +208,7 @@ impl Twin {
         self.wall = self.wall.max(x - inwards).min(x + outwards);
         let held = self.sparte.friction.sliding.0.to_num::<f64>() / stiffness;
         let stretch = x - self.wall;
-        let has_stopped = self.direction == 0.0 || self.still > 200 && (x - self.furthest).abs() < 0.1;
-        if has_stopped && stretch.abs() > held {
+        if self.has_stopped && stretch.abs() > held {
             let share = -(-0.1 / f64::from(self.sparte.relax_ms)).exp_m1();
             self.wall += (stretch - held * stretch.signum()) * share;
         }
