@@ -27,7 +27,7 @@ mod validation;
 pub use io::error::InputError;
 pub use io::{recording, rig};
 pub use pipeline::diagnosis::Series;
-pub use report::outcome::{Evidence, Outcome};
+pub use report::outcome::{Evidence, Made, Outcome};
 pub use report::{Report, Verdict};
 pub use validation::residual_maps::Map;
 
@@ -69,14 +69,14 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     diagnose_recordings(&rig, &fit, &holdout, progress)
 }
 
-/// Diagnoses recordings that are already read.
+/// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit or a sign is wrong.
 pub fn diagnose_recordings(
     rig: &Rig,
     fit: &[Recording],
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
-    let outcome = Outcome::of(pipeline::run(rig, fit, holdout, progress));
+    let outcome = Outcome::of(pipeline::run(rig, fit, holdout, progress)?);
     progress("done", 1.0);
     Ok(outcome)
 }

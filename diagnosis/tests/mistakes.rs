@@ -42,12 +42,40 @@ fn said(rig: &Rig, spoil: impl Fn(&mut Recording)) -> Outcome {
     diagnose_recordings(rig, &[fit], &[holdout], &|_, _| ()).expect("they can be read")
 }
 
-/// That a mistake is answered by a sentence with `hint`, without a name and without a force error.
+/// That a mistake is an error whose sentence has `hint`.
 fn helps(what: &str, rig: &Rig, spoil: impl Fn(&mut Recording), hint: &str) {
-    let outcome = said(rig, spoil);
+    let (fit, holdout) = both(spoil);
+    let error = diagnose_recordings(rig, &[fit], &[holdout], &|_, _| ()).expect_err(what).to_string();
+    assert!(error.contains(hint), "{what} should say \"{hint}\": {error}");
+    assert!(!error.contains("could still be used"), "{what}: both are wrong: {error}");
+}
+
+#[test]
+fn the_recordings_that_could_still_be_used_are_said() {
+    let all = [recorded("fit.csv", 0.0), recorded("fit2.csv", 0.5), recorded("holdout.csv", 1.0)];
+    let error = |spoiled: usize, spoil: &dyn Fn(&mut Recording)| {
+        let mut all = all.clone();
+        spoil(&mut all[spoiled]);
+        let [fit, more, holdout] = all;
+        diagnose_recordings(&rig(), &[fit, more], &[holdout], &|_, _| ())
+            .expect_err("it is refused")
+            .to_string()
+    };
+    let turned = error(1, &|r| r.position_counts.iter_mut().for_each(|q| *q = -*q));
+    assert!(turned.starts_with("the axis of fit2.csv moves against its command"), "{turned}");
+    assert!(turned.ends_with("; fit.csv and holdout.csv could still be used"), "{turned}");
+    let at_rest = error(2, &|r| r.position_counts.fill(17.0));
+    assert!(at_rest.starts_with("holdout.csv is at rest"), "{at_rest}");
+    assert!(at_rest.ends_with("; fit.csv and fit2.csv could still be used"), "{at_rest}");
+}
+
+#[test]
+fn a_verdict_without_a_fit_has_no_force_error() {
+    let what = "a constant command";
+    let outcome = said(&rig(), |r| r.command.fill(0.1));
     let report = &outcome.report;
     assert_eq!(report.verdict, Verdict::InsufficientExcitation, "{what}: {}", report.sentence);
-    assert!(report.sentence.contains(hint), "{what} should say \"{hint}\": {}", report.sentence);
+    assert!(report.sentence.contains("is constant"), "{}", report.sentence);
     assert!(report.effects.is_empty(), "{what}");
     let json = serde_json::to_value(report).expect("it can be written");
     for model in ["nominal", "refit", "patched"] {

@@ -32,6 +32,7 @@ pub mod reproduce;
 pub mod score;
 pub mod session;
 pub mod sheet;
+pub mod shell;
 pub mod station;
 pub mod streams;
 pub mod tally;

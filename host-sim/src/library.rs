@@ -51,7 +51,36 @@ pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Failure> {
         Failure::input(format_args!(
             "{}, line {line}{key}: {}; correct the file",
             source.origin,
-            cause.message()
+            in_words(cause.message())
         ))
     })
+}
+
+/// A parser's message; of a key that is not known, with the nearest that is.
+fn in_words(message: &str) -> String {
+    let Some((key, known)) =
+        message.strip_prefix("unknown field `").and_then(|rest| rest.split_once("`, expected "))
+    else {
+        return message.to_owned();
+    };
+    let known: Vec<&str> = known.split('`').skip(1).step_by(2).collect();
+    let near = known.iter().map(|name| (strsim::damerau_levenshtein(key, name), *name)).min();
+    match near.filter(|(changes, name)| 2 * changes <= name.len()) {
+        Some((_, name)) => format!("{key} is not a key here; do you mean {name}"),
+        None => format!("{key} is not a key here; known are {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_that_is_misspelt_is_named_with_the_nearest() {
+        let message = "unknown field `thicknes_mm`, expected one of `name`, `thickness_mm`";
+        assert_eq!(in_words(message), "thicknes_mm is not a key here; do you mean thickness_mm");
+        let message = "unknown field `colour`, expected `name` or `thickness_mm`";
+        assert_eq!(in_words(message), "colour is not a key here; known are name, thickness_mm");
+        assert_eq!(in_words("missing field `name`"), "missing field `name`");
+    }
 }

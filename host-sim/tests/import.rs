@@ -66,7 +66,7 @@ fn holds_the_motion(recording: &Recording, per_unit: f64, begin: f64, gain: f64,
 
 #[test]
 fn tables_of_pandas_numpy_and_matlab_and_json_give_the_same_motion() {
-    let cases: [(&str, &[&str], f64, &[&str]); 8] = [
+    let cases: [(&str, &[&str], f64, &[&str]); 12] = [
         ("pandas.csv", &[], 1.0, &["position is theta_deg, in rad", "command is tau [Nm], in N·m"]),
         (
             "semicolons.csv",
@@ -88,6 +88,20 @@ fn tables_of_pandas_numpy_and_matlab_and_json_give_the_same_motion() {
         ("records.json", &[], 1.0, &["read as JSON: 3 columns"]),
         ("split.json", &[], 1.0, &["read as JSON: 3 columns"]),
         ("lines.jsonl", &[], 1.0, &["read as JSON: 3 columns"]),
+        ("vectors.mat", &[], 1.0, &["read as MATLAB: 3 columns", "note, mass left out"]),
+        (
+            "structure.mat",
+            &["--column", "position=log.signals.values.1:rad", "--column", "command=log.signals.values.2:Nm"],
+            1.0,
+            &["read as MATLAB: 4 columns"],
+        ),
+        ("rows.csv", &[], 1.0, &["channels stand in rows, 3 of 500 values: taken as columns"]),
+        (
+            "matrix.json",
+            &["--column", "time=0:s", "--column", "position=1:rad", "--column", "command=2:Nm"],
+            1.0,
+            &["read as JSON: 3 columns"],
+        ),
     ];
     for (file, options, gain, sentences) in cases {
         let (said, recordings, per_unit) = import(&[file], options);
@@ -116,6 +130,89 @@ fn an_mcap_of_the_python_package_gives_the_motion_in_either_compression() {
             assert!((recording.command[i] - torque(held)).abs() < 1e-9);
         }
     }
+}
+
+#[cfg(feature = "ros")]
+#[test]
+fn a_ros_2_bag_of_rosbags_gives_the_motion_of_a_joint() {
+    let (said, recordings, per_unit) = import(
+        &["ros2-bag"],
+        &[
+            "--column",
+            "position=joint_states.position.wrist:rad",
+            "--column",
+            "command=joint_states.effort.wrist:Nm",
+        ],
+    );
+    assert!(said.contains("topics /joint_states"), "{said}");
+    assert_eq!(recordings[0].len(), 500, "{said}");
+    holds_the_motion(&recordings[0], per_unit.expect("it is known"), 0.0, 1.0, 2e-6);
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn the_episodes_of_a_lerobot_dataset_are_runs_of_their_own() {
+    let options = [
+        "--column",
+        "position=observation.state.wrist.pos:rad",
+        "--column",
+        "command=observation.effort.wrist.torque:Nm",
+    ];
+    let (said, recordings, per_unit) = import(&["lerobot"], &options);
+    assert!(said.contains("read as Parquet of a LeRobot dataset"), "{said}");
+    assert!(said.contains("the clock starts again 1 times"), "{said}");
+    assert_eq!(recordings.len(), 2, "{said}");
+    for recording in &recordings {
+        holds_the_motion(recording, per_unit.expect("it is known"), 0.0, 1.0, 2e-6);
+    }
+}
+
+#[cfg(not(feature = "ros"))]
+#[test]
+fn a_ros_2_bag_is_told_which_build_reads_it() {
+    let bag = foreign("ros2-bag");
+    let output = host_sim(&["import", text(&bag), "--out", text(&folder("import-no-ros"))]).output();
+    let output = output.expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("build with `--features ros`"), "{said}");
+}
+
+#[test]
+fn two_files_of_one_run_give_their_columns_by_file() {
+    let (said, recordings, per_unit) = import(
+        &["angle.csv", "torque.csv"],
+        &["--column", "position=angle.csv/value:deg", "--column", "command=torque/value:Nm"],
+    );
+    assert!(said.contains("columns of 2 tables put on the clock of"), "{said}");
+    assert_eq!(recordings.len(), 1, "{said}");
+    holds_the_motion(&recordings[0], per_unit.expect("it is known"), 0.0, 1.0, 2e-6);
+}
+
+#[test]
+fn a_role_may_stay_empty_and_a_reference_shares_the_unit() {
+    let out = folder("import-reference");
+    let rows: String = (0..400)
+        .map(|i| {
+            let t = i as f64 * 0.005;
+            format!("{t},{},{},{}\n", angle(t).to_degrees(), angle(t + 0.01).to_degrees(), torque(t))
+        })
+        .collect();
+    let file = out.join("loop.csv");
+    std::fs::write(&file, format!("t,theta_deg,theta_ref,tau_Nm\n{rows}")).expect("written");
+    let columns = |extra: &[&str]| {
+        let to = out.join("done");
+        let mut arguments = vec!["import", text(&file), "--out", text(&to)];
+        arguments.extend(extra);
+        let said = run_well(&arguments);
+        let written = std::fs::read_to_string(to.join("recording.csv")).expect("it is written");
+        (said, written.lines().next().expect("it has a header").to_owned())
+    };
+    let (said, header) = columns(&[]);
+    assert!(said.contains("theta_ref has no unit: taken to have the position's"), "{said}");
+    assert_eq!(header, "time_s,command,position_counts,reference_counts");
+    let (_, header) = columns(&["--column", "reference=none"]);
+    assert_eq!(header, "time_s,command,position_counts");
 }
 
 #[cfg(feature = "parquet")]
@@ -235,13 +332,31 @@ fn what_only_a_person_can_know_is_asked_with_the_option_that_says_it() {
             &[],
             "has steps of 20, which could be ms or µs; say which with --column time=t:ms",
         ),
+        (written("g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"), &[], "is no usable MATLAB file"),
+        (written("v73.mat", b"MATLAB 7.3 MAT-file"), &[], "save('FILE.mat', '-v7')"),
+        (foreign("sheet.xlsx"), &[], "is an Excel workbook; save its sheet as CSV"),
         (
-            written("g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"),
+            written("same.csv", table("t,value,u").as_bytes()),
+            &["--column", "position=value:rad", "--column", "command=value:Nm"],
+            "--column gives value two roles, position and command",
+        ),
+        (
+            written("spaces.csv", table("t,the angle,the torque").as_bytes()),
+            &["--column", "command=the torque"],
+            "say it with --column 'position=the angle:UNIT'",
+        ),
+        (
+            foreign("bare.txt"),
+            &["--column", "command=column3"],
+            "its columns are column1 (0, 0.005, 0.01, …), column2 (0, ",
+        ),
+        (
+            written("both.csv", table("t,theta,foo").as_bytes()),
             &[],
-            "is a MATLAB .mat file; save it as CSV",
+            "--undriven where nothing drives the axis; and the position column theta",
         ),
         (written("h.csv", b"nothing here\nbut words\n"), &[], "no row of numbers was found"),
-        (written("i.npz", b"PK\x03\x04 and no more"), &[], "is no usable NumPy file"),
+        (written("i.npz", b"PK\x03\x04 q.npy and no more"), &[], "is no usable NumPy file"),
     ];
     for (path, options, sentence) in cases {
         let result = out.join("result");
@@ -254,4 +369,23 @@ fn what_only_a_person_can_know_is_asked_with_the_option_that_says_it() {
         assert_eq!(said.trim_end().lines().count(), 1, "{said}");
         assert!(!result.exists(), "nothing is half written");
     }
+}
+
+#[test]
+fn files_of_which_nothing_says_that_they_are_runs_are_asked_about() {
+    let out = folder("import-runs");
+    let rows: String =
+        (0..400).map(|i| format!("{},{},{}\n", i as f64 * 0.005, angle(i as f64 * 0.005), i % 7)).collect();
+    let files: Vec<PathBuf> = ["motor.csv", "load.csv"].iter().map(|name| out.join(name)).collect();
+    for file in &files {
+        std::fs::write(file, format!("t,theta_rad,u\n{rows}")).expect("written");
+    }
+    let to = out.join("result");
+    let arguments = ["import", text(&files[0]), text(&files[1]), "--out", text(&to)];
+    let output = host_sim(&arguments).output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("have the same columns over the same time") && said.contains("--runs"), "{said}");
+    run_well(&[&arguments[..], &["--runs"]].concat());
+    assert!(to.join("recording-2.csv").exists());
 }

@@ -52,7 +52,10 @@ fn the_sentence_comes_first_and_a_fit_by_motion_says_what_it_is() {
     ];
     let said = run_well(&arguments);
     let first = said.lines().next().expect("a line");
-    assert!(first.starts_with("Run over the 6.0 s of holdout.csv under its command alone"), "{said}");
+    assert!(
+        first.starts_with("In windows of 0.5 s of holdout.csv, the simulated position is off by"),
+        "{said}"
+    );
     assert!(said.contains("The motion-fitted simulation is the nominal one with the values that bring its free run closest to fit.csv"), "{said}");
     assert!(!said.contains("judges nothing"), "{said}");
     let json = std::fs::read_to_string(out.join("simulation.json")).expect("written");

@@ -47,7 +47,12 @@ pub(crate) const QUICK: [Step; 4] = [
 /// The checks that take longer than the tests may.
 pub(crate) const NIGHTLY: [Step; 7] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
-    step("parquet", "import reads Parquet, which the default build leaves out", 300.0, parquet),
+    step(
+        "parquet",
+        "import reads Parquet and ROS 2 bags, which the default build leaves out",
+        300.0,
+        parquet,
+    ),
     step("foxglove", "Foxglove's live stream read by Foxglove's own client", 400.0, foxglove),
     step("class", "devices and their instructor over Zenoh, and thirty devices measured", 900.0, class),
     step("soak", "the frame parser, ten minutes of damaged frames", 620.0, soak),
@@ -193,10 +198,16 @@ fn mutated() -> Result<(), Failure> {
     mutants::run(&[])
 }
 
-/// Apart from `unit`: forty packages more.
+/// Separate from `unit`: fifty packages more.
 fn parquet() -> Result<(), Failure> {
     let mut import = cargo();
-    import.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/parquet", "--test", "import"]);
+    import.arg("test").args(BUILD).args([
+        "--quiet",
+        "--features",
+        "host-sim/parquet,host-sim/ros",
+        "--test",
+        "import",
+    ]);
     shell::run(&mut import)
 }
 

@@ -33,11 +33,6 @@ pub(crate) fn mistake(recording: &Recording, rig: &Rig) -> Option<String> {
         .or_else(|| scale_or_sign(recording, rig))
 }
 
-/// The same for several recordings.
-pub(crate) fn mistakes(recordings: &[&Recording], rig: &Rig) -> Option<String> {
-    recordings.iter().find_map(|recording| mistake(recording, rig))
-}
-
 fn swapped(recording: &Recording) -> Option<String> {
     let counts_in_command = broken(&recording.command) == 0.0 && spread(&recording.command) >= 100.0;
     let none_in_position =

@@ -181,6 +181,15 @@ pub struct Hypothesis {
     pub rejected_because: Option<String>,
 }
 
+/// An effect that these recordings could not show.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Untested {
+    /// The effect.
+    pub name: EffectName,
+    /// What it would need.
+    pub because: String,
+}
+
 /// A force of any form: what is there and has no name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FreeForm {
@@ -208,6 +217,12 @@ pub struct Report {
     pub verdict: Verdict,
     /// The verdict in one sentence that a technician understands.
     pub sentence: String,
+    /// How much remains against the sensor's noise, a clause.
+    #[serde(default)]
+    pub remains: String,
+    /// What to record next, a clause.
+    #[serde(default)]
+    pub record_next: String,
     /// Effects left out, the largest first.
     pub effects: Vec<Named>,
     /// Before and after.
@@ -222,6 +237,9 @@ pub struct Report {
     pub unexplained_fraction: f64,
     /// Every hypothesis that was looked at closely.
     pub hypotheses: Vec<Hypothesis>,
+    /// Effects that these recordings could not show.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub untested: Vec<Untested>,
     /// The gain of a force of any form in addition to the named effects.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub free_form: Option<FreeForm>,

@@ -13,12 +13,14 @@ const LEAST_ROWS: usize = 40;
 /// Slowest and fastest rate that is worth fitting, Hz.
 const SLOWEST_HZ: f64 = 19.0;
 const FASTEST_HZ: f64 = 25_000.0;
+/// Nobody records a motion more slowly: the unit of the time is another.
+const NOBODYS_HZ: f64 = 2.0;
 /// Fewest counts of travel.
 const FEWEST_COUNTS: f64 = 100.0;
 
 /// The reason why recordings cannot tell, if there is one; short ones tell together what none tells alone.
-pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording], rig: &Rig) -> Option<String> {
-    if let Some(reason) = fit.iter().chain(holdout).find_map(|recording| alone(recording, rig)) {
+pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
+    if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
         return Some(reason);
     }
     let pooled = |all: &[Recording], least: f64, what: &str| {
@@ -37,16 +39,12 @@ pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording], rig: &Rig) ->
     pooled(fit, SHORTEST_S, "to fit on").or_else(|| pooled(holdout, SHORTEST_HOLDOUT_S, "to judge by"))
 }
 
-/// The reason why one recording cannot tell anything.
-fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
+/// The reason why one recording tells too little.
+fn alone(recording: &Recording) -> Option<String> {
     let file = &recording.file;
     let seconds = recording.duration_s();
-    let rate = recording.rate_hz();
-    if !(SLOWEST_HZ..FASTEST_HZ).contains(&rate) {
-        let unit = if rate < SLOWEST_HZ { "milliseconds" } else { "minutes" };
-        return Some(format!(
-            "{file} has {rate:.3} rows a second where 20 to 20000 are read (are its times in {unit}?)"
-        ));
+    if let Some(sentence) = rate_is_off(recording) {
+        return Some(sentence);
     }
     if seconds < LEAST_S || recording.len() < LEAST_ROWS {
         return Some(format!(
@@ -54,15 +52,40 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
             recording.len()
         ));
     }
-    let spread = |column: &[f64]| {
-        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        high - low
-    };
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
     // None at all is a free motion; one that never changes is told from no offset.
     if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
         return Some(format!("the command of {file} is constant"));
+    }
+    // Longest gap: a hold of the last command over it would be a guess.
+    let gap = recording.time_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+    (gap > 0.25 * seconds).then(|| format!("{file} has a gap of {gap:.2} s in its {seconds:.2} s"))
+}
+
+/// A sentence on a rate that is not read.
+fn rate_is_off(recording: &Recording) -> Option<String> {
+    let rate = recording.rate_hz();
+    let unit = if rate < SLOWEST_HZ { "milliseconds" } else { "minutes" };
+    (!(SLOWEST_HZ..FASTEST_HZ).contains(&rate)).then(|| {
+        format!(
+            "{} has {rate:.3} rows a second where 20 to 20000 are read (are its times in {unit}?)",
+            recording.file
+        )
+    })
+}
+
+fn spread(column: &[f64]) -> f64 {
+    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+    column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
+}
+
+/// The reason why a recording cannot be used at all: at rest, or of another unit than the rig.
+pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
+    let file = &recording.file;
+    if let Some(sentence) =
+        rate_is_off(recording).filter(|_| !(NOBODYS_HZ..FASTEST_HZ).contains(&recording.rate_hz()))
+    {
+        return Some(sentence);
     }
     let counts = spread(&recording.position_counts);
     if counts < FEWEST_COUNTS {
@@ -70,11 +93,7 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
             "{file} is at rest: it moves by {counts:.0} counts in all; record a motion of some turns"
         ));
     }
-    // Longest gap: a hold of the last command over it would be a guess.
-    let gap = recording.time_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-    if gap > 0.25 * seconds {
-        return Some(format!("{file} has a gap of {gap:.2} s in its {seconds:.2} s"));
-    }
+    let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
     if let Some(limit) = rig.actuator.limit {
         let over = recording.command.iter().filter(|u| u.abs() > 1.5 * limit).count();
         if over * 10 > recording.len() {
@@ -83,17 +102,17 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<String> {
             ));
         }
     }
+    let seconds = recording.duration_s();
     let travel = counts / rig.encoder.counts_per_unit;
     let asked = rig.actuator.gain.abs() * largest / rig.model.inertia;
     // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is zero, or is
     // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
-    if largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds {
-        return Some(format!(
+    (largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds).then(|| {
+        format!(
             "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: a unit is wrong",
             rig.kind.length()
-        ));
-    }
-    None
+        )
+    })
 }
 
 /// Travel over the farthest that the command can cause from which a unit is wrong.

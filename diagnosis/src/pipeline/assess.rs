@@ -15,6 +15,7 @@ use crate::validation::confidence_pass::{Scales, WeighedModel, weigh};
 use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library::{self, Foreign};
+use crate::validation::parameters;
 
 /// Everything that the decision rests on.
 pub(crate) struct Assessment {
@@ -23,12 +24,12 @@ pub(crate) struct Assessment {
     /// The recordings that judge, in that motion.
     pub(crate) holdout: HoldoutSet,
     pub(crate) excitation: Excitation,
-    /// The null under coloured noise.
-    pub(crate) null: FittedModel,
     /// The null under white noise.
     pub(crate) refit: FittedModel,
     /// The model found, its effects weighed.
     pub(crate) weighed: WeighedModel,
+    /// The model with the named effects and no other, where that is another one than was weighed.
+    pub(crate) named_alone: Option<Shown>,
     /// The gain of a force of any form in addition to the named effects.
     pub(crate) beside: Option<FreeFormShare>,
     /// The force of any form that explains most, where nothing is named, and the refit with it beside.
@@ -52,7 +53,8 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     if let Some(reason) = misfit(&weighed, nominal).filter(|_| is_driven(nominal, &fit)) {
         return Err(reason);
     }
-    let (weighed, beside) = free_form_check::check(weighed, &context);
+    let (mut weighed, beside) = free_form_check::check(weighed, &context);
+    let named_alone = only_named(&scales, &mut weighed);
     let nothing_named = weighed.named().is_empty();
     let unnamed =
         nothing_named.then(|| free_form_check::alone(&context, &refit, &holdout, &null.noise)).flatten();
@@ -60,5 +62,43 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
     let with_unnamed = fitted.map(show);
     let foreign = nothing_named.then(|| out_of_library::alone(&context, &refit, &holdout)).flatten();
-    Ok(Assessment { fit, holdout, excitation, null, refit, weighed, beside, unnamed, with_unnamed, foreign })
+    Ok(Assessment {
+        fit,
+        holdout,
+        excitation,
+        refit,
+        weighed,
+        named_alone,
+        beside,
+        unnamed,
+        with_unnamed,
+        foreign,
+    })
+}
+
+/// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in no
+/// patched rig. An effect that has no size without the others is not named either.
+fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
+    let Scales { context, refit, null, holdout, .. } = *scales;
+    loop {
+        let named = weighed.named();
+        if named.len() == weighed.effects.len() {
+            return None;
+        }
+        let last = &weighed.slow;
+        let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
+        let model = Model { effects, ..last.model.clone() };
+        let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
+        let patched = context.fit(slow.model, &slow.noise, Colour::White);
+        let is_there = |place: usize| {
+            let values = parameters::parameters(context, &patched, place);
+            parameters::is_there(patched.model.effects[place].name, &values)
+        };
+        let gone: Vec<usize> =
+            named.iter().enumerate().filter(|(place, _)| !is_there(*place)).map(|(_, i)| *i).collect();
+        if gone.is_empty() {
+            return Some(Shown::new(context, &holdout.smoothed, &weighed.estimator, refit, patched));
+        }
+        weighed.have_no_size(&gone);
+    }
 }

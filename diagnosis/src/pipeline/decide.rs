@@ -4,22 +4,23 @@ use super::assess::Assessment;
 use super::diagnosis::{Complete, Diagnosis, FreeForce, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
 use super::patched_rig::{patch, place};
 use super::prepare::Prepared;
-use super::run_forward::{pooled, simulated};
+use super::run_forward::{follows_worse, pooled, simulated};
 use super::verdict::verdict;
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
-use crate::estimation::model::Model;
-use crate::estimation::noise::Colour;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch, Verdict};
 use crate::selection::context::FittedModel;
+use crate::selection::untested;
 use crate::validation::comparison::Shown;
+use crate::validation::confidence;
 use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
 use crate::validation::free_form_check::{FreeFormShare, Unnamed};
 use crate::validation::known_travel;
 use crate::validation::parameters;
+use crate::validation::plain_regression::{self, Left};
 use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
@@ -35,12 +36,12 @@ pub(crate) fn decide(
     let maps_with_all = decision.maps(&assessment.weighed.shown);
     let (verdict, reason) = decision.verdict(&maps_with_all);
     // The verdict rests on all that was weighed, what people see on what is named.
-    let with_named = decision.only_named();
-    let named_alone = with_named.as_ref().unwrap_or(&assessment.weighed.shown);
+    let with_named = assessment.named_alone.as_ref();
+    let named_alone = with_named.unwrap_or(&assessment.weighed.shown);
     let unnamed = assessment.unnamed.as_ref().filter(|_| verdict == Verdict::Unexplained);
     let with_force = assessment.with_unnamed.as_ref().filter(|_| unnamed.is_some());
     let shown = with_force.unwrap_or(named_alone);
-    let maps = with_named.as_ref().map_or(maps_with_all, |shown| decision.maps(shown));
+    let maps = with_named.map_or(maps_with_all, |shown| decision.maps(shown));
     let rigs = decision.rigs(shown);
     let simulated = simulated(&rigs.nominal, &rigs.refit, &rigs.patched, holdout);
     let smoothed = &assessment.holdout.smoothed;
@@ -51,7 +52,8 @@ pub(crate) fn decide(
     Diagnosis::Complete(Box::new(Complete {
         verdict,
         reason,
-        effects: decision.named_effects(with_named.as_ref()),
+        effects: decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse)),
+        untested: untested::untested(&prepared.span, &prepared.nominal),
         hypotheses: hypotheses(&assessment.weighed),
         errors: shown.table.clone(),
         bandwidth_hz: estimator.bandwidth_hz,
@@ -86,27 +88,20 @@ impl Decision<'_> {
 
     /// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves.
     fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
-        let Assessment { weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
+        let Assessment { fit, weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
         let form = unnamed.is_some().then_some(Reason::FreeForm);
         let foreign = foreign.clone().map(Reason::Foreign).or(form);
-        verdict(weighed, maps, &holdout.smoothed, excitation, foreign)
-    }
-
-    /// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in
-    /// no patched rig.
-    fn only_named(&self) -> Option<Shown> {
-        let Assessment { fit, holdout, null, refit, weighed, .. } = self.assessment;
-        let named = weighed.named();
-        if named.len() == weighed.effects.len() {
-            return None;
-        }
-        let last = &weighed.slow;
-        let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
-        let model = Model { effects, ..last.model.clone() };
-        let context = self.prepared.context(fit);
-        let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
-        let patched = context.fit(slow.model, &slow.noise, Colour::White);
-        Some(Shown::new(&context, &holdout.smoothed, &weighed.estimator, refit, patched))
+        let follows = || {
+            let Shown { on_fit, on_holdout, .. } = &weighed.shown;
+            let on = |tracks, of| Left::new(tracks, of, &weighed.estimator);
+            plain_regression::follows(
+                &on(fit, on_fit),
+                &on(&holdout.smoothed, on_holdout),
+                &weighed.estimator,
+            )
+            .map(|(what, part)| Reason::Follows { what, part })
+        };
+        verdict(weighed, maps, &holdout.smoothed, excitation, foreign, &follows)
     }
 
     fn rigs(&self, shown: &Shown) -> Rigs {
@@ -123,14 +118,17 @@ impl Decision<'_> {
     }
 
     /// The named effects, the one that explains most first.
-    fn named_effects(&self, with_named: Option<&Shown>) -> Vec<NamedEffect> {
+    fn named_effects(&self, with_named: Option<&Shown>, follows_worse: bool) -> Vec<NamedEffect> {
         let Assessment { fit, weighed, .. } = self.assessment;
         let nominal = &self.prepared.nominal;
         let patched = &with_named.unwrap_or(&weighed.shown).patched;
         let one = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
             name: effect.found.effect.name,
             class: effect.class.clone(),
-            confidence: effect.confidence,
+            confidence: match follows_worse {
+                true => confidence::with_worse_motion(effect.confidence),
+                false => effect.confidence,
+            },
             parameters: match with_named {
                 Some(_) => parameters::parameters(&self.prepared.context(fit), patched, i),
                 None => effect.parameters.clone(),

@@ -43,6 +43,8 @@ pub(crate) enum Reason {
     Foreign(Foreign),
     /// A force of any form explains it.
     FreeForm,
+    /// A plain regression explains this part of it on held-out recordings; `what` is a noun phrase.
+    Follows { what: &'static str, part: f64 },
     /// The residual repeats where the motion does.
     Repeats { correlation: f64 },
 }
@@ -55,6 +57,8 @@ pub(crate) struct Complete {
     pub(crate) effects: Vec<NamedEffect>,
     /// Every hypothesis that was looked at closely, each effect once.
     pub(crate) hypotheses: Vec<JudgedHypothesis>,
+    /// Effects that these recordings could not show, with the reason as a clause.
+    pub(crate) untested: Vec<(EffectName, String)>,
     /// Force errors under the three models.
     pub(crate) errors: FitTable,
     /// Bandwidth of the residuals, Hz.

@@ -14,6 +14,7 @@ mod search;
 mod verdict;
 
 use crate::estimation::plausibility;
+use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
@@ -22,20 +23,47 @@ use diagnosis::{Diagnosis, Reason};
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
-/// Diagnoses recordings of a rig.
-pub(crate) fn run(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress: Progress) -> Diagnosis {
+/// Diagnoses recordings of a rig; an error where one of them cannot be used at all.
+pub(crate) fn run(
+    rig: &Rig,
+    fit: &[Recording],
+    holdout: &[Recording],
+    progress: Progress,
+) -> Result<Diagnosis, InputError> {
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
-    let mistake = plausibility::mistakes(&all, rig).or_else(|| sufficiency::too_little(fit, holdout, rig));
-    if let Some(sentence) = mistake {
+    if let Some(sentence) = unusable(&all, rig) {
+        return Err(InputError::new(sentence));
+    }
+    if let Some(sentence) = sufficiency::too_little(fit, holdout) {
         let reason = Reason::Recordings(sentence);
-        return Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None };
+        return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
     }
     let prepared = prepare::prepare(rig, fit, holdout, progress);
     let found = search::search(&prepared, progress);
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
-    match assess::assess(&prepared, found) {
+    Ok(match assess::assess(&prepared, found) {
         Ok(assessment) => decide::decide(&prepared, &assessment, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
+    })
+}
+
+/// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.
+fn unusable(all: &[&Recording], rig: &Rig) -> Option<String> {
+    let wrong = |recording: &&&Recording| {
+        plausibility::mistake(recording, rig).or_else(|| sufficiency::unusable(recording, rig))
+    };
+    let (mut first, mut usable) = (None, Vec::new());
+    for recording in all {
+        match wrong(&recording) {
+            Some(sentence) => first = first.or(Some(sentence)),
+            None => usable.push(recording.file.as_str()),
+        }
     }
+    let sentence = first?;
+    Some(match usable.split_last() {
+        None => sentence,
+        Some((one, [])) => format!("{sentence}; {one} could still be used"),
+        Some((last, more)) => format!("{sentence}; {} and {last} could still be used", more.join(", ")),
+    })
 }

@@ -4,6 +4,7 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{ByModel, Simulation, WindowsOff};
 use crate::simulation::comparison::{Comparison, Figures};
+use crate::thresholds::WORSE_MOTION;
 
 /// Windows that the report tells of, s.
 const WINDOWS_S: [f64; 3] = [0.1, 0.5, 2.0];
@@ -15,6 +16,13 @@ pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Re
         models.push(("patched".to_owned(), patched.clone()));
     }
     holdout.iter().map(|recording| Comparison::new(recording, &models, &WINDOWS_S)).collect()
+}
+
+/// True if the patched simulation follows the motion less well than the refitted one in windows of half a second or less.
+pub(crate) fn follows_worse(simulation: &Simulation) -> bool {
+    let short = simulation.windows.iter().filter(|w| w.seconds <= 0.5);
+    let mut both = short.filter_map(|w| w.position.patched.zip(w.position.refit));
+    both.any(|(patched, refit)| patched > WORSE_MOTION.1 * refit)
 }
 
 /// Root mean square over all held-out recordings.

@@ -36,13 +36,14 @@ pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason
 }
 
 /// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves,
-/// `foreign` what physics without a name alone would explain.
+/// `foreign` what physics without a name alone would explain, `follows` what a plain regression would.
 pub(crate) fn verdict(
     weighed: &WeighedModel,
     maps: &[Map],
     holdout: &[BlockedRecording],
     excitation: &Excitation,
     foreign: Option<Reason>,
+    follows: &dyn Fn() -> Option<Reason>,
 ) -> (Verdict, Option<Reason>) {
     let Shown { on_holdout, table, .. } = &weighed.shown;
     let left = above(table.patched.holdout, weighed.floor, 0.0).sqrt();
@@ -71,7 +72,11 @@ pub(crate) fn verdict(
         let again = again.map(|correlation| Reason::Repeats { correlation });
         (Verdict::Unexplained, swings.or(resembles).or(foreign).or(again))
     } else if disturbed {
-        (Verdict::RandomDisturbance, None)
+        // Only what no regression on what was recorded predicts depends on nothing.
+        match follows() {
+            Some(reason) => (Verdict::Unexplained, Some(reason)),
+            None => (Verdict::RandomDisturbance, None),
+        }
     } else if refit_matters(&weighed.estimator, holdout, on_holdout, table.force_rms.holdout) {
         (Verdict::ParametersOnly, None)
     } else {

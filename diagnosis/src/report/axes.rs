@@ -13,6 +13,8 @@ pub(crate) const HIGH: f64 = 190.0;
 const LEFT: f64 = 72.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 32.0;
+/// Room between the curves and the frame.
+const EDGE: f64 = 6.0;
 
 /// Round values within a range, about `count` of them: 1, 2 or 5 times a power of ten apart.
 pub(crate) fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
@@ -40,7 +42,8 @@ pub(crate) fn label(value: f64, step: f64) -> String {
     format!("{:.decimals$}", value + 0.0)
 }
 
-/// A frame with its ticks; returns the mapping of values to places.
+/// A frame with its ticks, under the title of its upright axis; returns the mapping of values to places. [`close`] ends it.
+/// `plot.js` reads the ranges and shows the values of the paths that have a `data-name`.
 pub(crate) fn frame(
     out: &mut String,
     x: (f64, f64),
@@ -48,16 +51,22 @@ pub(crate) fn frame(
     x_label: &str,
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
+    let (x_label, y_label) = (safe(x_label), safe(y_label));
     let _ = write!(
         out,
-        "<svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img><title>{} over {}</title>",
+        "<div class=plot><p class=axis>{y_label}</p><svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img data-of=\"{x_label}\" \
+         data-x=\"{:e} {:e}\" data-y=\"{:e} {:e}\" data-box=\"{LEFT} {} {EDGE} {}\"><title>{y_label} over {x_label}</title>",
         TOP + HIGH + BOTTOM,
-        safe(y_label),
-        safe(x_label)
+        x.0,
+        x.1,
+        y.0,
+        y.1,
+        WIDE - EDGE,
+        HIGH - EDGE
     );
     let at = move |a: f64, b: f64| {
-        let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - 6.0);
-        let py = 6.0 + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 12.0);
+        let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - EDGE);
+        let py = EDGE + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 2.0 * EDGE);
         (px, py.clamp(0.0, HIGH))
     };
     let step = |ticks: &[f64]| if let [a, b, ..] = ticks { b - a } else { 1.0 };
@@ -85,6 +94,11 @@ pub(crate) fn frame(
         );
     }
     at
+}
+
+/// Ends a frame, with the title of its level axis.
+pub(crate) fn close(out: &mut String, x_label: &str) {
+    let _ = write!(out, "</svg><p class=\"axis level\">{}</p></div>", safe(x_label));
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use crate::numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
 const MOST: f64 = 0.85;
+/// Part of the mean square that proportion to speed must explain to be told as such: a square of the speed has 0.94.
+const PROPORTIONAL: f64 = 0.97;
 /// Part of the mean square that a product of two variables must explain to be told as one.
 const PRODUCT: f64 = 0.7;
 /// Part of its size over which a form must change to change at all, and part of its range that makes a turn of it.
@@ -153,7 +155,12 @@ impl Sheet {
 
     fn in_words(&self, other: Option<Variable>, length: &str) -> String {
         let by_speed = self.by_column();
-        let Some(other) = other else { return along(Variable::Speed, &self.columns, &by_speed, length) };
+        let Some(other) = other else {
+            if self.explained(|_, j| self.per_speed() * self.columns[j]) > PROPORTIONAL {
+                return "grows in proportion to speed, as viscous friction does".into();
+            }
+            return along(Variable::Speed, &self.columns, &by_speed, length);
+        };
         let by_other = self.by_row();
         if self.explained(|_, j| by_speed[j].0) > MOST {
             return along(Variable::Speed, &self.columns, &by_speed, length);
@@ -183,6 +190,14 @@ impl Sheet {
             return format!("grows with speed, by a factor that {along}");
         }
         format!("depends on {} and speed together, in no simple form", other.in_words())
+    }
+
+    /// Least squares of speed times a constant.
+    fn per_speed(&self) -> f64 {
+        let (along, square) = self
+            .places()
+            .fold((0.0, 0.0), |(along, square), (_, v, f, w)| (along + w * v * f, square + w * v * v));
+        along / square.max(1e-300)
     }
 
     /// Least squares of speed times a line of the other variable.
@@ -316,6 +331,10 @@ mod tests {
         let of = |force: &dyn Fn(f64, f64) -> f64| told(None, |_, v, way| force(v, way));
         assert_eq!(of(&|v, _| -v * v.abs()), "a force against the motion that grows with speed");
         assert_eq!(
+            of(&|v, _| -2.0 * v),
+            "a force against the motion that grows in proportion to speed, as viscous friction does"
+        );
+        assert_eq!(
             of(&|v, way| -way * (0.2 + (-v.abs()).exp())),
             "a force against the motion that falls as speed grows"
         );
@@ -327,7 +346,7 @@ mod tests {
         );
         assert_eq!(
             of(&|v, way| if way > 0.0 { -v } else { 0.0 }),
-            "a force against the motion that grows with speed, forward only"
+            "a force against the motion that grows in proportion to speed, as viscous friction does, forward only"
         );
     }
 

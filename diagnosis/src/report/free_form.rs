@@ -5,7 +5,7 @@ use crate::io::rig::Kind;
 use crate::io::schema::FreeForm;
 use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::FreeForce;
-use crate::report::axes::{frame, safe};
+use crate::report::axes::{close, frame, safe};
 use crate::report::form_in_words;
 use crate::selection::free_form::Shape;
 use std::fmt::Write as _;
@@ -91,7 +91,8 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
     let all = || lines.iter().flat_map(|line| line.places.iter().copied());
     let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
     let top = all().map(|p| p.1.abs() + p.2).fold(1e-300, f64::max);
-    let at = frame(out, (low, high), (-top, top), variable.in_words(), force);
+    let x_label = format!("{}, {}", variable.in_words(), unit(variable, kind));
+    let at = frame(out, (low, high), (-top, top), &x_label, &format!("force, {force}"));
     for (k, line) in lines.iter().enumerate() {
         let turn = 200 + 130 * k / lines.len();
         let _ = write!(out, "<path style=\"fill:hsl({turn} 60% 50%/.18)\" d=\"");
@@ -103,19 +104,22 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
             edge(out, p, 1.0, if i == 0 { 'M' } else { 'L' });
         }
         line.places.iter().rev().for_each(|p| edge(out, p, -1.0, 'L'));
-        let _ = write!(out, "Z\"/><path class=line style=\"stroke:hsl({turn} 60% 50%)\" d=\"");
+        let name = match (line.at, other) {
+            (Some(value), Some(other)) => format!("at a {} of {}", other.in_words(), short(value)),
+            _ => "force".to_owned(),
+        };
+        let _ = write!(
+            out,
+            "Z\"/><path class=line data-name=\"{}\" style=\"stroke:hsl({turn} 60% 50%)\" d=\"",
+            safe(&name)
+        );
         for (i, p) in line.places.iter().enumerate() {
             edge(out, p, 0.0, if i == 0 { 'M' } else { 'L' });
         }
         out.push_str("\"/>");
     }
-    let _ = write!(
-        out,
-        "</svg><figcaption>force, {}, over {}, {}, with its 95 % band",
-        safe(force),
-        variable.in_words(),
-        safe(&unit(variable, kind))
-    );
+    close(out, &x_label);
+    let _ = write!(out, "<figcaption>force over {}, with its 95 % band", variable.in_words());
     if let Some(other) = other {
         out.push_str("; ");
         for (k, line) in lines.iter().enumerate() {

@@ -1,12 +1,12 @@
-//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here, a few lines of script for tabs
-//! would be one too many.
+//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; `plot.js` shows the values under the
+//! pointer.
 
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::Series;
-use crate::report::axes::{HIGH, frame, safe};
+use crate::report::axes::{HIGH, close, frame, safe};
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
@@ -15,6 +15,7 @@ use crate::validation::residual_maps::Map;
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("report.css");
+const SCRIPT: &str = include_str!("plot.js");
 
 /// The page.
 pub(crate) fn page(outcome: &Outcome) -> String {
@@ -23,10 +24,13 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     let _ = write!(
         out,
         "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
-         <title>Diagnosis: {}</title><style>{STYLE}</style></head><body><main><p class=rig>{}</p><h1>{}.</h1>",
+         <title>Diagnosis: {}</title><style>{STYLE}</style></head><body><main><p class=rig>{}</p><h1>{}.</h1>\
+         <dl class=short><dt>What remains</dt><dd>{}.</dd><dt>Record next</dt><dd>{}.</dd></dl>",
         safe(&outcome.evidence.rig),
         safe(&outcome.evidence.rig),
-        safe(&r.sentence)
+        safe(&r.sentence),
+        safe(&r.remains),
+        safe(&r.record_next)
     );
     motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {
@@ -41,25 +45,20 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         remains(&mut out, outcome);
     }
     next(&mut out, outcome);
-    out.push_str("</main></body></html>\n");
+    footer(&mut out, outcome);
+    let _ = writeln!(out, "</main><script>{SCRIPT}</script></body></html>");
     out
 }
 
 /// The motion that the simulation gives beside the one that was recorded.
 fn motion(out: &mut String, outcome: &Outcome) {
     let Some(first) = outcome.evidence.simulated.first() else { return };
-    let _ = write!(
-        out,
-        "<section><h2>Simulated beside recorded: {}, held out, from its first row</h2>",
-        safe(&first.file)
-    );
+    let _ = write!(out, "<section><h2>Simulated beside recorded: {}, held out</h2>", safe(&first.file));
     let found = first.figures("patched").is_some();
-    motion_picture::motions(out, first, if found { &["nominal", "patched"] } else { &["nominal", "refit"] });
-    out.push_str(
-        "<p class=note>In the first picture and in that of the speed the command alone drives the simulation and nothing corrects it: errors of \
-         force add up to errors of position. A line that leaves the picture has diverged.</p>",
-    );
+    let wanted: &[&str] = if found { &["nominal", "patched"] } else { &["nominal", "refit"] };
+    motion_picture::in_windows(out, first, wanted);
     motion_picture::table(out, first);
+    motion_picture::free_run(out, first, wanted);
     if let Some(worse) = outcome.report.simulation.as_ref().and_then(|s| s.worse.as_ref()) {
         let _ = write!(
             out,
@@ -68,6 +67,19 @@ fn motion(out: &mut String, outcome: &Outcome) {
         );
     }
     out.push_str("</section>");
+}
+
+/// Writes what the page was made of.
+fn footer(out: &mut String, outcome: &Outcome) {
+    let Some(made) = &outcome.made else { return };
+    let _ = write!(
+        out,
+        "<footer><h2>Made from</h2><div class=scroll><table><tr><th>file</th><th>SHA-256</th></tr>"
+    );
+    for (file, hash) in &made.files {
+        let _ = write!(out, "<tr><td>{}</td><td><code>{}</code></td></tr>", safe(file), safe(hash));
+    }
+    let _ = write!(out, "</table></div><p>{}, {}</p></footer>", safe(&made.program), safe(&made.date));
 }
 
 /// Writes the next steps.
@@ -146,8 +158,14 @@ fn numbers(out: &mut String, outcome: &Outcome) {
     if found {
         // Adding zero takes the sign from what rounds to nothing.
         let [low, high] = f.holdout_gain_ci95.map(|part| (100.0 * part).round() + 0.0);
-        let _ =
-            write!(out, " From refit to patched the mean square falls by {low:.0} to {high:.0} % (95 %).");
+        let _ = if low > 0.0 {
+            write!(out, " From refit to patched the mean square falls by {low:.0} to {high:.0} % (95 %).")
+        } else {
+            write!(
+                out,
+                " That it falls from refit to patched is not proven: the 95 % interval of its fall, {low:.0} to {high:.0} %, holds zero."
+            )
+        };
     }
     out.push_str("</p></section>");
 }
@@ -227,7 +245,7 @@ fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64
 fn over_time(out: &mut String, outcome: &Outcome) {
     let unit = &outcome.report.fit.unit;
     let marked = "<span><i class=\"key m\"></i> where</span>";
-    let (after, marks_say) = match &outcome.report {
+    let (after_name, marks_say) = match &outcome.report {
         report if !report.effects.is_empty() || outcome.evidence.form.is_some() => {
             ("with what was found", format!(" {marked} the effects found are strongest"))
         }
@@ -239,7 +257,7 @@ fn over_time(out: &mut String, outcome: &Outcome) {
     let _ = write!(
         out,
         "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it is</span> <span><i class=\"key c\"></i> \
-         {after}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
+         {after_name}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
     );
     for series in &outcome.evidence.series {
         let kind = if series.held_out { "held out" } else { "fitted" };
@@ -250,10 +268,10 @@ fn over_time(out: &mut String, outcome: &Outcome) {
         let mut sizes: Vec<f64> = before.iter().chain(&after).map(|(_, a, b)| a.abs().max(b.abs())).collect();
         sizes.sort_by(f64::total_cmp);
         let top = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-300);
-        let at = frame(out, (0.0, last), (-top, top), "time, s", unit);
+        let at = frame(out, (0.0, last), (-top, top), "time, s", &format!("residual force, {unit}"));
         marks(out, outcome, series, &at);
-        for (class, band) in [("a", &before), ("c", &after)] {
-            let _ = write!(out, "<path class=\"band {class}\" d=\"");
+        for (class, name, band) in [("a", "as it is", &before), ("c", after_name, &after)] {
+            let _ = write!(out, "<path class=\"band {class}\" data-name=\"{name}\" d=\"");
             for (t, low, high) in band {
                 let (x, y0) = at(*t, *low);
                 let (_, y1) = at(*t, *high);
@@ -261,7 +279,7 @@ fn over_time(out: &mut String, outcome: &Outcome) {
             }
             out.push_str("\"/>");
         }
-        let _ = write!(out, "</svg><p class=axis>residual force, {} · time, s</p>", safe(unit));
+        close(out, "time, s");
     }
     out.push_str("</section>");
 }
@@ -309,9 +327,10 @@ fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
     let low = map.edges.first().copied().unwrap_or(0.0);
     let high = map.edges.last().copied().unwrap_or(1.0);
     out.push_str("<figure>");
-    let at = frame(out, (low, high), (-top, top), map.variable, unit);
-    for (class, column) in [("f", &map.forward), ("r", &map.backward)] {
-        let _ = write!(out, "<path class=\"line {class}\" d=\"");
+    let x_label = format!("{}, {x_unit}", map.variable);
+    let at = frame(out, (low, high), (-top, top), &x_label, &format!("residual force, {unit}"));
+    for (class, name, column) in [("f", "forward", &map.forward), ("r", "backward", &map.backward)] {
+        let _ = write!(out, "<path class=\"line {class}\" data-name={name} d=\"");
         let mut pen = 'M';
         for (value, edges) in column.iter().zip(map.edges.windows(2)) {
             match value {
@@ -330,12 +349,8 @@ fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
     } else {
         "does not generalise to the held-out recordings".to_owned()
     };
-    let _ = write!(
-        out,
-        "</svg><figcaption>over {}, {}: {carries}</figcaption></figure>",
-        map.variable,
-        safe(&x_unit)
-    );
+    close(out, &x_label);
+    let _ = write!(out, "<figcaption>over {}: {carries}</figcaption></figure>", map.variable);
 }
 
 fn hypotheses(out: &mut String, outcome: &Outcome) {
@@ -360,7 +375,21 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
             safe(outcome)
         );
     }
-    out.push_str("</table></div><p class=note>Gain of log-likelihood on the held-out recordings over the model without it.</p></section>");
+    out.push_str("</table></div><p class=note>Gain of log-likelihood on the held-out recordings over the model without it.</p>");
+    if !r.untested.is_empty() {
+        out.push_str("<h3>Not tested</h3><p class=note>These recordings could not show them, so that they are not ruled out.</p><ul>");
+        for one in &r.untested {
+            let _ = write!(
+                out,
+                "<li>{} <small>{}</small>: {}</li>",
+                safe(one.name.in_words()),
+                one.name,
+                safe(&one.because)
+            );
+        }
+        out.push_str("</ul>");
+    }
+    out.push_str("</section>");
 }
 
 fn remains(out: &mut String, outcome: &Outcome) {

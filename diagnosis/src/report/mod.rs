@@ -8,6 +8,7 @@ mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
 pub(crate) mod outcome;
+mod remains;
 #[cfg(test)]
 mod sentence_snapshots;
 pub mod simulation_page;
@@ -16,5 +17,5 @@ mod write;
 
 pub use crate::io::schema::{
     Both, ByModel, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report, Simulation,
-    Stretch, Verdict, WindowsOff,
+    Stretch, Untested, Verdict, WindowsOff,
 };

@@ -1,7 +1,7 @@
 //! What a person means by "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
 
 use crate::numerics::digits::short;
-use crate::report::axes::{HIGH, frame, safe};
+use crate::report::axes::{HIGH, close, frame, safe};
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
 use std::fmt::Write as _;
 
@@ -34,7 +34,7 @@ pub(crate) fn words(model: &str) -> &str {
 /// A line through points; it is interrupted where it leaves the picture and wherever the simulation is started `afresh`, s.
 fn line(
     out: &mut String,
-    class: &str,
+    (class, name): (&str, &str),
     time: &[f64],
     values: &[f64],
     afresh: Option<f64>,
@@ -42,7 +42,7 @@ fn line(
 ) {
     let every = time.len().div_ceil(POINTS).max(1);
     let part = |t: f64| afresh.map_or(0, |seconds| (t / seconds) as u64);
-    let _ = write!(out, "<path class=\"motion {class}\" d=\"");
+    let _ = write!(out, "<path class=\"motion {class}\" data-name=\"{}\" d=\"", safe(name));
     let mut last = None;
     for (t, x) in time.iter().zip(values).step_by(every) {
         let (px, py) = at(*t, *x);
@@ -87,17 +87,22 @@ struct Picture<'a> {
     models: Vec<(&'a str, &'a [f64])>,
     /// Time between two starts from the measured state, s.
     afresh: Option<f64>,
+    /// The upright range, where it does not follow from what was recorded.
+    range: Option<(f64, f64)>,
 }
 
 fn picture(out: &mut String, time: &[f64], picture: &Picture) {
     let last = time.last().copied().unwrap_or(1.0);
     let _ = write!(out, "<h3>{}</h3>", picture.title);
-    let at = frame(out, (0.0, last), range(picture.recorded, &picture.models), "time, s", &picture.label);
+    let range = picture.range.unwrap_or_else(|| range(picture.recorded, &picture.models));
+    let at = frame(out, (0.0, last), range, "time, s", &picture.label);
     for (model, values) in &picture.models {
-        line(out, class(model), time, values, picture.afresh, &at);
+        line(out, (class(model), words(model)), time, values, picture.afresh, &at);
     }
-    line(out, "r", time, picture.recorded, None, &at);
-    let _ = write!(out, "</svg><p class=axis>{} · time, s</p>", safe(&picture.label));
+    if !picture.recorded.is_empty() {
+        line(out, ("r", "recorded"), time, picture.recorded, None, &at);
+    }
+    close(out, "time, s");
 }
 
 fn legend(out: &mut String, models: &[&str]) {
@@ -118,36 +123,71 @@ fn columns<'a>(
     models.filter_map(|m| Some((m.model.as_str(), pick(m)?))).collect()
 }
 
-/// Position and speed of some of the models beside the recording: in a free run, and started afresh from time to time.
-pub(crate) fn motions(out: &mut String, compared: &Comparison, wanted: &[&str]) {
+/// Position of some of the models in short windows started from the measured state, and how far off it is there.
+pub(crate) fn in_windows(out: &mut String, compared: &Comparison, wanted: &[&str]) {
     let length = compared.kind.length();
     let motion = &compared.motion;
+    let afresh = columns(compared, wanted, |m| m.afresh.as_deref());
+    if afresh.is_empty() {
+        return;
+    }
+    let _ = write!(
+        out,
+        "<p class=note>Every {AFRESH_S} s the simulation is put back to the measured state, and then the command alone drives it: what grows \
+         within a window is the simulation's own error of force.</p>"
+    );
     legend(out, wanted);
-    let position = |title: String, models, afresh| Picture {
-        title,
+    let off: Vec<(&str, Vec<f64>)> = afresh
+        .iter()
+        .map(|(model, x)| (*model, x.iter().zip(&motion.position).map(|(a, b)| a - b).collect()))
+        .collect();
+    let position = Picture {
+        title: format!("Position in windows of {AFRESH_S} s"),
         label: format!("position, {length}"),
         recorded: &motion.position,
-        models,
-        afresh,
+        models: afresh,
+        afresh: Some(AFRESH_S),
+        range: None,
     };
-    let free = columns(compared, wanted, |m| Some(&m.free.position));
-    picture(out, &motion.time, &position("Position".into(), free, None));
-    let afresh = columns(compared, wanted, |m| m.afresh.as_deref());
-    if !afresh.is_empty() {
-        let title = format!("Position, started from the measured state every {AFRESH_S} s");
-        picture(out, &motion.time, &position(title, afresh, Some(AFRESH_S)));
-    }
-    picture(
+    picture(out, &motion.time, &position);
+    let most = off
+        .iter()
+        .map(|(_, values)| bulk(values))
+        .fold(1e-300_f64, |most, (low, high)| most.max(low.abs()).max(high.abs()));
+    let error = Picture {
+        title: "How far off it is".into(),
+        label: format!("simulated − recorded position, {length}"),
+        recorded: &[],
+        models: off.iter().map(|(model, values)| (*model, values.as_slice())).collect(),
+        afresh: Some(AFRESH_S),
+        range: Some((-1.15 * most, 1.15 * most)),
+    };
+    picture(out, &motion.time, &error);
+}
+
+/// Position and speed of some of the models in one free run, folded away: it is a bad judge.
+pub(crate) fn free_run(out: &mut String, compared: &Comparison, wanted: &[&str]) {
+    let length = compared.kind.length();
+    let motion = &compared.motion;
+    let _ = write!(
         out,
-        &motion.time,
-        &Picture {
-            title: "Speed".into(),
-            label: format!("speed, {length}/s"),
-            recorded: &motion.velocity,
-            models: columns(compared, wanted, |m| Some(&m.free.velocity)),
-            afresh: None,
-        },
+        "<details><summary>The free run of {:.1} s from the first row</summary><p class=note>It is a bad judge of a simulation: nothing \
+         corrects it, so that an error of force adds up twice to one of position, and a tiny offset, or a start that is a little off, \
+         counts for more than physics that is missing. A line that leaves the picture has diverged.</p>",
+        motion.seconds()
     );
+    legend(out, wanted);
+    let shown = |title: &str, label, recorded, models| {
+        let title = title.to_owned();
+        Picture { title, label, recorded, models, afresh: None, range: None }
+    };
+    let position = columns(compared, wanted, |m| Some(&m.free.position));
+    let label = format!("position, {length}");
+    picture(out, &motion.time, &shown("Position", label, &motion.position, position));
+    let speed = columns(compared, wanted, |m| Some(&m.free.velocity));
+    let label = format!("speed, {length}/s");
+    picture(out, &motion.time, &shown("Speed", label, &motion.velocity, speed));
+    out.push_str("</details>");
 }
 
 /// Position under the recorded reference with the loop that ran, where it was recognised.
@@ -168,6 +208,7 @@ pub(crate) fn under_reference(out: &mut String, compared: &Comparison, wanted: &
             recorded: &compared.motion.position,
             models: columns(compared, wanted, |m| m.under.as_ref().map(|u| u.position.as_slice())),
             afresh: None,
+            range: None,
         },
     );
 }
@@ -183,6 +224,7 @@ pub(crate) fn force(out: &mut String, compared: &Comparison, wanted: &[&str]) {
             recorded: &compared.force,
             models: columns(compared, wanted, |m| Some(&m.force)),
             afresh: None,
+            range: None,
         },
     );
 }

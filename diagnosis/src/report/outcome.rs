@@ -3,10 +3,10 @@
 use crate::effects::EffectName;
 use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Verdict};
+use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Untested, Verdict};
 use crate::numerics::digits::{in_sentence, short};
 use crate::pipeline::diagnosis::{Complete, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
-use crate::report::{free_form, next_experiment, text};
+use crate::report::{free_form, next_experiment, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
@@ -32,9 +32,22 @@ pub struct Evidence {
     pub rate_hz: Option<f64>,
 }
 
+/// What a report was made from and by: for its footer.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// The program with its version.
+    pub program: String,
+    /// The date.
+    pub date: String,
+    /// The files with their SHA-256.
+    pub files: Vec<(String, String)>,
+}
+
 /// The outcome of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Outcome {
+    /// What it was made from, where the caller says it.
+    pub made: Option<Made>,
     /// `diagnosis.json`.
     pub report: Report,
     /// The data that is plotted.
@@ -75,13 +88,32 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
                     unit(&r.variable, kind)
                 )
             });
-            format!(
-                "The simulation leaves out {out}{region}; with it the held-out force error falls from {:.1} % to {:.1} %",
-                percent(fit.refit.holdout),
-                percent(fit.patched.holdout)
-            )
+            let (before, after) = (percent(fit.refit.holdout), percent(fit.patched.holdout));
+            let rest = remains::of_noise(report)
+                .filter(|ratio| *ratio >= remains::MORE)
+                .map_or(String::new(), |ratio| {
+                    format!(", still {} the sensor's noise", remains::times(ratio))
+                });
+            if fit.holdout_gain_ci95[0] > 0.0 {
+                format!(
+                    "The simulation leaves out {out}{region}; with it the held-out force error falls from {before:.1} % to {after:.1} %{rest}"
+                )
+            } else {
+                format!(
+                    "The simulation leaves out {out}{region}; that this lowers the held-out force error, {before:.1} %, is not proven"
+                )
+            }
         }
-        Verdict::NoMismatch => "The simulation explains the recordings down to their noise".into(),
+        Verdict::NoMismatch => format!(
+            "The simulation is right to within {:.1} % of the force{}",
+            percent(fit.patched.holdout),
+            match remains::of_noise(report) {
+                Some(ratio) if ratio >= remains::MORE =>
+                    ", and no known effect explains a material part of that",
+                Some(_) => ", which is the sensor's noise",
+                None => "",
+            }
+        ),
         Verdict::ParametersOnly => format!(
             "The simulation has the right structure but wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %",
             percent(fit.nominal.holdout),
@@ -129,6 +161,8 @@ impl Outcome {
             format: 1,
             verdict: Verdict::InsufficientExcitation,
             sentence: String::new(),
+            remains: String::new(),
+            record_next: String::new(),
             effects: Vec::new(),
             fit: FitTable {
                 metric: "force_rmse".into(),
@@ -144,6 +178,7 @@ impl Outcome {
             noise_floor: 0.0,
             unexplained_fraction: 0.0,
             hypotheses: Vec::new(),
+            untested: Vec::new(),
             free_form: None,
             place: None,
             simulation: None,
@@ -151,6 +186,7 @@ impl Outcome {
             reason: Some(text::reason(reason, None)),
         };
         report.sentence = sentence(&report, rig.kind);
+        remains::complete(&mut report);
         let evidence = Evidence {
             series: Vec::new(),
             maps: Vec::new(),
@@ -160,7 +196,8 @@ impl Outcome {
             rig: rig.name.clone(),
             rate_hz,
         };
-        Self { report, evidence, nominal_rig: rig.clone(), refit_rig: rig.clone(), patched_rig: rig.clone() }
+        let [nominal_rig, refit_rig, patched_rig] = [rig.clone(), rig.clone(), rig.clone()];
+        Self { report, evidence, nominal_rig, refit_rig, patched_rig, made: None }
     }
 
     fn complete(diagnosis: Complete) -> Self {
@@ -176,6 +213,8 @@ impl Outcome {
             format: 1,
             verdict: diagnosis.verdict,
             sentence: String::new(),
+            remains: String::new(),
+            record_next: String::new(),
             effects: diagnosis.effects.into_iter().map(named).collect(),
             fit: diagnosis.errors,
             refitted: refitted(&patched),
@@ -183,6 +222,11 @@ impl Outcome {
             noise_floor: diagnosis.noise_floor,
             unexplained_fraction: diagnosis.unexplained_fraction,
             hypotheses: diagnosis.hypotheses.into_iter().map(hypothesis).collect(),
+            untested: diagnosis
+                .untested
+                .into_iter()
+                .map(|(name, because)| Untested { name, because })
+                .collect(),
             reason: diagnosis.reason.map(|reason| text::reason(&reason, form.as_deref())),
             free_form: diagnosis.free_form.as_ref().map(|force| free_form::entry(force, form)),
             place: diagnosis.place,
@@ -190,6 +234,7 @@ impl Outcome {
             simulation: diagnosis.simulation,
         };
         report.sentence = sentence(&report, kind);
+        remains::complete(&mut report);
         let evidence = Evidence {
             series: diagnosis.series,
             maps: diagnosis.maps,
@@ -199,13 +244,14 @@ impl Outcome {
             rig: nominal.name.clone(),
             rate_hz: diagnosis.rate_hz,
         };
-        Self { report, evidence, nominal_rig: nominal, refit_rig: refit, patched_rig: patched }
+        Self { report, evidence, nominal_rig: nominal, refit_rig: refit, patched_rig: patched, made: None }
     }
 
     /// Ten lines for the terminal.
     pub fn summary(&self) -> String {
         let r = &self.report;
-        let mut out = format!("{}.\n", r.sentence);
+        let mut out =
+            format!("{}.\n  what remains: {}\n  record next: {}\n", r.sentence, r.remains, r.record_next);
         for effect in &r.effects {
             let values: Vec<String> = effect
                 .parameters
@@ -222,15 +268,6 @@ impl Outcome {
         if r.fit.nominal.fit.is_finite() {
             self.figures(&mut out);
         }
-        let next: Vec<&String> = r
-            .effects
-            .iter()
-            .filter_map(|e| e.separating_experiment.as_ref())
-            .chain(&r.separating_experiment)
-            .collect();
-        if let Some(next) = next.first() {
-            let _ = writeln!(out, "  record next: {next}");
-        }
         let losers: Vec<&str> = r
             .hypotheses
             .iter()
@@ -240,6 +277,11 @@ impl Outcome {
             .collect();
         if !losers.is_empty() {
             let _ = writeln!(out, "  tested and rejected: {}", losers.join(", "));
+        }
+        if let [first, more @ ..] = &r.untested[..] {
+            let more =
+                if more.is_empty() { String::new() } else { format!("; {} more in the report", more.len()) };
+            let _ = writeln!(out, "  not tested: {} ({}{more})", first.name, first.because);
         }
         out
     }
@@ -277,12 +319,6 @@ impl Outcome {
                 let all = [named("nominal", m.nominal), named("refit", m.refit), named("patched", m.patched)];
                 all.into_iter().flatten().collect::<Vec<_>>().join(", ")
             };
-            let _ = writeln!(
-                out,
-                "  held-out position RMSE, free run: {} {}",
-                of(&simulation.free_run),
-                simulation.unit
-            );
             if let Some(window) = simulation.windows.iter().find(|w| w.seconds >= 0.5) {
                 let _ = writeln!(
                     out,
@@ -292,6 +328,12 @@ impl Outcome {
                     simulation.unit
                 );
             }
+            let _ = writeln!(
+                out,
+                "  held-out position RMSE, free run: {} {}",
+                of(&simulation.free_run),
+                simulation.unit
+            );
             if let Some(worse) = &simulation.worse {
                 let _ = writeln!(out, "  {worse}");
             }

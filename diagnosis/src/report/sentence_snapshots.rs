@@ -31,7 +31,9 @@ fn report(verdict: Verdict, reason: Option<&str>, effects: Vec<Named>) -> Report
     report.reason = reason.map(str::to_owned);
     let both = |x: f64| Both { fit: x, holdout: x };
     let fit = &mut report.fit;
+    fit.holdout_gain_ci95 = [0.92, 0.95];
     (fit.nominal, fit.refit, fit.patched, fit.force_rms) = (both(0.4), both(0.2), both(0.05), both(1.0));
+    report.noise_floor = 0.05 / 19.0;
     report
 }
 

@@ -2,20 +2,29 @@
 
 use crate::numerics::digits::short;
 use crate::report::axes::safe;
-use crate::report::motion_picture::{force, motions, scale, table, under_reference, words};
-use crate::simulation::comparison::Comparison;
+use crate::report::motion_picture::{force, free_run, in_windows, scale, table, under_reference, words};
+use crate::simulation::comparison::{Comparison, Simulated};
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("report.css");
+const SCRIPT: &str = include_str!("plot.js");
 
-/// Returns the position errors of the models in a free run as one sentence without its full stop.
+/// The length of the windows by which models are compared in a sentence, s, where they were run: short enough that errors of
+/// force do not add up, long enough that the sensor's noise is none.
+const JUDGING_S: f64 = 0.5;
+
+/// Returns the position errors of the models as one sentence without its full stop: in windows, or in the free run of a recording
+/// too short for any.
 pub fn sentence(compared: &Comparison) -> String {
     let (factor, unit) = scale(compared);
+    let windows = compared.models.first().map_or(&[][..], |m| &m.figures.windows);
+    let judging = windows.iter().position(|w| w.seconds >= JUDGING_S);
+    let off = |m: &Simulated| judging.map_or(m.figures.free_run, |k| m.figures.windows[k].off).position_rms;
     let parts: Vec<String> = compared
         .models
         .iter()
         .map(|m| {
-            let off = format!("{} {unit}", short(factor * m.figures.free_run.position_rms));
+            let off = format!("{} {unit}", short(factor * off(m)));
             match m.model.as_str() {
                 "nominal" => format!("{off} as the simulation stands"),
                 other => format!("{off} {}", words(other)),
@@ -28,11 +37,17 @@ pub fn sentence(compared: &Comparison) -> String {
         }
         _ => parts.concat(),
     };
-    format!(
-        "Run over the {:.1} s of {} under its command alone, the simulated position is off by {all} (root mean square)",
-        compared.motion.seconds(),
-        compared.file
-    )
+    let over = match judging {
+        Some(k) => format!("In windows of {} s of {}", windows[k].seconds, compared.file),
+        None => {
+            format!(
+                "Run over the {:.1} s of {} under its command alone",
+                compared.motion.seconds(),
+                compared.file
+            )
+        }
+    };
+    format!("{over}, the simulated position is off by {all} (root mean square)")
 }
 
 /// The page. `notes` are sentences without their full stop that a reader has to mind; `next` says what to do, one item each, as
@@ -53,14 +68,15 @@ pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[Stri
     for one in compared {
         let names: Vec<&str> = one.models.iter().map(|m| m.model.as_str()).collect();
         let _ = write!(out, "<section><h2>Simulated beside recorded: {}</h2>", safe(&one.file));
-        motions(&mut out, one, &names);
+        in_windows(&mut out, one, &names);
         table(&mut out, one);
+        free_run(&mut out, one, &names);
         under_reference(&mut out, one, &names);
         force(&mut out, one, &names);
         out.push_str("</section>");
     }
     what_next(&mut out, next);
-    out.push_str("</main></body></html>\n");
+    let _ = writeln!(out, "</main><script>{SCRIPT}</script></body></html>");
     out
 }
 
@@ -86,6 +102,7 @@ mod tests {
     use super::*;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
+    use crate::simulation::comparison::AFRESH_S;
     use crate::simulation::{Plant, Surroundings};
 
     /// A recording of 10 s of a machine with dry friction.
@@ -111,15 +128,14 @@ mod tests {
         let compared = Comparison::new(&recording, &models, &[0.1, 1.0]);
         let said = sentence(&compared);
         assert!(
-            said.starts_with(
-                "Run over the 10.0 s of bench.csv under its command alone, the simulated position is off by "
-            ) && said.contains(" as the simulation stands and ")
+            said.starts_with("In windows of 1 s of bench.csv, the simulated position is off by ")
+                && said.contains(" as the simulation stands and ")
                 && said.ends_with(" with what was found (root mean square)"),
             "{said}"
         );
         let afresh = compared.models[0].afresh.as_ref().expect("10 s hold five starts");
         for (i, t) in compared.motion.time.iter().enumerate() {
-            if (t / 2.0).fract() < 1e-6 && i + 1 < afresh.len() {
+            if (t / AFRESH_S).fract() < 1e-6 && i + 1 < afresh.len() {
                 assert!((afresh[i] - compared.motion.position[i]).abs() < 1e-9, "a start at {t} s");
             }
         }
@@ -130,12 +146,14 @@ mod tests {
             &["Run `host-sim x <y>`.".into()],
         );
         let places: Vec<usize> = [
-            "<h1>Run over the",
+            "<h1>In windows of 1 s",
             "<b>Warning:</b> a note.",
-            "<h3>Position</h3>",
-            "<h3>Position, started from the measured state every 2 s</h3>",
-            "<h3>Speed</h3>",
+            "<h3>Position in windows of 0.5 s</h3>",
+            "<h3>How far off it is</h3>",
             "position off, rms",
+            "<details><summary>The free run of 10.0 s",
+            "<h3>Position</h3>",
+            "<h3>Speed</h3>",
             "<h3>Force along the recorded motion</h3>",
             "<h2>What to do next</h2>",
             "<code>host-sim x &lt;y&gt;</code>",
@@ -144,6 +162,13 @@ mod tests {
         .map(|part| page.find(part).unwrap_or_else(|| panic!("{part} is missing")))
         .collect();
         assert!(places.is_sorted(), "{places:?}");
-        assert!(page.contains("position, rad · time, s") && !page.contains("bench <1>"));
+        assert!(!page.contains("bench <1>"));
+        // Every picture has a title on each axis and its ranges; every curve has a name.
+        let count = |part: &str| page.matches(part).count();
+        assert_eq!(
+            (count("<svg "), count("<svg ") * 2),
+            (count("data-x="), count("<p class=\"axis level\">") + count("<p class=axis>"))
+        );
+        assert_eq!(count("<path class=\"motion "), count("<path class=\"motion ").min(count("data-name=")));
     }
 }

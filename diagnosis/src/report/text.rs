@@ -2,7 +2,7 @@
 
 use crate::numerics::bootstrap::Gain;
 use crate::pipeline::diagnosis::Reason;
-use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
+use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::rejection::{Rather, Rejection, Weakness};
 
 /// Says why an effect is not named, as a clause.
@@ -35,6 +35,11 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             "it explains {:.1} % of what the noise leaves, and effects below {:.0} % need a gain of {CERTAIN_Z} standard errors; this one has {z:.1}",
             100.0 * share,
             100.0 * least
+        ),
+        Rejection::Immaterial { part } => format!(
+            "it takes {:.1} % off the held-out force error, less than the {:.0} % that make it material",
+            100.0 * part.max(0.0),
+            100.0 * MATERIAL
         ),
         Rejection::NotPeriodic => {
             "its orders follow one another without a gap, as at places along the travel, not at teeth or poles"
@@ -111,6 +116,9 @@ pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
             format!("{} would explain {:.0} % of it", foreign.what, 100.0 * foreign.share)
         }
         Reason::FreeForm => return format!("{} would explain it", form.unwrap_or("a force of some form")),
+        Reason::Follows { what, part } => {
+            format!("{what} would explain {:.0} % of it on held-out recordings", 100.0 * part)
+        }
         Reason::Repeats { correlation } => {
             format!("the residual repeats where the motion does, with a correlation of {correlation:.2}")
         }

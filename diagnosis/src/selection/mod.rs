@@ -11,3 +11,4 @@ pub(crate) mod predictive;
 pub(crate) mod score_statistic;
 pub(crate) mod search;
 pub(crate) mod shape_search;
+pub(crate) mod untested;

@@ -41,6 +41,18 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     (count >= 8).then(|| (travel, (FEWEST..=count).map(|i| 0.5 * i as f64).collect()))
 }
 
+/// Travel that would be needed to look for waves, rad or m; none where there is enough.
+pub(crate) fn travel_needed(span: &Span, nominal: &Nominal) -> Option<f64> {
+    if candidates(span, nominal).is_some() {
+        return None;
+    }
+    let turn = nominal.rig.turn();
+    // Three periods of the shortest wave that the encoder resolves, or most of a turn.
+    let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
+    let by_cycles = 4.0 * shortest;
+    Some(turn.map_or(by_cycles, |turn| by_cycles.min(0.6 * turn)).max(span.travel()))
+}
+
 fn wave_inputs(track: &BlockedRecording, wave: f64, drive: Option<&Input>) -> [Input; 2] {
     let (cos, sin): (Vec<f64>, Vec<f64>) = (0..track.block_count())
         .map(|j| {

@@ -163,6 +163,6 @@ impl Comparison {
 }
 
 /// Time between two starts from the measured state in the motion that is drawn so, s.
-pub(crate) const AFRESH_S: f64 = 2.0;
+pub(crate) const AFRESH_S: f64 = 0.5;
 /// Ratio of errors from which a model counts as worse.
 const MUCH: f64 = 1.05;

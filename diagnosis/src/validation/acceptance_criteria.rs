@@ -27,6 +27,8 @@ pub(crate) struct EffectEvidence {
     pub(crate) score_z: f64,
     /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
     pub(crate) share: f64,
+    /// Part of the held-out force error, root mean square, that it takes off.
+    pub(crate) off_force: f64,
     /// True if one of its values is at a bound.
     pub(crate) at_bound: bool,
     /// True if its waves, if it has any, are those of teeth or poles.
@@ -204,6 +206,7 @@ mod tests {
             holdout: gain(500.0, 300.0, 8.0),
             fit: gain(900.0, 600.0, 9.0),
             force: gain(0.9, 0.6, 5.0),
+            off_force: 0.5,
             share: 0.9,
             at_bound: false,
             is_comb: true,

@@ -4,7 +4,8 @@
 //! judge.
 
 use crate::thresholds::{
-    BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, SUREST_Z, UNLIKELY_Z, WEIGHTS,
+    BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, NAMED, SUREST_Z, UNLIKELY_Z, WEIGHTS,
+    WORSE_MOTION,
 };
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::rejection::Weakness;
@@ -58,6 +59,13 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
+/// The probability of a name whose simulation follows the motion less well in short windows than the simulation without it. It may
+/// become unsure by that, and is not taken back.
+pub(crate) fn with_worse_motion(confidence: f64) -> f64 {
+    let odds = confidence / (1.0 - confidence) * (-WORSE_MOTION.0).exp();
+    (odds / (1.0 + odds)).max(confidence.min(NAMED))
+}
+
 /// Returns the piece of evidence that lowers the probability most.
 pub(crate) fn weakness(evidence: &Evidence) -> Weakness {
     match takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key) {
@@ -90,6 +98,13 @@ mod tests {
         assert!(matches!(small, Weakness::SmallShare { share } if near(share, 0.04)), "{small:?}");
         let left = weakest(&[("unexplained", 0.6), ("unexplained_of_force", 1.8)]);
         assert_eq!(left, Weakness::LeftOver { part: 0.6 });
+    }
+
+    #[test]
+    fn a_worse_motion_makes_a_name_less_sure_and_takes_none() {
+        let [sure, hardly, unnamed] = [0.97, 0.7, 0.5].map(with_worse_motion);
+        assert!((0.9..0.95).contains(&sure), "{sure}");
+        assert!(hardly == NAMED && unnamed == 0.5, "{hardly} {unnamed}");
     }
 
     #[test]

@@ -11,7 +11,9 @@ use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{ALIKE, BEHIND_Z, LEAVES_MUCH, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
+use crate::thresholds::{
+    ALIKE, BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD,
+};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
@@ -112,6 +114,13 @@ impl WeighedModel {
         Some((most.found.effect.name, most.rather.clone()?))
     }
 
+    /// Marks the effects at some places as having no size.
+    pub(crate) fn have_no_size(&mut self, places: &[usize]) {
+        for i in places {
+            self.effects[*i].is_there = false;
+        }
+    }
+
     /// Places of the effects that are named.
     pub(crate) fn named(&self) -> Vec<usize> {
         let is_named = |(i, effect): (usize, &WeighedEffect)| self.doubt(effect).is_none().then_some(i);
@@ -138,6 +147,8 @@ impl WeighedModel {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
             Some(Rejection::NoSize)
+        } else if assessed.found.off_force < MATERIAL {
+            Some(Rejection::Immaterial { part: assessed.found.off_force })
         } else if let Some(part) = assessed.creeps {
             Some(Rejection::Creeps { part })
         } else if let Some(rather) = &assessed.rather {

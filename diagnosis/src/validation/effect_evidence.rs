@@ -116,6 +116,7 @@ impl<'a> JudgedModel<'a> {
             fit: bootstrap(&gains),
             force: relative_gain(estimator, shown, &less.held_out, &left.held_out),
             share: self.share(&less),
+            off_force: self.off_force(&less),
             at_bound: self.is_at_bound(&effect, i),
             is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
@@ -136,6 +137,12 @@ impl<'a> JudgedModel<'a> {
         let (tracks, shown) = (self.context.tracks, self.shown);
         ((square(&less.held_out, shown) - square(&self.left.held_out, shown)) / held_out)
             .max((square(&less.fitted, tracks) - square(&self.left.fitted, tracks)) / fitted)
+    }
+
+    /// Part of the held-out force error, root mean square, that the model takes off and one that leaves `less` does not.
+    fn off_force(&self, less: &LeftForce) -> f64 {
+        let rms = |left: &LeftForce| self.estimator.rms(&left.held_out, self.shown);
+        1.0 - rms(&self.left) / rms(less).max(1e-300)
     }
 
     /// True if a value of effect `i` is at a bound.

@@ -13,6 +13,7 @@ pub(crate) mod holdout_set;
 pub(crate) mod known_travel;
 pub(crate) mod out_of_library;
 pub(crate) mod parameters;
+pub(crate) mod plain_regression;
 pub(crate) mod rejection;
 pub(crate) mod repeats;
 pub(crate) mod residual_maps;

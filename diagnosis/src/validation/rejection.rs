@@ -23,6 +23,8 @@ pub(crate) enum Rejection {
     TooSmall { share: f64 },
     /// The effect explains less than `least` of what the noise leaves, and is not sure enough for that.
     SmallAndUnsure { share: f64, least: f64, z: f64 },
+    /// The effect takes so small a part off the held-out force error that the simulation is right without it.
+    Immaterial { part: f64 },
     /// The waves are not those of teeth or poles.
     NotPeriodic,
     /// A fitted value reached its limit.

@@ -2,8 +2,10 @@
 
 use super::progress::Progress;
 use clap::Args;
-use diagnosis::Request;
+use diagnosis::{Made, Request};
 use host_sim::failure::Failure;
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -44,8 +46,9 @@ impl Diagnose {
                 bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
             }
         };
-        let outcome = diagnosis::diagnose(&request, &show).map_err(Failure::input)?;
+        let mut outcome = diagnosis::diagnose(&request, &show).map_err(Failure::input)?;
         drop(bar);
+        outcome.made = Some(made(&request));
         outcome.write(&self.out).map_err(|cause| {
             Failure::failed(format_args!(
                 "{}: the report cannot be written ({cause}); free some space or choose another --out",
@@ -56,5 +59,24 @@ impl Diagnose {
         super::export::write(&outcome.patched_rig, &formats, &self.out)?;
         say!("report: {}", self.out.join("report.html").display());
         Ok(())
+    }
+}
+
+/// What the report was made from.
+fn made(request: &Request) -> Made {
+    let all =
+        std::iter::once(&request.rig).chain(&request.fit).chain(&request.holdout).chain(&request.effects);
+    let hash = |path: &PathBuf| {
+        let bytes = std::fs::read(path).ok()?;
+        let mut hash = String::new();
+        for byte in Sha256::digest(bytes) {
+            let _ = write!(hash, "{byte:02x}");
+        }
+        Some((path.display().to_string(), hash))
+    };
+    Made {
+        program: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
+        date: jiff::Zoned::now().strftime("%Y-%m-%d %H:%M %Z").to_string(),
+        files: all.filter_map(hash).collect(),
     }
 }

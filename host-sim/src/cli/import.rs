@@ -3,17 +3,20 @@
 use clap::Args;
 use host_sim::failure::Failure;
 use host_sim::import::{self, Keep, Known, Request, RigValues};
+use host_sim::shell::quoted;
 use std::path::PathBuf;
 
 /// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.
 ///
-/// Reads tables as text (any separator, decimal commas, comments, a row of units, no header), NumPy's .npz, JSON, MCAP with
-/// messages in JSON and, where built with `--features parquet`, Parquet. Says what it took for what, what it changed and what
-/// it left out. Values that no recording tells stand as nan in rig.toml, to be filled in.
+/// Reads tables as text (any separator, decimal commas, comments, a row of units, no header, channels in rows), NumPy's .npz,
+/// MATLAB's .mat (not -v7.3), JSON, MCAP with messages in JSON, with `--features ros` ROS 2 bags in MCAP, and with
+/// `--features parquet` Parquet and LeRobot datasets. Says what it took for what, what it changed and what it left out. Values
+/// that no recording tells stand as nan in rig.toml, to be filled in.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim import run1.csv run2.csv --out imported
   host-sim import log.csv --column position=theta:deg --column command=-tau:mNm --out imported
+  host-sim import angle.csv torque.csv --column position=angle.csv/value:deg --column command=torque.csv/value:Nm --out imported
   host-sim import log.npz --rate 1000 --split 0.6 --inertia 0.17 --gain 1 --out imported"))]
 pub(crate) struct Import {
     /// Recordings; several files of one run in chronological order, or with different columns
@@ -23,12 +26,15 @@ pub(crate) struct Import {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The column of the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
-    /// changes the sign
+    /// changes the sign, FILE/NAME is a column of one file, and none leaves the role empty
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,
     /// Rows per second, if no column has the time
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
+    /// Treat every file as a separate run, even if neither clocks nor names say so
+    #[arg(long)]
+    runs: bool,
     /// Nothing drives the axis: the command is zero
     #[arg(long)]
     undriven: bool,
@@ -86,6 +92,7 @@ impl Import {
             counts_per_unit: self.counts_per_unit,
             values: RigValues { inertia: self.inertia, gain: self.gain },
             rig: self.rig,
+            runs: self.runs,
             keep: Keep { idle: self.keep_idle, wraps: self.keep_wraps },
             split: self.split,
             out: self.out.clone(),
@@ -120,13 +127,14 @@ fn next(done: &import::Imported, out: &std::path::Path) {
         note!("next: another recording, to hold out, or import this one again with --split 0.6");
         return;
     }
-    let list =
-        |option: &str, files: &[&String]| files.iter().map(|f| format!(" {option} {f}")).collect::<String>();
+    let list = |option: &str, files: &[&String]| {
+        files.iter().map(|f| format!(" {option} {}", quoted(f))).collect::<String>()
+    };
     note!(
         "next: host-sim diagnose --rig {}{}{} --out {}",
-        done.rig.display(),
+        quoted(&done.rig.display().to_string()),
         list("--fit", &fit),
         list("--holdout", &held),
-        out.join("report").display()
+        quoted(&out.join("report").display().to_string())
     );
 }

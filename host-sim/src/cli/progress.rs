@@ -11,12 +11,18 @@ pub(crate) struct Progress {
     what: &'static str,
     on: bool,
     drawn: Option<Instant>,
+    begun: Instant,
 }
 
 impl Progress {
     /// Quiet unless standard error is a terminal, and with `--quiet`.
     pub(crate) fn new(what: &'static str) -> Self {
-        Self { what, on: std::io::stderr().is_terminal() && !super::output::is_quiet(), drawn: None }
+        Self {
+            what,
+            on: std::io::stderr().is_terminal() && !super::output::is_quiet(),
+            drawn: None,
+            begun: Instant::now(),
+        }
     }
 
     /// Shows `done` of `all`, where that is known.
@@ -26,7 +32,11 @@ impl Progress {
         }
         self.drawn = Some(Instant::now());
         let line = match all {
-            Some(all) => format!("{}: {done:.1} of {all:.1} {unit}", self.what),
+            Some(all) => {
+                let left = left(self.begun.elapsed().as_secs_f64(), done / all);
+                let left = left.map_or(String::new(), |left| format!(", about {left} left"));
+                format!("{}: {done:.1} of {all:.1} {unit}{left}", self.what)
+            }
             None => format!("{}: {done:.1} {unit}", self.what),
         };
         // A terminal that went away is no reason to stop.
@@ -34,10 +44,32 @@ impl Progress {
     }
 }
 
+/// The time that is left of work that took `elapsed` s for a part of it, as words; none while too little is done to say it.
+fn left(elapsed: f64, part: f64) -> Option<String> {
+    if elapsed < 2.0 || !(0.05..1.0).contains(&part) {
+        return None;
+    }
+    let seconds = elapsed * (1.0 - part) / part;
+    Some(if seconds < 90.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) })
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         if self.drawn.is_some() {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_left_is_said_once_enough_is_done() {
+        assert_eq!(left(1.0, 0.5), None);
+        assert_eq!(left(10.0, 0.01), None);
+        assert_eq!(left(10.0, 0.25).as_deref(), Some("30 s"));
+        assert_eq!(left(60.0, 0.1).as_deref(), Some("9 min"));
     }
 }

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 /// Deeper nesting is nobody's recording.
 const DEEPEST: usize = 12;
+/// Elements of an array within a row that become columns.
+const WIDEST: usize = 64;
 
 pub(super) fn read(file: &str, text: &str) -> Result<Log, Failure> {
     let value = match serde_json::from_str(text) {
@@ -55,6 +57,10 @@ fn collect(path: &str, value: &Value, depth: usize, out: &mut Vec<Column>, left_
         Value::Array(rows) if rows.len() > 1 => {
             if let Some(values) = rows.iter().map(scalar).collect::<Option<Vec<f64>>>() {
                 out.push(Column::new(path, values));
+            } else if let Some(channels) = channels(rows) {
+                for (index, values) in channels.into_iter().enumerate() {
+                    out.push(Column::unnamed(join(path, &index.to_string()), values));
+                }
             } else if rows.iter().all(|row| row.is_object() || row.is_array()) {
                 of_rows(path, rows, out);
             } else {
@@ -94,6 +100,17 @@ fn collect(path: &str, value: &Value, depth: usize, out: &mut Vec<Column>, left_
     }
 }
 
+/// The values of a matrix whose rows are its channels: few of them, each many values long.
+fn channels(rows: &[Value]) -> Option<Vec<Vec<f64>>> {
+    let length = rows.first()?.as_array()?.len();
+    let row = |row: &Value| row.as_array()?.iter().map(scalar).collect::<Option<Vec<f64>>>();
+    if length <= WIDEST || rows.len() >= length {
+        return None;
+    }
+    let all = rows.iter().map(row).collect::<Option<Vec<_>>>()?;
+    all.iter().all(|row| row.len() == length).then_some(all)
+}
+
 /// Columns of rows that are objects or arrays; what a row does not have is NaN there.
 fn of_rows(path: &str, rows: &[Value], out: &mut Vec<Column>) {
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
@@ -130,7 +147,7 @@ pub(super) fn flatten(path: &str, value: &Value, depth: usize, give: &mut dyn Fn
             }
         }
         Value::Array(items) => {
-            for (index, value) in items.iter().enumerate().take(64) {
+            for (index, value) in items.iter().enumerate().take(WIDEST) {
                 flatten(&join(path, &index.to_string()), value, depth + 1, give);
             }
         }

@@ -2,14 +2,19 @@
 //! out on the way is said. It reads tables and writes the contract's files; it may not know what is done with them.
 
 mod counts;
+mod folder;
 mod json;
 mod log;
+mod mat;
 mod npy;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod roles;
+#[cfg(feature = "ros")]
+mod ros;
 mod rows;
 mod runs;
+mod separate;
 mod table;
 mod text;
 mod units;
@@ -25,6 +30,7 @@ use diagnosis::rig::{Kind, Rig};
 use rows::Rows;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
+use table::Log;
 use units::Quantity;
 
 /// What to import, and what is known about it.
@@ -46,6 +52,8 @@ pub struct Request {
     pub rig: Option<PathBuf>,
     /// What is left as it stands.
     pub keep: Keep,
+    /// Each file is a run of its own, whatever clocks and names say.
+    pub runs: bool,
     /// Cuts every run at this part of its length, the first for fitting, the second to hold out.
     pub split: Option<f64>,
     /// Folder to write to.
@@ -83,14 +91,15 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         Some(path) => Some(Rig::read(path).map_err(Failure::input)?),
         None => None,
     };
-    let logs = request.files.iter().map(|path| table::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let paths = folder::files(&request.files)?;
+    let logs = paths.iter().map(|path| table::read(path)).collect::<Result<Vec<_>, _>>()?;
     for log in &logs {
         notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
     }
-    let wholes: Vec<Rows> = if logs
-        .iter()
-        .all(|log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known))
-    {
+    roles::check(&logs, &request.columns)?;
+    let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
+    let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(&logs));
+    let wholes: Vec<Rows> = if !one_run && logs.iter().all(is_whole) {
         let mut wholes = Vec::new();
         for (index, log) in logs.iter().enumerate() {
             let mut said = Vec::new();
@@ -99,6 +108,9 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
             if index == 0 {
                 notes.extend(said);
             }
+        }
+        if !request.runs {
+            separate::check(&logs, &wholes)?;
         }
         joined(wholes, &mut notes)
     } else {
@@ -162,12 +174,14 @@ fn joined(wholes: Vec<Rows>, notes: &mut Vec<String>) -> Vec<Rows> {
     for rows in wholes {
         if let Some(last) = out.last_mut() {
             let step = rows::median_step(&last.time).unwrap_or(0.0);
+            // The later file's clock, counted from the earlier one's zero.
+            let later = rows.origin - last.origin;
             let between =
-                rows.time.first().copied().unwrap_or(0.0) - last.time.last().copied().unwrap_or(0.0);
+                rows.time.first().copied().unwrap_or(0.0) + later - last.time.last().copied().unwrap_or(0.0);
             let alike = last.columns.keys().eq(rows.columns.keys()) && last.position == rows.position;
             if alike && between > 0.0 && between < 20.0 * step {
                 notes.push("a file goes on where the one before ends: joined to one run".into());
-                last.time.extend(rows.time);
+                last.time.extend(rows.time.iter().map(|t| t + later));
                 for (role, column) in rows.columns {
                     last.columns.entry(role).or_default().extend(column);
                 }

@@ -49,8 +49,10 @@ fn add(name: &str, array: &ArrayD<f64>, out: &mut Vec<Column>) {
     }
     for (i, values) in values.into_iter().enumerate() {
         // Matrices count their columns from 0, as their users do.
-        let name = if array.ndim() == 1 { name.to_owned() } else { format!("{name}.{i}") };
-        out.push(Column::new(name, values));
+        out.push(match array.ndim() {
+            1 => Column::new(name, values),
+            _ => Column::unnamed(format!("{name}.{i}"), values),
+        });
     }
 }
 

@@ -3,7 +3,9 @@
 use super::table::{Column, Log};
 use super::units::{self, Quantity, Unit};
 use crate::failure::Failure;
+use crate::shell::quoted;
 use std::fmt;
+use std::path::Path;
 
 /// What a column of a recording may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,10 +69,29 @@ impl fmt::Display for Role {
 pub struct Choice {
     /// Which role.
     pub role: Role,
-    /// The column's name, or its number from 1.
+    /// The column's name, its number from 1, either of them after `FILE/`, or `none`.
     pub name: String,
     /// Its unit, where given.
     pub unit: Option<Unit>,
+}
+
+impl Choice {
+    /// The column that it names and the sign that it gives; `None` where it names no column of `logs`.
+    fn column(&self, logs: &[Log]) -> Option<(Place, f64)> {
+        let turned = || Some((find(logs, self.name.strip_prefix('-')?)?, -1.0));
+        find(logs, &self.name).map(|at| (at, 1.0)).or_else(turned)
+    }
+
+    /// True if the role is to stay empty: `none`, where no column is called so.
+    fn is_none(&self, logs: &[Log]) -> bool {
+        self.name == "none" && find(logs, "none").is_none()
+    }
+
+    /// True if the name says in which of several files its column is.
+    pub(super) fn names_a_file(&self, logs: &[Log]) -> bool {
+        let name = self.name.strip_prefix('-').unwrap_or(&self.name);
+        find_in_any(logs, name).is_none() && find_in_file(logs, name).is_some()
+    }
 }
 
 /// Reads one `--column`.
@@ -89,11 +110,8 @@ pub fn choice(text: &str) -> Result<Choice, Failure> {
     let (name, unit) = match name.rsplit_once(':') {
         Some((before, unit)) if !before.is_empty() => match units::parse(unit) {
             Some(unit) => (before, Some(unit)),
-            None => {
-                return Err(Failure::input(format_args!(
-                    "--column {text}: \"{unit}\" is no unit that is known; use one of s, ms, us, ns, rad, deg, rev, counts, m, mm, rad/s, deg/s, rpm, m/s, mm/s, A, mA, V, Nm, mNm, N, dac"
-                )));
-            }
+            // A name may hold a colon; `nowhere` says which units there are where it does not.
+            None => (name, None),
         },
         _ => (name, None),
     };
@@ -108,11 +126,14 @@ pub fn choice(text: &str) -> Result<Choice, Failure> {
     Ok(Choice { role, name: name.to_owned(), unit })
 }
 
+/// Index of a log, of a table in it and of a column there.
+type Place = (usize, usize, usize);
+
 /// A column that was chosen, with what is to be done to it.
 #[derive(Clone, Debug)]
 pub(super) struct Chosen {
-    /// Index of the log and of its table, and the column there.
-    pub at: (usize, usize, usize),
+    /// Which column.
+    pub at: Place,
     /// Its unit, where known.
     pub unit: Option<Unit>,
     /// −1 where the sign is to be turned.
@@ -131,7 +152,7 @@ fn suggested(column: &Column) -> Option<(Role, u32)> {
     let position =
         has("position pos angle theta phi q x enc encoder count counts ticks weg winkel travel displacement");
     let velocity = has("velocity vel speed omega rpm dot qd dq v w geschwindigkeit drehzahl");
-    let wanted = has("reference ref setpoint set target desired des demand demanded goal soll");
+    let wanted = has("reference ref setpoint set target desired des demand demanded goal action soll");
     let ordered = has("command cmd commanded ctrl control input u");
     let measured = u32::from(has("measured meas actual act feedback fbk ist estimated est"));
     if column.unit.is_some_and(|u| u.quantity == Quantity::Time) && !position && !effort {
@@ -184,22 +205,42 @@ fn suggested(column: &Column) -> Option<(Role, u32)> {
     }
 }
 
-/// Every column, as errors list it.
+/// Every column, as errors list it: those that the file does not name with their first values, those of several files by file.
 fn listed(logs: &[Log]) -> String {
-    let mut names: Vec<&str> = logs
-        .iter()
-        .flat_map(|l| &l.tables)
-        .flat_map(|t| &t.columns)
-        .map(|c| c.name.as_str())
-        .filter(|n| !n.is_empty())
-        .collect();
-    names.dedup();
-    let more = names.len().saturating_sub(24);
-    names.truncate(24);
-    format!("{}{}", names.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+    let of_log = |log: &Log| {
+        let mut names: Vec<String> = log
+            .tables
+            .iter()
+            .flat_map(|t| &t.columns)
+            .filter(|c| !c.name.is_empty())
+            .map(|c| if c.is_named { c.name.clone() } else { format!("{} ({})", c.name, sample(&c.values)) })
+            .collect();
+        names.dedup();
+        let more = names.len().saturating_sub(24);
+        names.truncate(24);
+        format!("{}{}", names.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+    };
+    match logs {
+        [one] => of_log(one),
+        several => {
+            let each = several.iter().map(|log| format!("{} in {}", of_log(log), log.file));
+            each.collect::<Vec<_>>().join(", ")
+        }
+    }
 }
 
-fn columns(logs: &[Log]) -> impl Iterator<Item = ((usize, usize, usize), &Column)> {
+/// The first values of a column, as a person would know it by.
+fn sample(values: &[f64]) -> String {
+    let first: Vec<String> = values
+        .iter()
+        .filter(|x| x.is_finite())
+        .take(3)
+        .map(|x| format!("{}", (x * 1e6).round() / 1e6))
+        .collect();
+    format!("{}, …", first.join(", "))
+}
+
+fn columns(logs: &[Log]) -> impl Iterator<Item = (Place, &Column)> {
     logs.iter().enumerate().flat_map(|(l, log)| {
         log.tables.iter().enumerate().flat_map(move |(t, table)| {
             table.columns.iter().enumerate().map(move |(c, column)| ((l, t, c), column))
@@ -207,7 +248,11 @@ fn columns(logs: &[Log]) -> impl Iterator<Item = ((usize, usize, usize), &Column
     })
 }
 
-fn find(logs: &[Log], wanted: &str) -> Option<(usize, usize, usize)> {
+fn find(logs: &[Log], wanted: &str) -> Option<Place> {
+    find_in_any(logs, wanted).or_else(|| find_in_file(logs, wanted))
+}
+
+fn find_in_any(logs: &[Log], wanted: &str) -> Option<Place> {
     let by = |same: &dyn Fn(&Column) -> bool| columns(logs).find(|(_, c)| same(c)).map(|(at, _)| at);
     by(&|c| c.name == wanted)
         .or_else(|| by(&|c| c.name.eq_ignore_ascii_case(wanted) || c.plain == wanted))
@@ -218,21 +263,54 @@ fn find(logs: &[Log], wanted: &str) -> Option<(usize, usize, usize)> {
         })
 }
 
+/// The column that `FILE/NAME` means; the file by its name, with or without its folder and ending.
+fn find_in_file(logs: &[Log], wanted: &str) -> Option<Place> {
+    wanted.match_indices('/').find_map(|(slash, _)| {
+        let (file, name) = (Path::new(&wanted[..slash]), &wanted[slash + 1..]);
+        let log = logs.iter().position(|log| {
+            let path = Path::new(&log.file);
+            path.ends_with(file) || path.file_stem() == Some(file.as_os_str())
+        })?;
+        find_in_any(&logs[log..=log], name).map(|(_, table, column)| (log, table, column))
+    })
+}
+
+/// Refuses choices that cannot all hold: a role given twice, or a column given two roles.
+pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Failure> {
+    for (i, choice) in choices.iter().enumerate() {
+        for before in &choices[..i] {
+            let (role, name) = (choice.role, &choice.name);
+            if before.role == role {
+                return Err(Failure::input(format_args!(
+                    "--column gives the {role} twice, {} and {name}; leave one of them out",
+                    before.name
+                )));
+            }
+            let at = choice.column(logs).map(|c| c.0);
+            if at.is_some() && at == before.column(logs).map(|c| c.0) {
+                return Err(Failure::input(format_args!(
+                    "--column gives {name} two roles, {} and {role}; a column has one, and where files have columns of one name, say whose it is: --column {role}=FILE/{name}",
+                    before.role
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The column of a role: the one that was said, else the one whose name fits best; an error where two fit alike.
 pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Option<Chosen>, Failure> {
     let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
-    let unit_of = |at: (usize, usize, usize)| logs[at.0].tables[at.1].columns[at.2].unit;
+    let unit_of = |at: Place| logs[at.0].tables[at.1].columns[at.2].unit;
     if let Some(said) = choices.iter().find(|c| c.role == role) {
-        let turned = said.name.strip_prefix('-');
-        let (at, sign) = match (find(logs, &said.name), turned) {
-            (Some(at), _) => (at, 1.0),
-            (None, Some(name)) => (find(logs, name).ok_or_else(|| nowhere(&files, name, logs))?, -1.0),
-            (None, None) => return Err(nowhere(&files, &said.name, logs)),
-        };
+        if said.is_none(logs) {
+            return Ok(None);
+        }
+        let (at, sign) = said.column(logs).ok_or_else(|| nowhere(&files, said, logs))?;
         let unit = said.unit.or(unit_of(at).filter(|u| role.takes(u.quantity)));
         return Ok(Some(Chosen { at, unit, sign }));
     }
-    let taken: Vec<_> = choices.iter().filter_map(|c| find(logs, c.name.trim_start_matches('-'))).collect();
+    let taken: Vec<_> = choices.iter().filter_map(|c| Some(c.column(logs)?.0)).collect();
     let mut fitting: Vec<_> = columns(logs)
         .filter(|(at, _)| !taken.contains(at))
         .filter_map(|(at, c)| suggested(c).filter(|s| s.0 == role).map(|s| (s.1, at, c)))
@@ -246,11 +324,11 @@ pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Opt
                 return Ok(None);
             }
             Err(Failure::input(format_args!(
-                "{}: {} and {} could both be the {role}; say which with --column {role}={}",
+                "{}: {} and {} could both be the {role}; say which with {}",
                 files.join(", "),
                 a.2.name,
                 b.2.name,
-                a.2.name
+                option(role, &a.2.name, None)
             )))
         }
         [first, ..] => {
@@ -259,9 +337,22 @@ pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Opt
     }
 }
 
-fn nowhere(files: &[&str], name: &str, logs: &[Log]) -> Failure {
+/// `--column ROLE=NAME[:UNIT]`, quoted for a shell where it has to be.
+pub(super) fn option(role: Role, name: &str, unit: Option<&str>) -> String {
+    let unit = unit.map_or(String::new(), |unit| format!(":{unit}"));
+    format!("--column {}", quoted(&format!("{role}={name}{unit}")))
+}
+
+fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Failure {
+    let name = choice.name.trim_start_matches('-');
+    let unit = match name.rsplit_once(':') {
+        Some((_, unit)) => format!(
+            ", or {unit} is no unit (units are s, ms, us, ns, rad, deg, rev, counts, m, mm, rad/s, deg/s, rpm, m/s, mm/s, A, mA, V, Nm, mNm, N, dac)"
+        ),
+        None => String::new(),
+    };
     Failure::input(format_args!(
-        "{}: has no column \"{name}\"; its columns are {}",
+        "{}: has no column \"{name}\"; its columns are {}{unit}",
         files.join(", "),
         listed(logs)
     ))

@@ -9,8 +9,10 @@ use std::collections::BTreeMap;
 /// A recording in SI units; the position is in `position_unit`. All columns have the same length.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
-    /// s, in any order yet.
+    /// s since `origin`, in any order yet.
     pub time: Vec<f64>,
+    /// Zero of the time, s: a date since 1970, or 0 where the clock begins with the recording.
+    pub origin: f64,
     /// Every other column that was found; NaN where the file has nothing.
     pub columns: BTreeMap<Role, Vec<f64>>,
     /// What position and reference measure.
@@ -53,7 +55,9 @@ fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f6
         d if d < 20.0 => (1e-3, "ms"),
         d if d < 100.0 => {
             return Err(Failure::input(format_args!(
-                "the time column {name} has steps of {d}, which could be ms or µs; say which with --column time={name}:ms or --column time={name}:us"
+                "the time column {name} has steps of {d}, which could be ms or µs; say which with {} or {}",
+                roles::option(Role::Time, name, Some("ms")),
+                roles::option(Role::Time, name, Some("us"))
             )));
         }
         d if d < 1e5 => (1e-6, "us"),
@@ -61,20 +65,21 @@ fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f6
     };
     if unit != "s" {
         notes.push(format!(
-            "time {name} taken as {unit}, for its steps of {step}; --column time={name}:UNIT says another"
+            "time {name} taken as {unit}, for its steps of {step}; {} says another",
+            roles::option(Role::Time, name, Some("UNIT"))
         ));
     }
     Ok(factor)
 }
 
-/// The clock of a table, in s.
+/// The clock of a table, in s, and its zero.
 fn clock(
     table: &Table,
     choices: &[Choice],
     several: bool,
     known: Known,
     notes: &mut Vec<String>,
-) -> Result<Vec<f64>, Failure> {
+) -> Result<(Vec<f64>, f64), Failure> {
     let said = choices.iter().find(|c| c.role == Role::Time);
     let alone = [Log { file: table.name.clone(), tables: vec![table.clone()], notes: Vec::new() }];
     let logged = table.columns.iter().position(|c| c.name == "log_time");
@@ -93,7 +98,7 @@ fn clock(
             )));
         };
         notes.push(format!("no column for the time: {rate} rows a second, as --rate says"));
-        return Ok((0..table.rows()).map(|row| row as f64 / rate).collect());
+        return Ok(((0..table.rows()).map(|row| row as f64 / rate).collect(), 0.0));
     };
     let column = &table.columns[chosen.at.2];
     // Before scaling: digits of a date since 1970 are scarce.
@@ -104,7 +109,7 @@ fn clock(
         Some(Unit { factor, .. }) => factor,
         None => unit_of_clock(&column.name, &time, notes)?,
     };
-    Ok(time.into_iter().map(|t| t * factor).collect())
+    Ok((time.into_iter().map(|t| t * factor).collect(), origin * factor))
 }
 
 fn find_all(logs: &[Log], choices: &[Choice]) -> Result<BTreeMap<Role, Chosen>, Failure> {
@@ -133,24 +138,31 @@ pub(super) fn gather(
     notes: &mut Vec<String>,
 ) -> Result<Rows, Failure> {
     let mut found = find_all(logs, choices)?;
+    let said = |role: Role| choices.iter().any(|c| c.role == role);
+    // Everything that only a person can know is asked at once.
+    let mut questions = Vec::new();
     if !found.contains_key(&Role::Position) && !found.contains_key(&Role::Velocity) {
-        return Err(roles::missing(logs, Role::Position));
+        questions.push(roles::missing(logs, Role::Position).to_string());
     }
     if !found.contains_key(&Role::Command) && !known.undriven {
-        return Err(Failure::input(format_args!(
+        questions.push(format!(
             "{}; or give --undriven where nothing drives the axis",
             roles::missing(logs, Role::Command)
-        )));
+        ));
     }
-    let said = |role: Role| choices.iter().any(|c| c.role == role);
     if found.contains_key(&Role::Position)
         && !said(Role::Velocity)
         && let Some(left) = found.remove(&Role::Velocity)
     {
         let name = &column(logs, &left).name;
         notes.push(format!(
-            "{name} left out: give --column velocity={name} only where a sensor of its own measured it"
+            "{name} left out: give {} only where a sensor of its own measured it",
+            roles::option(Role::Velocity, name, None)
         ));
+    }
+    let units = units(logs, &mut found, &said, &mut questions, notes);
+    if !questions.is_empty() {
+        return Err(Failure::input(questions.join("; and ")));
     }
     let base = if found.contains_key(&Role::Position) { Role::Position } else { Role::Velocity };
     let base = found[&base].clone();
@@ -168,9 +180,10 @@ pub(super) fn gather(
             logs[base.at.0].tables[base.at.1].name
         ));
     }
-    let time = clocks[&(base.at.0, base.at.1)].clone();
+    let (time, origin) = clocks[&(base.at.0, base.at.1)].clone();
     let mut rows = Rows {
         time,
+        origin,
         columns: BTreeMap::new(),
         position: Quantity::Counts,
         command: Quantity::Plain,
@@ -178,7 +191,7 @@ pub(super) fn gather(
     };
     for (role, chosen) in &found {
         let column = column(logs, chosen);
-        let unit = unit(*role, chosen, &column.name, &column.values, notes)?;
+        let unit = units[role];
         match role {
             Role::Position => rows.position = unit.quantity,
             Role::Velocity if rows.position == Quantity::Counts && !found.contains_key(&Role::Position) => {
@@ -191,8 +204,11 @@ pub(super) fn gather(
         }
         let scaled: Vec<f64> = column.values.iter().map(|x| chosen.sign * unit.factor * x).collect();
         let at = (chosen.at.0, chosen.at.1);
-        let values =
-            if at == (base.at.0, base.at.1) { scaled } else { held(&clocks[&at], &scaled, &rows.time) };
+        let values = if at == (base.at.0, base.at.1) {
+            scaled
+        } else {
+            held(&since(&clocks[&at], origin), &scaled, &rows.time)
+        };
         let turned = if chosen.sign < 0.0 { ", its sign turned" } else { "" };
         notes.push(format!("{role} is {}, in {}{turned}", column.name, said_unit(*role, unit)));
         rows.columns.insert(*role, values);
@@ -202,6 +218,11 @@ pub(super) fn gather(
         notes.push("the command is zero throughout, as --undriven says".into());
     }
     Ok(rows)
+}
+
+/// A clock counted from another's zero.
+fn since((clock, zero): &(Vec<f64>, f64), origin: f64) -> Vec<f64> {
+    clock.iter().map(|t| t + (zero - origin)).collect()
 }
 
 fn said_unit(role: Role, unit: Unit) -> String {
@@ -217,41 +238,79 @@ fn column<'a>(logs: &'a [Log], chosen: &Chosen) -> &'a super::table::Column {
     &logs[chosen.at.0].tables[chosen.at.1].columns[chosen.at.2]
 }
 
-/// The unit of a column; an error where only a person can know it.
-fn unit(
-    role: Role,
-    chosen: &Chosen,
-    name: &str,
-    values: &[f64],
+/// The unit of every column that was found. A column that nobody asked for and that does not say its unit is left out, and a
+/// reference is taken to have the position's; what only a person can know becomes a question.
+fn units(
+    logs: &[Log],
+    found: &mut BTreeMap<Role, Chosen>,
+    said: &dyn Fn(Role) -> bool,
+    questions: &mut Vec<String>,
     notes: &mut Vec<String>,
-) -> Result<Unit, Failure> {
-    if let Some(unit) = chosen.unit {
-        return Ok(unit);
+) -> BTreeMap<Role, Unit> {
+    let mut units: BTreeMap<Role, Unit> = BTreeMap::new();
+    let roles: Vec<Role> = found.keys().copied().collect();
+    for role in roles {
+        let chosen = &found[&role];
+        let from = column(logs, chosen);
+        if let Some(unit) = chosen.unit.or_else(|| own_unit(role, &from.name, &from.values, notes)) {
+            units.insert(role, unit);
+            continue;
+        }
+        let position = units.get(&Role::Position).copied();
+        match role {
+            Role::Reference if position.is_some() => {
+                notes.push(format!("{} has no unit: taken to have the position's", from.name));
+                units.extend(position.map(|unit| (role, unit)));
+            }
+            Role::Reference | Role::Tilt | Role::Force if !said(role) => {
+                notes.push(format!(
+                    "{} left out: it does not say its unit; {} takes it as the {role}",
+                    from.name,
+                    roles::option(role, &from.name, Some("UNIT"))
+                ));
+                found.remove(&role);
+            }
+            _ => questions.push(format!(
+                "the {role} column {} does not say its unit; say it with {}, in {}",
+                from.name,
+                roles::option(role, &from.name, Some("UNIT")),
+                usual_units(role)
+            )),
+        }
     }
-    let plain = |quantity| Ok(Unit { quantity, factor: 1.0 });
-    let whole = values.iter().filter(|x| x.is_finite()).all(|x| x.fract() == 0.0);
-    let example = match role {
+    units
+}
+
+/// The unit of a column that does not say it, where it follows from the role or the values.
+fn own_unit(role: Role, name: &str, values: &[f64], notes: &mut Vec<String>) -> Option<Unit> {
+    let plain = |quantity| Some(Unit { quantity, factor: 1.0 });
+    let whole = || values.iter().filter(|x| x.is_finite()).all(|x| x.fract() == 0.0);
+    let counts =
+        |word: &String| ["count", "counts", "tick", "ticks", "enc", "encoder"].contains(&word.as_str());
+    match role {
         Role::Command => {
-            notes.push(format!("{name} has no unit; --column command={name}:A says it, if it is A"));
-            return plain(Quantity::Plain);
+            notes.push(format!(
+                "{name} has no unit; {} says it, if it is A",
+                roles::option(Role::Command, name, Some("A"))
+            ));
+            plain(Quantity::Plain)
         }
-        Role::Position | Role::Reference
-            if whole
-                && super::units::words(name)
-                    .iter()
-                    .any(|w| ["counts", "ticks", "enc", "encoder"].contains(&w.as_str())) =>
-        {
-            return plain(Quantity::Counts);
+        Role::Position | Role::Reference if whole() && super::units::words(name).iter().any(counts) => {
+            plain(Quantity::Counts)
         }
+        _ => None,
+    }
+}
+
+fn usual_units(role: Role) -> &'static str {
+    match role {
         Role::Position | Role::Reference => "rad, deg, rev, counts, m or mm",
         Role::Velocity => "rad/s, deg/s, rpm, m/s or mm/s",
         Role::Tilt => "rad or deg",
         Role::Force => "Nm, mNm or N",
         Role::Time => "s, ms, us or ns",
-    };
-    Err(Failure::input(format_args!(
-        "the {role} column {name} does not say its unit; say it with --column {role}={name}:UNIT, in {example}"
-    )))
+        Role::Command => "A, V, Nm or N",
+    }
 }
 
 /// The value of a slower or faster table at each of `times`: the last one before it.

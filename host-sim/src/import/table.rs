@@ -1,7 +1,7 @@
 //! What every reader hands on: tables of numbers with named columns, whatever the file's format.
 
 use super::units::{self, Unit};
-use super::{json, log, npy, text};
+use super::{json, log, mat, npy, text};
 use crate::failure::Failure;
 use std::path::Path;
 
@@ -12,6 +12,8 @@ pub(super) struct Column {
     pub name: String,
     /// Without its unit.
     pub plain: String,
+    /// False where the name was made up, as the file gives none.
+    pub is_named: bool,
     /// From the name, a row of units or the format itself.
     pub unit: Option<Unit>,
     /// One a row.
@@ -23,10 +25,15 @@ impl Column {
     pub(super) fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         let name = name.into();
         let (plain, unit) = units::split_name(&name);
-        Self { name, plain, unit, values }
+        Self { name, plain, is_named: true, unit, values }
     }
 
-    /// Whether it holds any number.
+    /// A column that the file gives no name.
+    pub(super) fn unnamed(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { is_named: false, ..Self::new(name, values) }
+    }
+
+    /// True if it holds any number.
     pub(super) fn has_numbers(&self) -> bool {
         self.values.iter().any(|x| x.is_finite())
     }
@@ -83,14 +90,14 @@ pub(super) fn read(path: &Path) -> Result<Log, Failure> {
     let first = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(0);
     let mut log = if bytes.starts_with(mcap::MAGIC) {
         log::read(&file, &bytes)?
-    } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x93NUMPY") {
+    } else if let Some(advice) = unread(&bytes) {
+        return Err(Failure::input(format_args!("{file}: is {advice}")));
+    } else if bytes.starts_with(ZIP) || bytes.starts_with(b"\x93NUMPY") {
         npy::read(&file, bytes)?
+    } else if bytes.starts_with(b"MATLAB 5.0") {
+        mat::read(&file, &bytes)?
     } else if bytes.starts_with(b"PAR1") {
         parquet(&file, bytes)?
-    } else if let Some(what) = foreign(&bytes) {
-        return Err(Failure::input(format_args!(
-            "{file}: is {what}; save it as CSV, .npz, JSON, MCAP or Parquet first"
-        )));
     } else if matches!(first, b'{' | b'[')
         && (ending.contains("json") || text::decode(&bytes).trim_end().ends_with(['}', ']']))
     {
@@ -110,16 +117,42 @@ pub(super) fn read(path: &Path) -> Result<Log, Failure> {
     Ok(log)
 }
 
-/// Formats that are known by their first bytes and not read.
-fn foreign(bytes: &[u8]) -> Option<&'static str> {
+const ZIP: &[u8] = b"PK\x03\x04";
+
+/// What a file of a known format that is not read is, and how to make one that is.
+fn unread(bytes: &[u8]) -> Option<&'static str> {
+    const WORKBOOK: &str = "an Excel workbook; save its sheet as CSV (File, Save As, CSV UTF-8), with one row of names above the numbers";
+    let holds = |name: &[u8]| bytes.windows(name.len()).any(|window| window == name);
+    if bytes.starts_with(ZIP) {
+        return match () {
+            () if holds(b"xl/workbook.") => Some(WORKBOOK),
+            () if bytes[..bytes.len().min(200)].windows(11).any(|w| w == b"opendocumen") => {
+                Some("an OpenDocument file; save its sheet as CSV (File, Save As, Text CSV)")
+            }
+            () if holds(b".npy") => None,
+            () => Some("a zip archive without NumPy arrays; unpack it and give the files in it"),
+        };
+    }
     [
-        (&b"\x89HDF"[..], "an HDF5 file (MATLAB 7.3 files are too)"),
-        (b"MATLAB 5.0", "a MATLAB .mat file"),
-        (b"#ROSBAG", "a ROS 1 bag"),
-        (b"SQLite format 3", "an SQLite file, as a ROS 2 bag is"),
-        (b"\x1f\x8b", "compressed with gzip"),
-        (b"\xd0\xcf\x11\xe0", "an old Excel file"),
-        (b"ARROW1", "an Arrow or Feather file"),
+        (
+            &b"MATLAB 7.3"[..],
+            "a MATLAB file of -v7.3, which is HDF5; save it again with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
+        ),
+        (
+            b"\x89HDF",
+            "an HDF5 file, as MATLAB's -v7.3 is; save it again from MATLAB with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
+        ),
+        (
+            b"#ROSBAG",
+            "a ROS 1 bag; make an MCAP file of it with rosbags-convert --src FILE --dst OUT --dst-storage mcap (pip install rosbags)",
+        ),
+        (
+            b"SQLite format 3",
+            "an SQLite file, as older ROS 2 bags are; make an MCAP file of it with rosbags-convert --src BAG --dst OUT --dst-storage mcap (pip install rosbags)",
+        ),
+        (b"\x1f\x8b", "compressed with gzip; unpack it with gunzip first"),
+        (b"\xd0\xcf\x11\xe0", WORKBOOK),
+        (b"ARROW1", "an Arrow or Feather file; write it as Parquet or CSV"),
     ]
     .into_iter()
     .find_map(|(magic, what)| bytes.starts_with(magic).then_some(what))

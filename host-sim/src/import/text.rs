@@ -126,6 +126,9 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
         }
     }
     let Layout { separator, count } = layout(&lines);
+    if let Some(log) = channels_in_rows(file, &lines, separator, count) {
+        return Ok(log);
+    }
     let numeric = |line: &str| {
         let row = fields(line, separator);
         let numbers = row.iter().filter(|f| number(f, separator).is_some()).count();
@@ -171,8 +174,12 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
     let columns = names
         .into_iter()
         .zip(columns)
-        .map(|((name, unit), values)| {
-            let mut column = Column::new(name, values);
+        .enumerate()
+        .map(|(i, ((name, unit), values))| {
+            let mut column = match name {
+                Some(name) => Column::new(name, values),
+                None => Column::unnamed(format!("column{}", i + 1), values),
+            };
             column.unit = unit.or(column.unit);
             column
         })
@@ -180,11 +187,50 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
     Ok(Log { file: file.to_owned(), tables: vec![Table { name: file.to_owned(), columns }], notes })
 }
 
+/// More rows than this are rows.
+const MOST_CHANNELS: usize = 64;
+/// So many times as many values as rows make them channels.
+const LONGER_THAN_MANY: usize = 8;
+
+/// A table whose rows are the channels, each with its name, and perhaps its unit, before its values.
+fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count: usize) -> Option<Log> {
+    if lines.len() > MOST_CHANNELS || count < LONGER_THAN_MANY * lines.len().max(4) {
+        return None;
+    }
+    let mut columns = Vec::new();
+    for (_, line) in lines {
+        let row: Vec<&str> =
+            fields(line, separator).into_iter().map(|f| f.trim().trim_matches('"').trim()).collect();
+        let words = row.iter().take_while(|f| number(f, separator).is_none()).count();
+        let values: Vec<f64> =
+            row[words..].iter().map(|f| number(f, separator).unwrap_or(f64::NAN)).collect();
+        let numbers = values.iter().filter(|x| x.is_finite()).count();
+        if words > 3 || 2 * numbers < count {
+            continue;
+        }
+        let mut column = match row.first().filter(|_| words > 0) {
+            Some(name) => Column::new(*name, values),
+            None => Column::unnamed(format!("column{}", columns.len() + 1), values),
+        };
+        column.unit = row[..words].iter().skip(1).find_map(|f| units::parse(f)).or(column.unit);
+        columns.push(column);
+    }
+    (columns.len() >= 2).then(|| {
+        let note = format!(
+            "read as text: channels stand in rows, {} of {} values: taken as columns",
+            columns.len(),
+            columns[0].values.len()
+        );
+        Log { notes: vec![note], ..Log::of_columns(file, columns) }
+    })
+}
+
 fn decimal_comma(lines: &[(usize, &str)], separator: char) -> bool {
     separator != ',' && lines.iter().take(SAMPLE).any(|(_, line)| line.contains(','))
 }
 
-type Names = Vec<(String, Option<units::Unit>)>;
+/// Names, none where they are made up, and units of their own.
+type Names = Vec<(Option<String>, Option<units::Unit>)>;
 
 /// The names of the columns with the units of a row of their own: from the lines above the numbers, else from the last comment
 /// of as many words, else made up.
@@ -223,10 +269,10 @@ fn header(
         let by_words: Vec<String> = comment.split_whitespace().map(str::to_owned).collect();
         fitting(comment).or_else(|| (by_words.len() == count).then_some(by_words))
     };
-    let names = names.or_else(from_comment).unwrap_or_else(|| {
+    let Some(names) = names.or_else(from_comment) else {
         notes.push(format!("no header: the columns are called column1 to column{count}"));
-        (1..=count).map(|n| format!("column{n}")).collect()
-    });
+        return vec![(None, None); count];
+    };
     let unit_of = |i: usize| own_units.as_ref().and_then(|u| units::parse(&u[i]));
-    names.into_iter().enumerate().map(|(i, name)| (name, unit_of(i))).collect()
+    names.into_iter().enumerate().map(|(i, name)| (Some(name), unit_of(i))).collect()
 }

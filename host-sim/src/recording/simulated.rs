@@ -62,7 +62,7 @@ fn schema(compared: &Comparison) -> Value {
     json!({
         "type": "object",
         "properties": {
-            "position": number(format!("{position}, from the first row; simulations start anew from the recorded state every 2 s")),
+            "position": number(format!("{position}, from the first row; simulations start anew from the recorded state every 0.5 s")),
             "velocity": number(format!("{velocity}; of simulations, of the free run")),
             "force": number(format!("{force}, inertia times acceleration")),
         },

@@ -1,6 +1,6 @@
 """Writes the same short recording as other programs write it, into the folder given.
 
-pip install numpy==2.4.6 pandas==3.1.1 pyarrow==26.0.1 mcap==1.6.0; python make.py DIR
+pip install numpy==2.4.6 pandas==3.1.1 pyarrow==26.0.1 mcap==1.6.0 scipy==1.17.1 rosbags==0.11.9 openpyxl==3.1.5; python make.py DIR
 
 The motion is one that tests/import.rs knows: 2.5 s at 200 rows a second, an angle of 0.8·sin(2π·0.9·t) + 0.3·sin(2π·2.3·t) rad
 under a torque of 0.4·cos(2π·0.9·t) N·m.
@@ -9,11 +9,18 @@ under a torque of 0.4·cos(2π·0.9·t) N·m.
 import io
 import json
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as BagWriter
+from rosbags.typesys import Stores, get_typestore
+from scipy.io import savemat
 
 out = Path(sys.argv[1])
 t = np.arange(500) / 200.0
@@ -77,3 +84,57 @@ pd.DataFrame({"t": rest, "enc": pad(counts), "u_v": pad(u)}).to_csv(out / "rest.
 half = len(t) // 2
 for name, part in [("first", slice(0, half)), ("second", slice(half, None))]:
     pd.DataFrame({"t": t[part], "enc": counts[part], "u_v": u[part]}).to_csv(out / f"{name}.csv", index=False)
+
+# MATLAB's version 5 by SciPy: vectors beside a text and a scalar, compressed; a structure with a matrix whose rows are channels.
+savemat(out / "vectors.mat", {"t": t, "q_rad": q, "tau_Nm": u.astype(np.float32), "note": "bench", "mass": 0.4}, do_compression=True)
+log = {"time": t.reshape(-1, 1), "signals": {"values": np.vstack([q, u, np.round(1000 * q)])}}
+savemat(out / "structure.mat", {"log": log}, oned_as="column")
+
+# A ROS 2 bag by rosbags: joint states of two joints.
+store = get_typestore(Stores.ROS2_HUMBLE)
+JointState, Header, Time = (store.types[name] for name in ["sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"])
+with tempfile.TemporaryDirectory() as folder:
+    bag = Path(folder) / "bag"
+    with BagWriter(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+        for a, b, c, d in zip(t, q, v, u):
+            stamp = 1_700_000_000_000_000_000 + round(a * 1e9)
+            header = Header(stamp=Time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="base")
+            message = JointState(header=header, name=["wrist", "elbow"], position=np.array([b, -b]), velocity=np.array([c, -c]), effort=np.array([d, 0.0]))
+            writer.write(connection, stamp, store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
+    (out / "ros2-bag").mkdir(exist_ok=True)
+    (out / "ros2-bag/metadata.yaml").write_bytes((bag / "metadata.yaml").read_bytes())
+    (out / "ros2-bag/bag.mcap").write_bytes((bag / "bag.mcap").read_bytes())
+
+# A LeRobot dataset: two episodes in a file, lists of fixed length, their names in meta/info.json.
+dataset = out / "lerobot"
+(dataset / "meta").mkdir(parents=True, exist_ok=True)
+(dataset / "data/chunk-000").mkdir(parents=True, exist_ok=True)
+joints = ["wrist.pos", "elbow.pos"]
+feature = lambda names: {"dtype": "float32", "shape": [len(names)], "names": names}
+features = {"action": feature(joints), "observation.state": feature(joints), "observation.effort": feature(["wrist.torque"])}
+info = {"codebase_version": "v3.0", "fps": 200, "features": features}
+(dataset / "meta/info.json").write_text(json.dumps(info))
+lists = lambda *columns: pa.FixedSizeListArray.from_arrays(pa.array(np.column_stack(columns).ravel(), pa.float32()), len(columns))
+twice = lambda column: np.concatenate([column, column])
+table = pa.table({
+    "observation.state": lists(twice(q), -twice(q)),
+    "observation.effort": lists(twice(u)),
+    "action": lists(twice(q), twice(q)),
+    "timestamp": pa.array(twice(t), pa.float32()),
+    "frame_index": pa.array(twice(np.arange(500))),
+    "episode_index": pa.array(np.repeat([0, 1], 500)),
+})
+pa.parquet.write_table(table, dataset / "data/chunk-000/file-000.parquet")
+
+# What a spreadsheet saves.
+pd.DataFrame({"t": t[:20], "theta_deg": q[:20], "u": u[:20]}).to_excel(out / "sheet.xlsx", index=False)
+
+# Channels in rows, and a table without a header.
+rows = [["time", "s", *t], ["theta", "deg", *np.degrees(q)], ["torque", "Nm", *u]]
+(out / "rows.csv").write_text("\n".join(";".join(x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows) + "\n")
+(out / "matrix.json").write_text(json.dumps([[round(x, 9) for x in row.tolist()] for row in (t, q, u)]))
+np.savetxt(out / "bare.txt", np.column_stack([t, q, u]), fmt="%.7g")
+# The same two columns in two files: an angle in one, a torque in the other.
+pd.DataFrame({"time": t, "value": np.degrees(q)}).to_csv(out / "angle.csv", index=False, float_format="%.9g")
+pd.DataFrame({"time": t, "value": u}).to_csv(out / "torque.csv", index=False, float_format="%.9g")

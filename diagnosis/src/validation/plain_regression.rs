@@ -1,0 +1,158 @@
+//! A plain regression of what a model leaves on what was recorded: speed, its sign, travel, angle, and the command a little
+//! earlier. A mismatch is called random only where none of them predicts it on recordings that it was not fitted to.
+
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::force_residual::Estimator;
+use crate::numerics::linear::{Factor, Square};
+use crate::thresholds::SURE_Z;
+use crate::validation::residuals::{Residuals, relative_gain};
+
+/// Part of the mean square of what is left that a regression must predict on held-out recordings.
+const PREDICTS: f64 = 0.1;
+/// Delays of the command that are tried, s.
+const DELAYS_S: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.08];
+/// Factor between the sizes of a delay by the recorded command and by the one that the motion asks for.
+const SAME_SIZE: f64 = 2.0;
+
+/// Recordings with what a model leaves on them and the drive's force, per block.
+pub(crate) struct Left<'a> {
+    tracks: &'a [BlockedRecording],
+    residual: &'a [Vec<f64>],
+    force: &'a [Vec<f64>],
+    moving: Vec<Vec<bool>>,
+}
+
+impl<'a> Left<'a> {
+    /// What the patched model leaves.
+    pub(crate) fn new(tracks: &'a [BlockedRecording], of: &'a Residuals, estimator: &Estimator) -> Self {
+        let moving = tracks.iter().map(|track| estimator.moving(track)).collect();
+        Self { tracks, residual: &of.patched, force: &of.force, moving }
+    }
+}
+
+/// Columns of a regression: per recording, per column, per block.
+type Columns = Vec<Vec<Vec<f64>>>;
+
+/// What predicts most of what is left on the held-out recordings, as a noun phrase, and what part of it; none where nothing does.
+pub(crate) fn follows(fit: &Left, holdout: &Left, estimator: &Estimator) -> Option<(&'static str, f64)> {
+    let predicted = |columns: &dyn Fn(&Left) -> Columns, is_possible: &dyn Fn(&[f64]) -> bool| {
+        let theta = solve(fit, &columns(fit))?;
+        is_possible(&theta).then(|| gain(holdout, &columns(holdout), &theta, estimator)).flatten()
+    };
+    // A disturbance that accelerates the axis goes along with its speed, and friction against it.
+    let against = |theta: &[f64]| theta[0] < 0.0;
+    let any = |_: &[f64]| true;
+    let turn =
+        |left: &Left| of_motion(left, &|track, j| vec![track.motion.x[j].sin(), track.motion.x[j].cos()]);
+    let all: [(&'static str, Option<f64>); 4] = [
+        (
+            "a force against the motion in proportion to speed, as viscous friction is,",
+            predicted(&|left| of_motion(left, &|track, j| vec![track.motion.v[j]]), &against),
+        ),
+        (
+            "a force against the motion of one size, as dry friction is,",
+            predicted(&|left| of_motion(left, &|track, j| vec![track.motion.v[j].signum()]), &against),
+        ),
+        (
+            "a force along the travel",
+            predicted(
+                &|left| of_motion(left, &|track, j| vec![track.motion.x[j], track.motion.x[j].powi(2)]),
+                &any,
+            ),
+        ),
+        ("a force once per turn", predicted(&turn, &any)),
+    ];
+    let delayed =
+        delay(fit, holdout, estimator).map(|part| ("a command that acts later than it is recorded", part));
+    let all = all.into_iter().filter_map(|(what, part)| Some((what, part?))).chain(delayed);
+    all.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Columns of the motion, block by block.
+fn of_motion(left: &Left, of: &dyn Fn(&BlockedRecording, usize) -> Vec<f64>) -> Columns {
+    let one = |track: &BlockedRecording| {
+        let rows: Vec<Vec<f64>> = (0..track.block_count()).map(|j| of(track, j)).collect();
+        let count = rows.first().map_or(0, Vec::len);
+        (0..count).map(|k| rows.iter().map(|row| row[k]).collect()).collect()
+    };
+    left.tracks.iter().map(one).collect()
+}
+
+/// The part that the best delay of the command predicts. Under feedback the command follows the disturbance, and without it the
+/// motion does: only what both the recorded command and the one that the motion asks for show is a delay.
+fn delay(fit: &Left, holdout: &Left, estimator: &Estimator) -> Option<f64> {
+    let later = |left: &Left, seconds: f64| -> Columns {
+        shifted(left, seconds, |force, _, j, by| force[j.saturating_sub(by)] - force[j])
+    };
+    let asked = |left: &Left, seconds: f64| -> Columns {
+        shifted(left, seconds, |force, residual, j, by| {
+            let at = |j: usize| force[j] + residual[j];
+            at(j) - at((j + by).min(force.len() - 1))
+        })
+    };
+    let of = |seconds: f64| {
+        let (by_command, by_motion) = (solve(fit, &later(fit, seconds))?, solve(fit, &asked(fit, seconds))?);
+        let ratio = by_command[0] / by_motion[0];
+        if !(ratio > 1.0 / SAME_SIZE && ratio < SAME_SIZE && by_command[0] > 0.0) {
+            return None;
+        }
+        let command = gain(holdout, &later(holdout, seconds), &by_command, estimator)?;
+        let motion = gain(holdout, &asked(holdout, seconds), &by_motion, estimator)?;
+        Some(command.min(motion))
+    };
+    DELAYS_S.into_iter().filter_map(of).max_by(f64::total_cmp)
+}
+
+fn shifted(left: &Left, seconds: f64, of: impl Fn(&[f64], &[f64], usize, usize) -> f64) -> Columns {
+    let all = left.tracks.iter().zip(left.force).zip(left.residual);
+    all.map(|((track, force), residual)| {
+        let by = (seconds * track.block_rate()).round().max(1.0) as usize;
+        vec![(0..force.len()).map(|j| of(force, residual, j, by)).collect()]
+    })
+    .collect()
+}
+
+/// A column less its mean over the rows that move: each recording has an offset of its own.
+fn centred(column: &[f64], moving: &[bool]) -> Vec<f64> {
+    let (sum, n) = column
+        .iter()
+        .zip(moving)
+        .filter(|(_, moves)| **moves)
+        .fold((0.0, 0.0), |(sum, n), (x, _)| (sum + x, n + 1.0));
+    let mean = if n > 0.0 { sum / n } else { 0.0 };
+    column.iter().map(|x| x - mean).collect()
+}
+
+/// Least squares of what is left on the columns, over all recordings; none where the columns do not change.
+fn solve(left: &Left, columns: &Columns) -> Option<Vec<f64>> {
+    let count = columns.first()?.len();
+    let (mut information, mut score) = (Square::zero(count), vec![0.0; count]);
+    for ((columns, residual), moving) in columns.iter().zip(left.residual).zip(&left.moving) {
+        let columns: Vec<Vec<f64>> = columns.iter().map(|column| centred(column, moving)).collect();
+        let residual = centred(residual, moving);
+        for j in (0..residual.len()).filter(|j| moving[*j]) {
+            for i in 0..count {
+                score[i] += columns[i][j] * residual[j];
+                for k in 0..count {
+                    information.add(i, k, columns[i][j] * columns[k][j]);
+                }
+            }
+        }
+    }
+    let theta = Factor::new(&information).solve(&score);
+    (theta.iter().all(|x| x.is_finite()) && theta.iter().any(|x| *x != 0.0)).then_some(theta)
+}
+
+/// Part of the mean square of what is left that coefficients predict; none where that is not sure or is little.
+fn gain(left: &Left, columns: &Columns, theta: &[f64], estimator: &Estimator) -> Option<f64> {
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for ((columns, residual), moving) in columns.iter().zip(left.residual).zip(&left.moving) {
+        let residual = centred(residual, moving);
+        let columns: Vec<Vec<f64>> = columns.iter().map(|column| centred(column, moving)).collect();
+        let predicted = |j: usize| columns.iter().zip(theta).map(|(column, x)| x * column[j]).sum::<f64>();
+        after.push((0..residual.len()).map(|j| residual[j] - predicted(j)).collect());
+        before.push(residual);
+    }
+    let gain = relative_gain(estimator, left.tracks, &before, &after);
+    (gain.sum >= PREDICTS && gain.low > 0.0 && gain.z >= SURE_Z).then_some(gain.sum)
+}
