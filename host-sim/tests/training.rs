@@ -256,7 +256,7 @@ fn the_papers_are_reproduced_each_on_its_own_law() {
         "Fig. 5",
         "opposite direction",
         "at 0.65 of the law's",
-        "1.60 N and 0.00 N",
+        "1.59 N and 0.00 N",
         "<svg",
     ] {
         assert!(sparte.contains(words), "{words} is not on the page of 002");

@@ -186,7 +186,7 @@ pub struct Hypothesis {
 pub struct Untested {
     /// The effect.
     pub name: EffectName,
-    /// What it would need.
+    /// The reason, with what a recording would need.
     pub because: String,
 }
 
@@ -217,10 +217,10 @@ pub struct Report {
     pub verdict: Verdict,
     /// The verdict in one sentence that a technician understands.
     pub sentence: String,
-    /// How much remains against the sensor's noise, a clause.
+    /// A clause: the residual compared with the sensor's noise.
     #[serde(default)]
     pub remains: String,
-    /// What to record next, a clause.
+    /// A clause: the recording to make next.
     #[serde(default)]
     pub record_next: String,
     /// Effects left out, the largest first.

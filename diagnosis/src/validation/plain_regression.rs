@@ -23,7 +23,7 @@ pub(crate) struct Left<'a> {
 }
 
 impl<'a> Left<'a> {
-    /// What the patched model leaves.
+    /// The residual of the patched model.
     pub(crate) fn new(tracks: &'a [BlockedRecording], of: &'a Residuals, estimator: &Estimator) -> Self {
         let moving = tracks.iter().map(|track| estimator.moving(track)).collect();
         Self { tracks, residual: &of.patched, force: &of.force, moving }
@@ -33,7 +33,8 @@ impl<'a> Left<'a> {
 /// Columns of a regression: per recording, per column, per block.
 type Columns = Vec<Vec<Vec<f64>>>;
 
-/// What predicts most of what is left on the held-out recordings, as a noun phrase, and what part of it; none where nothing does.
+/// Returns the best predictor of the residual on the held-out recordings, as a noun phrase, and the share that it predicts; none if
+/// nothing does.
 pub(crate) fn follows(fit: &Left, holdout: &Left, estimator: &Estimator) -> Option<(&'static str, f64)> {
     let predicted = |columns: &dyn Fn(&Left) -> Columns, is_possible: &dyn Fn(&[f64]) -> bool| {
         let theta = solve(fit, &columns(fit))?;

@@ -62,7 +62,7 @@ impl Diagnose {
     }
 }
 
-/// What the report was made from.
+/// Describes the report's sources.
 fn made(request: &Request) -> Made {
     let all =
         std::iter::once(&request.rig).chain(&request.fit).chain(&request.holdout).chain(&request.effects);

@@ -56,6 +56,9 @@ pub fn is_rise(piece: usize) -> bool {
 /// Parts of a piece in which its points are taken together.
 const PARTS: usize = 64;
 
+/// The points of the last part of a piece count this often: the force at which a layer gives way is felt more than the way to it.
+const PEAK_WEIGHT: f64 = 8.0;
+
 /// The points of one cell, laid over one another.
 #[derive(Clone, Debug)]
 pub struct Overlaid {
@@ -105,12 +108,13 @@ impl Overlaid {
         let (mut diagonal, mut upper, mut right) =
             (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);
         let total: f64 = self.pieces[piece].iter().map(|part| part.count).sum();
-        for part in self.pieces[piece].iter().filter(|part| part.count > 0.0) {
+        for (place, part) in self.pieces[piece].iter().enumerate().filter(|(_, part)| part.count > 0.0) {
             let (left, share) = between(knots, part.share / part.count);
-            let (near, far) = (1.0 - share, share);
-            diagonal[left] += part.count * near * near;
-            diagonal[left + 1] += part.count * far * far;
-            upper[left] += part.count * near * far;
+            let weight = if place + 1 == PARTS { PEAK_WEIGHT } else { 1.0 };
+            let (near, far) = (weight * (1.0 - share), weight * share);
+            diagonal[left] += part.count * near * (1.0 - share);
+            diagonal[left + 1] += part.count * far * share;
+            upper[left] += part.count * near * share;
             right[left] += near * part.force;
             right[left + 1] += far * part.force;
         }

@@ -77,7 +77,7 @@ fn paper_001_condition_4_two_degrees_of_freedom() {
 #[test]
 fn paper_001_condition_5_initial_slope_and_its_range() {
     let adult = profile("adult");
-    assert_eq!(adult.entry_rad.to_degrees(), 30.0, "the initial slope is the patient's");
+    assert!((adult.entry_rad.to_degrees() - 30.0).abs() < 1e-9, "the initial slope is the patient's");
     // It is adjusted within a range, and refused outside.
     let refused = [4.0, 5.0, 90.0, 91.0].map(|deg| profile("adult").at_angle(deg).is_err());
     assert_eq!(refused, [true, false, false, true]);
@@ -186,7 +186,8 @@ fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
     let begin = bench.seen.len();
     bench.rest(20.0);
     assert!((bench.tip_mm() - place_mm).abs() < 0.05, "it went from {place_mm} to {} mm", bench.tip_mm());
-    assert!((bench.now().given_n - force_n).abs() < 0.03, "from {force_n} to {} N", bench.now().given_n);
+    // Every four seconds the device asks a needle without a count for one; dry friction then keeps a few hundredths of a newton.
+    assert!((bench.now().given_n - force_n).abs() < 0.06, "from {force_n} to {} N", bench.now().given_n);
     let resting = &bench.seen[begin..];
     assert!(resting.iter().all(|s| s.state == State::Friction), "it reads as resting in tissue");
 }
