@@ -192,7 +192,8 @@ impl Watch {
         let middle = self.count(SPAN_LOOKS);
         let speed = self.count(0).wrapping_sub(middle);
         self.gained = speed.wrapping_sub(middle.wrapping_sub(self.count(2 * SPAN_LOOKS)));
-        if !self.still_gains() {
+        // Fewer counts are no acceleration anyway.
+        if self.gained.unsigned_abs() >= LEAST_COUNTS.unsigned_abs() && !self.still_gains() {
             self.gained = 0;
         }
         (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)

@@ -31,13 +31,16 @@ const RISE: I2F30 = I2F30::from_bits(I2F30::ONE.to_bits() / (50 * LOOK_HZ as i32
 /// Looks without torque after which a needle that has not moved is not held by a hand: 10 ms.
 const WITHOUT_TORQUE_LOOKS: u32 = 10 * LOOK_HZ / 1_000;
 
+/// The needle has moved.
+const MOVED: u8 = 1;
+/// It has moved, and not back to where the step before came from.
+const PROGRESSED: u8 = 2;
+
 /// The watch with its memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stillness {
-    /// The needle has moved since the last look.
-    has_moved: bool,
-    /// It has moved since the last look, and not back to where the step before came from.
-    has_progressed: bool,
+    /// [`MOVED`] and [`PROGRESSED`] since the last look.
+    moves: u8,
     /// Looks with torque since the last count.
     since_count: u32,
     /// Looks with torque since the last count that did not go back to where the one before came from.
@@ -49,14 +52,7 @@ pub(crate) struct Stillness {
 
 impl Default for Stillness {
     fn default() -> Self {
-        Self {
-            has_moved: false,
-            has_progressed: false,
-            since_count: 0,
-            since_progress: 0,
-            taken: I2F30::ZERO,
-            without_torque: 0,
-        }
+        Self { moves: 0, since_count: 0, since_progress: 0, taken: I2F30::ZERO, without_torque: 0 }
     }
 }
 
@@ -64,32 +60,29 @@ impl Stillness {
     /// Takes a step of the needle; `is_back` if it went back to where the step before came from. Called in every tick with a step.
     #[inline]
     pub(crate) fn step(&mut self, is_back: bool) {
-        self.has_moved = true;
-        self.has_progressed |= !is_back;
+        self.moves |= if is_back { MOVED } else { MOVED | PROGRESSED };
     }
 
     /// Returns true if the needle has got on since the last look and all of the torque is given: then there is nothing to look at.
     #[inline]
     pub(crate) fn is_moving(&self) -> bool {
-        self.has_progressed && !self.is_asking()
+        self.moves & PROGRESSED != 0 && !self.is_asking()
     }
 
     /// Begins anew, as after a step of the needle that got on.
     #[inline]
     pub(crate) fn forget(&mut self) {
-        (self.has_moved, self.has_progressed) = (false, false);
-        (self.since_count, self.since_progress) = (0, 0);
+        (self.moves, self.since_count, self.since_progress) = (0, 0, 0);
     }
 
     /// Takes a look; `is_loaded` if the torque that the law asks for would move a needle that nobody holds. Called in one tick
     /// of [`LOOK_TICKS`].
     pub(crate) fn look(&mut self, is_loaded: bool) {
-        let (has_moved, has_progressed) = (self.has_moved, self.has_progressed);
-        (self.has_moved, self.has_progressed) = (false, false);
+        let moves = core::mem::take(&mut self.moves);
         // They never wrap: long before, the needle is in doubt.
         let next = |looks: u32, begins_anew: bool| if begins_anew { 0 } else { looks.wrapping_add(1) };
-        self.since_count = next(self.since_count, has_moved || !is_loaded);
-        self.since_progress = next(self.since_progress, has_progressed || !is_loaded);
+        self.since_count = next(self.since_count, moves & MOVED != 0 || !is_loaded);
+        self.since_progress = next(self.since_progress, moves & PROGRESSED != 0 || !is_loaded);
     }
 
     /// Returns true if the encoder is in doubt, without asking it.

@@ -104,11 +104,11 @@ impl<B: Board> Tick<B> {
         self.watch_supervisor();
         self.take_order();
         self.shared.stages.note(Stage::TickToDac, to_dac);
-        if to_dac >= timing::OUTPUT_CYCLES && self.width == DacWidth::Bits12 {
-            self.late_code();
-        }
         self.shared.reports.alive(Task::Tick);
         self.watch_time(entered);
+        if to_dac >= timing::OUTPUT_CYCLES {
+            self.late_code();
+        }
     }
 
     /// At most one order a tick, so that a storm of them costs no more than one.
@@ -176,8 +176,10 @@ impl<B: Board> Tick<B> {
     /// Counts a code that came after the converter's instant. One by itself is a delay of a tick; many make a wall softer than it
     /// is calculated to be, so they are counted, sent to the PC and shown.
     #[cold]
+    #[inline(never)]
     fn late_code(&self) {
-        if self.is_saving() {
+        // The eight-bit converter has no such instant.
+        if self.is_saving() || self.width == DacWidth::Bits8 {
             return;
         }
         self.shared.late_codes.store(self.shared.late_codes.load(Relaxed).saturating_add(1), Relaxed);
