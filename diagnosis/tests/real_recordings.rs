@@ -51,8 +51,9 @@ fn emps_names_dry_friction_then_direction_or_did_not_run() {
     }
 }
 
+/// The ripple of the ball screw is there (it gains hundreds of nats on the held-out recording) but takes less than 5 % off the force error.
 #[test]
-fn emps_ripple_of_2_5_mm_is_found_where_friction_is_known_or_did_not_run() {
+fn emps_ripple_is_seen_but_not_material_or_did_not_run() {
     let Some(dir) = shared("emps") else { return };
     let mut rig = Rig::read(&dir.join("rig.toml")).expect("the rig is usable");
     rig.model.coulomb = Some(20.39);
@@ -64,12 +65,12 @@ fn emps_ripple_of_2_5_mm_is_found_where_friction_is_known_or_did_not_run() {
     println!("{}", outcome.summary());
     // A ball screw that was never seen to let go.
     assert!(!names(&outcome).contains(&EffectName::RollerSlip));
-    let cogging = outcome.report.effects.iter().find(|e| e.name == EffectName::Cogging);
-    let cogging = cogging.expect("the ripple is named");
-    let period = cogging.parameters["period"].value;
-    assert!((period - 0.0025).abs() < 2e-5, "{period} m");
-    let amplitude = cogging.parameters["amplitude_1"].value;
-    assert!((0.8..1.3).contains(&amplitude), "{amplitude} N");
+    assert!(!names(&outcome).contains(&EffectName::Cogging));
+    let cogging = outcome.report.hypotheses.iter().find(|h| h.name == EffectName::Cogging);
+    let cogging = cogging.expect("it was tested");
+    assert!(cogging.holdout_gain.is_some_and(|nats| nats > 100.0), "{:?} nats", cogging.holdout_gain);
+    let why = cogging.rejected_because.as_deref().expect("it is not named");
+    assert!(why.contains("less than the 5 %"), "{why}");
 }
 
 #[test]
