@@ -1,6 +1,6 @@
 //! From insertions at several speeds and angles to the force table of seed 000, and how good it is on insertions that it has not seen.
 //!
-//! [`insertions`] reads recordings, [`falls`], [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may
+//! [`insertions`] reads recordings, [`mod@falls`], [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may
 //! not run a device, and it takes a force as it was measured, whoever measured it. What is judged is the table that is written.
 
 pub mod curve;
