@@ -64,7 +64,7 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
         "a refusal with its reason",
         SOON,
         "document.getElementById('patient-answer').dataset.tone === 'bad' && \
-         document.getElementById('patient-answer').textContent.includes('Friction is -5')",
+         document.getElementById('patient-answer').textContent.includes('friction_n_per_mm is -5')",
     )?;
     page.photograph(&scratch.join("patient.png"))?;
     page.evaluate(&edit("0.03"))?;
