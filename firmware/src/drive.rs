@@ -170,14 +170,18 @@ mod tests {
 
     #[test]
     fn a_code_put_while_off_leaves_the_amplifier_off() {
-        let writes = RefCell::new(vec![]);
-        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
-        drive.apply(DacWidth::Bits12, &output(true, 2050));
-        writes.take();
-        drive.put_while_off(DacCode(1));
-        let off = [Write::Enable(false), Write::Twelve(2048), Write::Eight(128)];
-        assert_eq!(writes.take(), [off.as_slice(), &[Write::Twelve(1)]].concat());
-        assert!(!drive.is_enabled());
+        for (code, powered) in [(1, true), (4095, true), (4095, false)] {
+            let writes = RefCell::new(vec![]);
+            let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
+            if powered {
+                drive.apply(DacWidth::Bits12, &output(true, 2050));
+            }
+            writes.take();
+            drive.put_while_off(DacCode(code));
+            let off = [Write::Enable(false), Write::Twelve(2048), Write::Eight(128)];
+            assert_eq!(writes.take(), [off.as_slice(), &[Write::Twelve(code)]].concat());
+            assert!(!drive.is_enabled());
+        }
     }
 
     #[test]
@@ -187,17 +191,6 @@ mod tests {
         writes.take();
         drive.apply(DacWidth::Bits8, &output(true, 130));
         assert_eq!(writes.take(), [Write::Eight(130), Write::Enable(true)]);
-    }
-
-    #[test]
-    fn a_code_for_the_test_of_the_board_goes_out_with_the_amplifier_off() {
-        let writes = RefCell::new(vec![]);
-        let mut drive = Drive::new(Twelve(&writes), ParallelDac(Bus(&writes)), Pin(&writes));
-        writes.take();
-        drive.put_while_off(DacCode(4095));
-        let writes = writes.take();
-        assert_eq!(writes.last(), Some(&Write::Twelve(4095)));
-        assert!(writes.contains(&Write::Enable(false)) && !writes.contains(&Write::Enable(true)));
     }
 
     #[test]

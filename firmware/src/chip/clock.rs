@@ -40,10 +40,13 @@ pub(super) fn start(rcc: RCC, source: Source) -> Rcc {
 /// for the revision too).
 fn wait_for_flash() {
     const FIRST_REVISION: u16 = 0x1000;
+    // The first revision gives itself out as an STM32F2 (errata sheet, "MCU device ID is incorrect").
+    const DEVICE_OF_FIRST_REVISION: u16 = 0x411;
     // SAFETY: start-up has the part to itself; the HAL is done with the register, and the identity is only read.
     let (flash, identity) = unsafe { (&*FLASH::ptr(), (&*DBGMCU::ptr()).idcode().read()) };
-    let can_prefetch = identity.rev_id().bits() != FIRST_REVISION;
-    flash.acr().modify(|_, w| w.latency().ws6().prften().bit(can_prefetch));
+    let is_first =
+        identity.rev_id().bits() == FIRST_REVISION || identity.dev_id().bits() == DEVICE_OF_FIRST_REVISION;
+    flash.acr().modify(|_, w| w.latency().ws6().prften().bit(!is_first));
 }
 
 /// Has the clock security watch the clock from outside once it runs. One that never comes leaves the device here, its pins inputs

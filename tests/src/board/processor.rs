@@ -113,8 +113,8 @@ pub struct Tally {
     masked_at: u32,
     /// The output that is shorted to the supply, which the part reads back.
     pub(super) shorted: Option<PartPin>,
-    /// The part's revision, where it is to be another one (`REV_ID`, RM0090 38.6.1).
-    pub revision: Option<u16>,
+    /// The part's identity, if it is to be another one (`DBGMCU_IDCODE`, RM0090 38.6.1).
+    pub identity: Option<u32>,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -340,9 +340,9 @@ impl Probed {
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let flash = self.flash.clone();
-        let (shorted, revision) = {
+        let (shorted, identity) = {
             let tally = self.probe.tally();
-            (tally.shorted, tally.revision)
+            (tally.shorted, tally.identity)
         };
         let mut bus = Rerouted {
             bus,
@@ -350,7 +350,7 @@ impl Processor for Probed {
             stalled: self.stalled,
             standstill: 0,
             shorted,
-            revision,
+            identity,
             code_written: false,
             stepping: false,
         };
@@ -462,7 +462,7 @@ struct Rerouted<'a> {
     /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
     standstill: u64,
     shorted: Option<PartPin>,
-    revision: Option<u16>,
+    identity: Option<u32>,
     /// True if a code was written to the converter since somebody asked.
     code_written: bool,
     /// True if the core is inspected after every instruction.
@@ -498,8 +498,8 @@ impl CoreBus for Rerouted<'_> {
             access.virtual_time = self.bus.time(access.instruction_count);
         }
         let value = self.bus.access(access, from_code)?;
-        if let Some(revision) = self.revision.filter(|_| !written && address == DBGMCU_IDCODE) {
-            return Some(value & 0xFFFF | u64::from(revision) << 16);
+        if let Some(identity) = self.identity.filter(|_| !written && address == DBGMCU_IDCODE) {
+            return Some(identity.into());
         }
         let high = self.shorted.filter(|place| !written && access.address == place.register(register::INPUT));
         Some(high.map_or(value, |place| value | 1 << place.index))
