@@ -7,6 +7,7 @@ mod json;
 mod log;
 mod mat;
 mod npy;
+mod npy_array;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod roles;
