@@ -1,10 +1,10 @@
 //! The virtual device for a while, as `run` drives it, and a hash (FNV-1a) of every byte that it sent: what the same device
 //! in a browser has to equal. `device_digest PROFILE TICKS`.
 
-use host_sim::device::virtual_device::VirtualDevice;
-use host_sim::driver::{Driver, Request};
-use host_sim::procedure::Procedure;
-use host_sim::profile::Profile;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::driver::{Driver, Request};
+use device_sim::procedure::Procedure;
+use device_sim::profile::Profile;
 use link::codec::MAX_FRAME;
 use std::time::Duration;
 

@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p host-sim --example plant_speed`
 
-use host_sim::device::virtual_device::VirtualDevice;
-use host_sim::procedure::Procedure;
-use host_sim::profile::Profile;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::procedure::Procedure;
+use device_sim::profile::Profile;
 use std::time::Instant;
 
 /// A minute of the device.

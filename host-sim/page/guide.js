@@ -1,5 +1,5 @@
 // The guide's page: says what comes next, and begins a step when the person says so. The program does the work and waits for it.
-// What it says stands in host-sim/src/guide.rs.
+// What it says stands in host-sim/server/src/guide.rs.
 
 import { Link } from "./link.js";
 

@@ -1,5 +1,5 @@
 // Practice: records, shows the verdict after each withdrawal, the attempts with what was better or worse than the best so far, and the
-// learning curve. The server judges; see host-sim/src/practice.rs.
+// learning curve. The server judges; see host-sim/training/src/practice.rs.
 
 import { LearningCurve } from "./learning_curve.js";
 import { number } from "./panel.js";

@@ -2,42 +2,10 @@
 //! behind functions of plain numbers and JSON texts. The page without a server (`cargo xtask site`) runs it in place of the
 //! WebSocket; `page/link.js` is the other side and speaks the same messages.
 //!
-//! The modules below are host-sim's own files, not copies: what a browser has no use for (sockets, files, serial ports) stays
-//! out, and what is left gives the same bits as there, which `cargo xtask test site` checks.
+//! The device itself is the crate `device-sim`, as host-sim has it: it gives the same bits here as there, which
+//! `cargo xtask test site` checks.
 //!
 //! The names are exported as they stand, which the language counts as unsafe; there is no other unsafe code.
-
-// Parts of host-sim's files are for its other users.
-#![allow(dead_code, unreachable_pub)]
-
-#[path = "../../host-sim/src/driver.rs"]
-pub mod driver;
-#[path = "../../host-sim/src/failure.rs"]
-pub mod failure;
-#[path = "../../host-sim/src/library.rs"]
-pub mod library;
-#[path = "../../host-sim/src/plant/mod.rs"]
-pub mod plant;
-#[path = "../../host-sim/src/procedure.rs"]
-pub mod procedure;
-#[path = "../../host-sim/src/profile/mod.rs"]
-pub mod profile;
-#[path = "../../host-sim/src/session/mod.rs"]
-pub mod session;
-
-/// The virtual device.
-#[path = "../../host-sim/src/device"]
-pub mod device {
-    pub mod grip;
-    pub mod virtual_device;
-}
-
-/// The messages to the page, and the reduction of samples at 10 kHz to pictures.
-#[path = "../../host-sim/src/visualizer"]
-pub mod visualizer {
-    pub mod condense;
-    pub mod messages;
-}
 
 pub mod simulation;
 

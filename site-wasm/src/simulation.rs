@@ -1,19 +1,16 @@
 //! The virtual device, the PC's side of its link and what the page is told, in one thread and without a clock.
 
-use crate::device::virtual_device::VirtualDevice;
-use crate::driver::{Driver, Request};
-use crate::failure::Failure;
-use crate::procedure::Procedure;
-use crate::profile::Profile;
-use crate::session::{self, Control, Publisher, Session, Source, Subscription};
-use crate::visualizer::condense::Condenser;
-use crate::visualizer::messages::{FromPage, Hand, ToPage};
-use link::codec::MAX_FRAME;
-use link::frames::DeviceFrame;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::driver::{Driver, Request};
+use device_sim::failure::Failure;
+use device_sim::lockstep;
+use device_sim::page::condense::Condenser;
+use device_sim::page::messages::{FromPage, Hand, ToPage};
+use device_sim::procedure::Procedure;
+use device_sim::profile::Profile;
+use device_sim::session::{self, Control, Publisher, Session, Source, Subscription};
 use std::time::Duration;
 
-/// Ticks between two exchanges with the device, as host-sim's station has them.
-const LOCKSTEP_TICKS: u64 = 10;
 /// The procedure that the scripted hand follows.
 const PROCEDURE: &str = "venepuncture";
 
@@ -57,9 +54,8 @@ impl Simulation {
     /// Moves time on, as host-sim's station does it with a virtual device.
     pub fn advance(&mut self, ticks: u64) {
         let end = self.device.ticks() + ticks;
-        let mut bytes = [0; MAX_FRAME];
         while self.device.ticks() < end {
-            let now = Duration::from_micros(self.device.ticks() * 100);
+            let now = lockstep::time(self.device.ticks());
             while let Some(control) = self.publisher.next_control() {
                 self.control(control);
             }
@@ -68,18 +64,17 @@ impl Simulation {
                 self.driver.request(Request::Start);
             }
             self.device.receive(self.driver.transmit(now));
-            for _ in 0..LOCKSTEP_TICKS {
+            for _ in 0..lockstep::TICKS {
                 self.device.tick();
             }
-            loop {
-                let count = self.device.transmit(&mut bytes);
-                if count == 0 {
-                    break;
-                }
-                self.digest.take(&bytes[..count]);
-                let publisher = &self.publisher;
-                self.driver.receive(now, &bytes[..count], |frame| publish(publisher, frame));
-            }
+            let Self { device, driver, publisher, digest, .. } = self;
+            lockstep::empty(
+                |frame| device.transmit(frame),
+                |bytes| {
+                    digest.take(bytes);
+                    driver.receive(now, bytes, |frame| publisher.frame(frame));
+                },
+            );
         }
         self.status();
     }
@@ -98,7 +93,7 @@ impl Simulation {
     }
 
     fn status(&self) {
-        let now = Duration::from_micros(self.device.ticks() * 100);
+        let now = lockstep::time(self.device.ticks());
         let counts = self.driver.counts();
         self.publisher.link(|status| {
             status.connected = self.driver.is_ready(now);
@@ -111,27 +106,13 @@ impl Simulation {
         });
     }
 
-    /// Does what the page asks for; what is wrong with it where it asked for nonsense.
+    /// Does what the page asks for, if a device alone can; what is wrong with it where it asked for nonsense.
     pub fn receive(&mut self, text: &str) -> Result<(), String> {
-        let control = match FromPage::parse(text)? {
-            FromPage::Start => Control::Start,
-            FromPage::Stop => Control::Stop,
-            FromPage::Zero => Control::Zero,
-            FromPage::Drag { depth_mm } => {
-                self.person = true;
-                Control::Drag { depth_mm }
-            }
-            FromPage::Demo => {
-                self.person = false;
-                Control::Script
-            }
-            FromPage::Tilt { rad } => Control::Tilt { rad },
-            FromPage::Release => Control::Release,
-            // What only a program beside the page can do.
-            #[allow(unreachable_patterns)]
-            _ => return Ok(()),
-        };
-        self.session.control(control);
+        let message = FromPage::parse(text)?;
+        if let Some(hand) = message.hand() {
+            self.person = hand == Hand::Person;
+        }
+        self.session.control(message.into());
         Ok(())
     }
 
@@ -160,17 +141,6 @@ impl Simulation {
     /// A hash of every byte that the device has sent.
     pub fn digest(&self) -> u64 {
         self.digest.0
-    }
-}
-
-fn publish(publisher: &Publisher, frame: &DeviceFrame) {
-    match frame {
-        DeviceFrame::Hello(hello) => publisher.hello(hello),
-        DeviceFrame::Samples(block) => publisher.samples(block.first_tick, &block.samples),
-        DeviceFrame::Pose(pose) => publisher.pose(*pose),
-        DeviceFrame::Event(event) => publisher.event(*event),
-        DeviceFrame::Timing(timing) => publisher.timing(*timing),
-        DeviceFrame::Ack(_) | DeviceFrame::Device(_) => {}
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::output;
 use clap::Args;
-use host_sim::failure::Failure;
-use host_sim::guide::Guide;
-use host_sim::visualizer::{self, Server};
+use device_sim::failure::Failure;
+use server::guide::Guide;
+use server::visualizer::{self, Server};
 use std::fmt::Display;
 use std::io::BufRead;
 use std::sync::Arc;

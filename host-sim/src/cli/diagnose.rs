@@ -2,8 +2,8 @@
 
 use super::progress::Progress;
 use clap::Args;
+use device_sim::failure::Failure;
 use diagnosis::{Made, Request};
-use host_sim::failure::Failure;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::path::PathBuf;

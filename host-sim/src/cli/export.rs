@@ -1,8 +1,8 @@
 //! `--export`: a rig for other simulators.
 
+use device_sim::failure::Failure;
 use diagnosis::report::exports::{Format, export};
 use diagnosis::rig::Rig;
-use host_sim::failure::Failure;
 use std::path::Path;
 
 /// The formats of `--export`.

@@ -1,8 +1,8 @@
 //! `host-sim fit-force`.
 
 use clap::Args;
-use host_sim::failure::Failure;
-use host_sim::force_fit::{self, Fit, insertions, page, table::Origin, written};
+use device_sim::failure::Failure;
+use lab::force_fit::{self, Fit, insertions, page, table::Origin, written};
 use std::path::{Path, PathBuf};
 
 /// Fit the force table of seed 000, F(depth, speed, angle), to insertions at several speeds and angles.

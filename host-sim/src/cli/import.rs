@@ -1,9 +1,9 @@
 //! `host-sim import`: recordings as people have them, made into what `diagnose` reads.
 
 use clap::Args;
-use host_sim::failure::Failure;
-use host_sim::import::{self, Keep, Known, Request, RigValues};
-use host_sim::shell::quoted;
+use device_sim::failure::Failure;
+use recording::import::{self, Keep, Known, Request, RigValues};
+use recording::shell::quoted;
 use std::path::PathBuf;
 
 /// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.

@@ -19,13 +19,13 @@ mod training;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Parser, Subcommand};
-use host_sim::failure::Failure;
+use device_sim::failure::Failure;
 
 /// The PC side of the needle insertion device: run it (virtual or real), watch it, record it, export and score recordings.
 ///
 /// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
 #[derive(Parser)]
-#[command(version = host_sim::version::version(), after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
+#[command(version = recording::version::version(), after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Cli {
     /// Print results and errors only: no progress, no addresses, no advice
     #[arg(long, short, global = true)]

@@ -2,11 +2,11 @@
 
 use super::run::{serve, stop_on_signals};
 use clap::Args;
-use host_sim::failure::Failure;
-use host_sim::recording::export;
-use host_sim::recording::read::Recording;
-use host_sim::replay::Replay as Player;
-use host_sim::session::{self, Source};
+use device_sim::failure::Failure;
+use device_sim::session::{self, Source};
+use recording::export;
+use recording::read::Recording;
+use server::replay::Replay as Player;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

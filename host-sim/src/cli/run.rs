@@ -6,22 +6,22 @@ use super::progress::Progress;
 use super::streams::StreamFlags;
 use clap::{Args, ValueEnum};
 use control_core::{Device, TICK_HZ};
-use host_sim::bedside::Bedside;
-use host_sim::device::part::DevicePart;
-use host_sim::device::serial::SerialPort;
-use host_sim::device::virtual_device::VirtualDevice;
-use host_sim::driver::Driver;
-use host_sim::failure::Failure;
-use host_sim::outlets::Outlets;
-use host_sim::pace::Pace;
-use host_sim::procedure::Procedure;
-use host_sim::profile::{Model, Profile};
-use host_sim::recording::messages::Setup;
-use host_sim::recording::write::Recorder;
-use host_sim::session::{self, Session, Source};
-use host_sim::station::{Outcome, Station};
-use host_sim::tally::Tally;
-use host_sim::visualizer;
+use device_sim::device::part::DevicePart;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::driver::Driver;
+use device_sim::failure::Failure;
+use device_sim::procedure::Procedure;
+use device_sim::profile::{Model, Profile};
+use device_sim::session::{self, Session, Source};
+use host_sim::serial::SerialPort;
+use recording::messages::Setup;
+use recording::tally::Tally;
+use recording::write::Recorder;
+use server::bedside::Bedside;
+use server::outlets::Outlets;
+use server::pace::Pace;
+use server::station::{Outcome, Station};
+use server::visualizer;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -130,7 +130,7 @@ impl Run {
         let looks = (!self.headless).then(|| session.subscribe());
         let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
         let setup = Setup {
-            program: host_sim::version::program(),
+            program: recording::version::program(),
             source: self.device.clone(),
             profile_toml: profile.source.text.clone(),
             profile_origin: profile.source.origin.clone(),

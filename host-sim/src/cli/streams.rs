@@ -1,9 +1,9 @@
 //! The flags of the live streams.
 
 use clap::Args;
-use host_sim::failure::Failure;
-use host_sim::session::Session;
-use host_sim::streams::{self, Spec, Streams, Token};
+use device_sim::failure::Failure;
+use device_sim::session::Session;
+use server::streams::{self, Spec, Streams, Token};
 
 #[derive(Args)]
 pub(crate) struct StreamFlags {

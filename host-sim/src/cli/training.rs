@@ -2,13 +2,13 @@
 
 use super::recordings::read;
 use clap::Args;
-use host_sim::debrief;
-use host_sim::failure::Failure;
-use host_sim::patients;
-use host_sim::profile::{BUILT_IN, Profile};
-use host_sim::reproduce::{PAPERS, Paper, reproduce};
-use host_sim::score::{Insertion, score};
+use device_sim::failure::Failure;
+use device_sim::patients;
+use device_sim::profile::{BUILT_IN, Profile};
+use reproduce::{PAPERS, Paper, reproduce};
 use std::path::{Path, PathBuf};
+use training::debrief;
+use training::score::{Insertion, score};
 
 /// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle, smoothness.
 ///

@@ -11,9 +11,9 @@ use control_core::units::{Counts, Millimetres, MillimetresPerSecond, Milliradian
 use control_core::{Config, Controller, Device, Order, Patient};
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
-use host_sim::characterise::programme;
-use host_sim::compensate::angle;
-use host_sim::compensate::coefficients::{Found, found};
+use lab::characterise::programme;
+use lab::compensate::angle;
+use lab::compensate::coefficients::{Found, found};
 use link::Command;
 use tests::board::{Board, MILLISECOND, Nanos};
 use tests::mechanism::{Mechanism, SharedMechanism, Way};

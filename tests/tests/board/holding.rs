@@ -4,7 +4,7 @@
 use control_core::event::Fault;
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Device, Order, Patient, Plan, TickInput};
-use host_sim::profile::Profile;
+use device_sim::profile::Profile;
 use link::Command;
 use link::frames::EventKind;
 use tests::board::wires::Wires;

@@ -1,0 +1,14 @@
+//! The tests of the control core from outside, in one program.
+
+mod anatomy;
+mod compensation;
+mod excitations;
+mod laws;
+mod needle;
+mod orders;
+mod protections;
+mod refusals;
+mod sparte;
+mod stability;
+mod twin;
+mod xr;

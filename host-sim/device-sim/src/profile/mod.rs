@@ -1,0 +1,402 @@
+//! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
+//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
+//! refuses is refused here too.
+
+mod goal;
+mod law;
+mod person;
+mod rupture;
+
+use crate::failure::Failure;
+use crate::library::{self, Text};
+use crate::session::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
+use control_core::config::{self, Config, Tissue};
+use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
+use control_core::{Device, Patient, Plan, plan};
+use fixed::types::I16F16;
+use serde::Deserialize;
+
+pub use goal::Goal;
+pub use law::Model;
+use person::Thickness;
+pub use person::{Difficulty, Person, Sex, Site};
+
+/// The profiles that come with the program.
+pub const BUILT_IN: [(&str, &str); 7] = [
+    ("adult", include_str!("../../../profiles/adult.toml")),
+    ("thin-elderly", include_str!("../../../profiles/thin-elderly.toml")),
+    ("high-body-mass", include_str!("../../../profiles/high-body-mass.toml")),
+    ("firm-skin", include_str!("../../../profiles/firm-skin.toml")),
+    ("dorsal-hand", include_str!("../../../profiles/dorsal-hand.toml")),
+    ("shoulder", include_str!("../../../profiles/shoulder.toml")),
+    ("phantom", include_str!("../../../profiles/phantom.toml")),
+];
+
+/// A profile that may run.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    /// Its name.
+    pub name: String,
+    /// Angle of the needle to the skin at entry, in rad.
+    pub entry_rad: f64,
+    /// The device's configuration: its own part and this patient.
+    pub config: Config,
+    /// The same, checked.
+    pub plan: Plan,
+    /// Whom it stands for.
+    pub person: Person,
+    /// The default procedure of a scripted hand.
+    pub procedure: String,
+    /// Layers, by their numbers, that the needle is to spare.
+    pub spared: Vec<u8>,
+    /// The needle's target.
+    goal: Option<goal::Written>,
+    /// The text that it came from, for recordings.
+    pub source: Text,
+}
+
+impl Profile {
+    /// A built-in profile by its name, or a file by its path, for the built-in device.
+    pub fn find(wanted: &str) -> Result<Self, Failure> {
+        Self::find_for(wanted, &Device::commissioned_virtual())
+    }
+
+    /// A built-in profile by its name, or a file by its path, for `device`.
+    pub fn find_for(wanted: &str, device: &Device) -> Result<Self, Failure> {
+        Self::parse_for(library::find("profile", wanted, &BUILT_IN)?, device)
+    }
+
+    /// Checks the text of a profile for the built-in device.
+    pub fn parse(source: Text) -> Result<Self, Failure> {
+        Self::parse_for(source, &Device::commissioned_virtual())
+    }
+
+    /// Checks the text of a profile for `device`.
+    pub fn parse_for(source: Text, device: &Device) -> Result<Self, Failure> {
+        let file: File = library::parse(&source)?;
+        let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
+        if file.format != 1 {
+            return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
+        }
+        check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
+        file.patient.check().map_err(refuse)?;
+        file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
+        let config = Config { device: *device, patient: file.config().map_err(refuse)? };
+        let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
+        let spared =
+            (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
+        Ok(Self {
+            spared: spared.collect(),
+            goal: file.target,
+            procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
+            person: file.patient,
+            name: file.name,
+            entry_rad: file.entry_deg.to_radians(),
+            config,
+            plan,
+            source,
+        })
+    }
+
+    /// Its law of force.
+    pub fn model(&self) -> Model {
+        Model::of(&self.config.patient.law)
+    }
+
+    /// Returns the scene for a picture.
+    pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
+        let ruptures = rupture::ruptures(&self.config.patient, self.entry_rad);
+        let sine = libm::sin(self.entry_rad);
+        let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
+            name: tissue_name(layer.tissue).to_owned(),
+            is_vessel: layer.tissue == Tissue::Vessel,
+            is_far_wall: layer.tissue == Tissue::FarWall,
+            depth_mm: layer.depth.0.to_num(),
+            puncture_travel_mm: match layer.wall {
+                Some(wall) => Some(wall.puncture_travel.0.to_num()),
+                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.below_mm / sine),
+            },
+            spring_back: layer.wall.map(|wall| wall.spring_back.to_num()),
+            puncture_force_n: match layer.wall {
+                Some(wall) => Some(force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
+                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.force_n),
+            },
+            friction_n_per_mm: layer.friction.0.to_num(),
+        });
+        let deepest_mm = self.config.patient.layers.last().map_or(0.0, |layer| layer.depth.0.to_num::<f64>());
+        Scene {
+            hand: source == Source::Virtual,
+            source,
+            profile: self.name.clone(),
+            procedure,
+            layers: layers.collect(),
+            roller_radius_mm: self.config.device.roller_radius.0.to_num(),
+            travel_mm: self.config.device.limits.travel.0.to_num(),
+            largest_force_n: self.plan.largest_force().0.to_num(),
+            force_scale: self.config.patient.scale.to_num(),
+            tilt_rad: self.tilt_rad(),
+            skin_tilt_rad: self.skin_tilt_rad(),
+            vessel: self.vessel(),
+            needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
+        }
+    }
+
+    /// The same patient with another angle to the skin at entry, 5 to 90°.
+    pub fn at_angle(self, degrees: f64) -> Result<Self, Failure> {
+        check_angle("--angle", degrees).map_err(Failure::input)?;
+        Ok(Self { entry_rad: degrees.to_radians(), ..self })
+    }
+
+    /// Returns the name of layer `number`.
+    pub fn layer_name(&self, number: u8) -> Option<String> {
+        let layer = self.config.patient.layers.get(usize::from(number))?;
+        Some(tissue_name(layer.tissue).to_owned())
+    }
+
+    /// Returns the needle's target: that of the file, else the vessel's lumen if there is a vessel.
+    pub fn goal(&self) -> Option<Goal> {
+        goal::goal(self.goal, &self.config.patient, self.entry_rad)
+    }
+
+    /// Inclination of the needle laid on the skin, in rad.
+    pub fn skin_tilt_rad(&self) -> f64 {
+        f64::from(self.config.device.skin_tilt.0) * 1e-3
+    }
+
+    /// Inclination of the needle below the horizontal at entry, in rad.
+    pub fn tilt_rad(&self) -> f64 {
+        self.entry_rad + self.skin_tilt_rad()
+    }
+
+    fn vessel(&self) -> Option<SceneVessel> {
+        let layers = &self.config.patient.layers;
+        let depth_mm = |tissue| {
+            let layer = layers.iter().find(|layer| layer.tissue == tissue)?;
+            Some(layer.depth.0.to_num::<f64>())
+        };
+        let (near, far) = (depth_mm(Tissue::Vessel)?, depth_mm(Tissue::FarWall)?);
+        let shape = self.config.patient.vessel;
+        Some(SceneVessel {
+            axis_mm: (near + far) / 2.0,
+            height_mm: far - near,
+            width_mm: shape.map_or(far - near, |shape| shape.width.0.to_num()),
+            offset_mm: shape.map_or(0.0, |shape| shape.offset.0.to_num()),
+        })
+    }
+}
+
+fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
+    if (5.0..=90.0).contains(&degrees) {
+        Ok(())
+    } else {
+        Err(format!("{key} is {degrees}; it must be from 5 to 90, the angle to the skin"))
+    }
+}
+
+/// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way, where it has one.
+pub fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
+    let wall = layer.wall?;
+    Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
+}
+
+/// `(T − n)²/a + b` of Paper 001, eq. 1, in N; `travel_mm` is T.
+fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
+    let from_vertex = travel_mm - parabola.vertex.0.to_num::<f64>();
+    from_vertex * from_vertex / parabola.compliance.0.to_num::<f64>() + parabola.base.0.to_num::<f64>()
+}
+
+/// The control law names layers by number; a person by what they are.
+fn say(refusal: &plan::Refusal, file: &File) -> String {
+    use plan::Refusal::{
+        BeyondTravel, ContactStep, NoVessel, Overlap, ReliefAboveElastic, TooStiff, TooStrong, WrongWay,
+    };
+    let layer = match *refusal {
+        TooStiff { layer, .. } | TooStrong { layer, .. } | Overlap { layer } | ContactStep { layer, .. } => {
+            layer
+        }
+        WrongWay { layer } | ReliefAboveElastic { layer } | BeyondTravel { layer } | NoVessel { layer } => {
+            layer
+        }
+        _ => return refusal.to_string(),
+    };
+    match file.layer.get(usize::from(layer)) {
+        Some(named) => format!("{refusal} (layer {layer} is {})", tissue_name(named.tissue.into())),
+        None => refusal.to_string(),
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: u32,
+    name: String,
+    entry_deg: f64,
+    /// In N; without it, as much as the device gives.
+    largest_force_n: Option<f64>,
+    /// Share of the law's forces that is given to the hand, where the motor is too weak for them.
+    force_scale: Option<f64>,
+    procedure: Option<String>,
+    #[serde(default)]
+    patient: Person,
+    law: Option<law::Table>,
+    friction: Option<law::Friction>,
+    force_table: Option<law::Forces>,
+    layer: Vec<Layer>,
+    vessel: Option<Vessel>,
+    target: Option<goal::Written>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Vessel {
+    width_mm: f64,
+    #[serde(default)]
+    offset_mm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layer {
+    tissue: TissueName,
+    /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
+    spare: Option<bool>,
+    depth_mm: f64,
+    /// The rule for its thickness; the layers below move with it.
+    thickness: Option<Thickness>,
+    wall: Option<Wall>,
+    /// For the jog law.
+    friction_n_per_mm: Option<f64>,
+    /// For the law of Paper 002.
+    cutting: Option<law::Cut>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum TissueName {
+    Skin,
+    Fat,
+    Muscle,
+    Vessel,
+    Other,
+    Bursa,
+    Tendon,
+    Cartilage,
+    FarWall,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Wall {
+    elastic: Parabola,
+    puncture_mm: f64,
+    relief: Parabola,
+    unload_n_per_mm: f64,
+    /// An assumption where it is left out: nobody gives it.
+    spring_back: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parabola {
+    vertex_mm: f64,
+    compliance_mm2_per_n: f64,
+    base_n: f64,
+}
+
+impl From<TissueName> for Tissue {
+    fn from(name: TissueName) -> Self {
+        match name {
+            TissueName::Skin => Tissue::Skin,
+            TissueName::Fat => Tissue::Fat,
+            TissueName::Muscle => Tissue::Muscle,
+            TissueName::Vessel => Tissue::Vessel,
+            TissueName::Other => Tissue::Other,
+            TissueName::Bursa => Tissue::Bursa,
+            TissueName::Tendon => Tissue::Tendon,
+            TissueName::Cartilage => Tissue::Cartilage,
+            TissueName::FarWall => Tissue::FarWall,
+        }
+    }
+}
+
+/// A decimal number as the control law holds it; one that it cannot hold is refused by name.
+pub(crate) fn fix(key: &str, value: f64) -> Result<I16F16, String> {
+    I16F16::checked_from_num(value)
+        .ok_or_else(|| format!("{key} is {value}; it must be a number between -32768 and 32768"))
+}
+
+impl File {
+    fn config(&self) -> Result<Patient, String> {
+        let mut patient = Patient::default();
+        patient.layers.clear();
+        for (layer, depth_mm) in self.layer.iter().zip(person::depths_mm(&self.layer, &self.patient)?) {
+            patient.layers.push(layer.config(depth_mm)?).map_err(|_| {
+                format!("there are {} layers; at most {} are possible", self.layer.len(), config::MAX_LAYERS)
+            })?;
+        }
+        if let Some(force) = self.largest_force_n {
+            patient.largest_force = Some(Newtons(fix("largest_force_n", force)?));
+        }
+        patient.vessel = match &self.vessel {
+            None => None,
+            Some(vessel) => Some(config::Vessel {
+                width: Millimetres(fix("width_mm", vessel.width_mm)?),
+                offset: Millimetres(fix("offset_mm", vessel.offset_mm)?),
+            }),
+        };
+        if let Some(scale) = self.force_scale {
+            patient.scale = fix("force_scale", scale)?;
+        }
+        patient.law = law::law(
+            self.law.as_ref(),
+            self.friction.as_ref(),
+            self.force_table.as_ref(),
+            &self.layer,
+            &patient.law,
+        )?;
+        Ok(patient)
+    }
+}
+
+impl Layer {
+    fn is_spared(&self) -> bool {
+        self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
+    }
+
+    fn config(&self, depth_mm: f64) -> Result<config::Layer, String> {
+        let wall = self.wall.as_ref().map(|wall| {
+            Ok::<_, String>(config::Wall {
+                elastic: wall.elastic.config()?,
+                puncture_travel: Millimetres(fix("puncture_mm", wall.puncture_mm)?),
+                relief: wall.relief.config()?,
+                unload: Stiffness(fix("unload_n_per_mm", wall.unload_n_per_mm)?),
+                spring_back: match wall.spring_back {
+                    Some(share) => fix("spring_back", share)?,
+                    None => config::SPRING_BACK,
+                },
+            })
+        });
+        Ok(config::Layer {
+            tissue: self.tissue.into(),
+            depth: Millimetres(fix("depth_mm", depth_mm)?),
+            wall: wall.transpose()?,
+            friction: FrictionPerMillimetre(fix(
+                "friction_n_per_mm",
+                self.friction_n_per_mm.unwrap_or_default(),
+            )?),
+        })
+    }
+}
+
+impl Parabola {
+    fn config(&self) -> Result<config::Parabola, String> {
+        Ok(config::Parabola {
+            vertex: Millimetres(fix("vertex_mm", self.vertex_mm)?),
+            compliance: JogCompliance(fix("compliance_mm2_per_n", self.compliance_mm2_per_n)?),
+            base: Newtons(fix("base_n", self.base_n)?),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,390 @@
+//! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what arrives, in batches, and
+//! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
+
+mod scene;
+mod told;
+
+pub use scene::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, state_name, tissue_name, vessel_name};
+pub use told::{
+    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, RecordingStatus,
+    ReplayStatus,
+};
+
+use control_core::controller::Sample;
+use link::frames::{DeviceFrame, Event, Hello, Pose, Timing};
+use serde_json::Value;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak, mpsc};
+
+/// Samples that wait for a slow subscriber: 2 s.
+const WAITING_SAMPLES: usize = 20_000;
+/// Poses that wait for a slow subscriber: 2 s.
+const WAITING_POSES: usize = 2_000;
+/// Events that wait for a slow subscriber, and that a new one is told of.
+const WAITING_EVENTS: usize = 256;
+
+/// A running device as the visualizer sees it. Cheap to clone.
+#[derive(Clone)]
+pub struct Session {
+    hub: Arc<Hub>,
+}
+
+/// One looker's place in the stream; dropped, it is forgotten.
+pub struct Subscription {
+    buffer: Arc<Mutex<Buffer>>,
+    hub: Arc<Hub>,
+}
+
+/// The other end: whoever runs the device publishes and takes controls here.
+pub struct Publisher {
+    hub: Arc<Hub>,
+    controls: mpsc::Receiver<Control>,
+}
+
+struct Hub {
+    scene: Mutex<Scene>,
+    state: Mutex<HubState>,
+    controls: mpsc::Sender<Control>,
+}
+
+#[derive(Default)]
+struct HubState {
+    subscribers: Vec<Weak<Mutex<Buffer>>>,
+    hello: Option<Hello>,
+    timing: Option<Timing>,
+    last_pose: Option<Pose>,
+    events: VecDeque<Happening>,
+    link: LinkStatus,
+    jumps: u64,
+    patient: Option<PatientStatus>,
+    practice: Option<Value>,
+    attempts: Vec<Value>,
+}
+
+#[derive(Default)]
+struct Buffer {
+    scene: Option<Scene>,
+    patient: Option<PatientStatus>,
+    practice: Option<Value>,
+    attempts: Vec<Value>,
+    hello: Option<Hello>,
+    samples: VecDeque<(u64, Sample)>,
+    poses: VecDeque<Pose>,
+    events: VecDeque<Happening>,
+    timing: Option<Timing>,
+    skipped_samples: u64,
+    jumps: u64,
+}
+
+/// A session and the end that feeds it.
+pub fn open(scene: Scene) -> (Session, Publisher) {
+    let (sender, receiver) = mpsc::channel();
+    let hub = Arc::new(Hub { scene: Mutex::new(scene), state: Mutex::default(), controls: sender });
+    (Session { hub: hub.clone() }, Publisher { hub, controls: receiver })
+}
+
+/// A looker that panicked must not take the device with it: its data is still whole.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Appends, dropping the oldest beyond `limit`; returns how many were dropped. A jump may have left more than `limit` waiting, which
+/// then stays that long until it is read.
+fn append<T: Clone>(queue: &mut VecDeque<T>, new: &[T], limit: usize) -> u64 {
+    let limit = limit.max(queue.len());
+    queue.extend(new.iter().cloned());
+    let excess = queue.len().saturating_sub(limit);
+    queue.drain(..excess);
+    excess as u64
+}
+
+/// Tells the events after `pose` of it.
+fn teach(events: &mut VecDeque<Happening>, pose: &Pose) {
+    events.iter_mut().rev().take_while(|h| h.event.tick > pose.tick).for_each(|h| h.learn(pose));
+}
+
+impl Session {
+    /// A new looker; it is told the last hello and the last events at once. Any number may look.
+    pub fn subscribe(&self) -> Subscription {
+        let mut state = lock(&self.hub.state);
+        let buffer = Arc::new(Mutex::new(Buffer {
+            scene: Some(lock(&self.hub.scene).clone()),
+            patient: state.patient.clone(),
+            practice: state.practice.clone(),
+            attempts: state.attempts.clone(),
+            hello: state.hello.clone(),
+            timing: state.timing,
+            events: state.events.clone(),
+            jumps: state.jumps,
+            ..Buffer::default()
+        }));
+        state.subscribers.push(Arc::downgrade(&buffer));
+        Subscription { buffer, hub: self.hub.clone() }
+    }
+
+    /// Asks for something; never blocks. What the device refuses is said in [`LinkStatus::notice`].
+    pub fn control(&self, control: Control) {
+        // Where the device's side is gone there is nobody to ask.
+        let _ = self.hub.controls.send(control);
+    }
+
+    /// Returns the scene for a picture before anything moves.
+    pub fn scene(&self) -> Scene {
+        lock(&self.hub.scene).clone()
+    }
+}
+
+impl Subscription {
+    /// All since the last drain; never blocks for long. A slow looker loses the oldest, and the loss is counted.
+    pub fn drain(&mut self) -> Batch {
+        let taken = {
+            let mut buffer = lock(&self.buffer);
+            let jumps = buffer.jumps;
+            std::mem::replace(&mut *buffer, Buffer { jumps, ..Buffer::default() })
+        };
+        let mut link = lock(&self.hub.state).link.clone();
+        // With the samples of the new place, not with the last ones of the old.
+        link.replay.iter_mut().for_each(|replay| replay.jumps = taken.jumps);
+        Batch {
+            scene: taken.scene,
+            patient: taken.patient,
+            practice: taken.practice,
+            attempts: taken.attempts,
+            hello: taken.hello,
+            samples: taken.samples.into(),
+            poses: taken.poses.into(),
+            events: taken.events.into(),
+            timing: taken.timing,
+            link,
+            skipped_samples: taken.skipped_samples,
+        }
+    }
+}
+
+impl Publisher {
+    /// The next thing that a person asked for.
+    pub fn next_control(&self) -> Option<Control> {
+        self.controls.try_recv().ok()
+    }
+
+    /// Publishes a frame of the device. Its answers and its configuration are not published.
+    pub fn frame(&self, frame: &DeviceFrame) {
+        match frame {
+            DeviceFrame::Hello(hello) => self.hello(hello),
+            DeviceFrame::Samples(block) => self.samples(block.first_tick, &block.samples),
+            DeviceFrame::Pose(pose) => self.pose(*pose),
+            DeviceFrame::Event(event) => self.event(*event),
+            DeviceFrame::Timing(timing) => self.timing(*timing),
+            DeviceFrame::Ack(_) | DeviceFrame::Device(_) => {}
+        }
+    }
+
+    /// Samples, the first of them at `first_tick`, the others following without a gap.
+    pub fn samples(&self, first_tick: u64, samples: &[Sample]) {
+        let numbered: Vec<_> = (first_tick..).zip(samples.iter().copied()).collect();
+        self.each(|buffer| {
+            buffer.skipped_samples += append(&mut buffer.samples, &numbered, WAITING_SAMPLES);
+        });
+    }
+
+    /// A pose. An event overtakes the poses of its own millisecond: the last ones may still learn from it.
+    pub fn pose(&self, pose: Pose) {
+        {
+            let mut state = lock(&self.hub.state);
+            state.last_pose = Some(pose);
+            teach(&mut state.events, &pose);
+        }
+        self.each(|buffer| {
+            append(&mut buffer.poses, &[pose], WAITING_POSES);
+            teach(&mut buffer.events, &pose);
+        });
+    }
+
+    /// An event.
+    pub fn event(&self, event: Event) {
+        let mut happening = Happening { event, before: None };
+        {
+            let mut state = lock(&self.hub.state);
+            state.last_pose.iter().for_each(|pose| happening.learn(pose));
+            append(&mut state.events, &[happening], WAITING_EVENTS);
+        }
+        self.each(|buffer| {
+            append(&mut buffer.events, &[happening], WAITING_EVENTS);
+        });
+    }
+
+    /// A hello: who speaks from now on.
+    pub fn hello(&self, hello: &Hello) {
+        lock(&self.hub.state).hello = Some(hello.clone());
+        self.each(|buffer| buffer.hello = Some(hello.clone()));
+    }
+
+    /// Time has jumped: what waits for lookers, and what happened, is that of another place; this comes instead, however long.
+    pub fn jump(&self, samples: &[(u64, Sample)], poses: &[Pose], events: &[Event]) {
+        let mut happenings: VecDeque<_> =
+            events.iter().map(|event| Happening { event: *event, before: None }).collect();
+        poses.iter().for_each(|pose| teach(&mut happenings, pose));
+        {
+            let mut state = lock(&self.hub.state);
+            state.events = happenings.clone();
+            state.last_pose = poses.last().copied();
+            state.jumps += 1;
+        }
+        self.each(|buffer| {
+            buffer.jumps += 1;
+            buffer.samples = samples.iter().copied().collect();
+            buffer.poses = poses.iter().copied().collect();
+            buffer.events = happenings.clone();
+        });
+    }
+
+    /// Another tissue is simulated from now on: what happened to the old one is no longer shown.
+    pub fn scene(&self, scene: &Scene) {
+        *lock(&self.hub.scene) = scene.clone();
+        lock(&self.hub.state).events.clear();
+        self.each(|buffer| {
+            buffer.scene = Some(scene.clone());
+            buffer.events.clear();
+        });
+    }
+
+    /// Whom the needle goes into, and what became of the last wish.
+    pub fn patient(&self, patient: &PatientStatus) {
+        lock(&self.hub.state).patient = Some(patient.clone());
+        self.each(|buffer| buffer.patient = Some(patient.clone()));
+    }
+
+    /// Sets the practised goal that insertions are judged by, as JSON.
+    pub fn practice(&self, practice: &Value) {
+        lock(&self.hub.state).practice = Some(practice.clone());
+        self.each(|buffer| buffer.practice = Some(practice.clone()));
+    }
+
+    /// An insertion that has ended, with its verdict, as JSON. A new looker is told of all of them.
+    pub fn attempt(&self, attempt: &Value) {
+        lock(&self.hub.state).attempts.push(attempt.clone());
+        self.each(|buffer| buffer.attempts.push(attempt.clone()));
+    }
+
+    /// Times of the stages.
+    pub fn timing(&self, timing: Timing) {
+        lock(&self.hub.state).timing = Some(timing);
+        self.each(|buffer| buffer.timing = Some(timing));
+    }
+
+    /// Changes the state of the link.
+    pub fn link(&self, change: impl FnOnce(&mut LinkStatus)) {
+        change(&mut lock(&self.hub.state).link);
+    }
+
+    fn each(&self, mut act: impl FnMut(&mut Buffer)) {
+        lock(&self.hub.state).subscribers.retain(|subscriber| {
+            subscriber.upgrade().is_some_and(|buffer| {
+                act(&mut lock(&buffer));
+                true
+            })
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::frames::EventKind;
+
+    fn scene() -> Scene {
+        Scene {
+            source: Source::Virtual,
+            profile: "adult".into(),
+            procedure: None,
+            layers: Vec::new(),
+            roller_radius_mm: 10.0,
+            travel_mm: 60.0,
+            largest_force_n: 2.88,
+            force_scale: 1.0,
+            tilt_rad: 0.0,
+            skin_tilt_rad: 0.0,
+            vessel: None,
+            needle: SceneNeedle::reaching(15.6),
+            hand: true,
+        }
+    }
+
+    #[test]
+    fn a_slow_looker_loses_the_oldest_and_is_told_how_many() {
+        let (session, publisher) = open(scene());
+        let (mut slow, mut quick) = (session.subscribe(), session.subscribe());
+        let block = [Sample::default(); 32];
+        let mut seen = 0;
+        for block_number in 0..1_000 {
+            publisher.samples(block_number * 32, &block);
+            seen += quick.drain().samples.len();
+        }
+        assert_eq!(seen, 32_000);
+        let late = slow.drain();
+        assert_eq!((late.samples.len(), late.skipped_samples), (20_000, 12_000));
+        assert_eq!(late.samples.first().map(|s| s.0), Some(12_000));
+        assert_eq!(slow.drain().samples.len(), 0);
+    }
+
+    #[test]
+    fn what_comes_after_a_jump_drops_none_of_it() {
+        let (session, publisher) = open(scene());
+        let mut looker = session.subscribe();
+        let poses: Vec<_> = (0..10_000).map(|ms| Pose { tick: ms * 10, ..Pose::default() }).collect();
+        let samples: Vec<_> = (0..100_000).map(|tick| (tick, Sample::default())).collect();
+        publisher.jump(&samples, &poses, &[]);
+        publisher.pose(Pose { tick: 100_000, ..Pose::default() });
+        publisher.samples(100_000, &[Sample::default()]);
+        let batch = looker.drain();
+        assert!(batch.poses.len() >= 10_000 && batch.samples.len() >= 100_000);
+        assert!(batch.poses[0].tick <= 10, "the ten seconds before are there");
+    }
+
+    #[test]
+    fn late_subscribers_get_the_same_state_and_dropped_ones_go() {
+        let (session, publisher) = open(scene());
+        let mut early = session.subscribe();
+        let pose = |tick| publisher.pose(Pose { tick, ..Pose::default() });
+        let event = |tick| publisher.event(Event { tick, kind: EventKind::Puncture { layer: 0 } });
+        pose(10);
+        // It overtakes the pose of its millisecond, and the pose of its own tick is from after the drop.
+        event(30);
+        pose(20);
+        pose(30);
+        event(90_000);
+        let told = |batch: &Batch| -> Vec<_> {
+            batch.events.iter().map(|h| (h.event.tick, h.before.map(|pose| pose.tick))).collect()
+        };
+        let seen = told(&early.drain());
+        assert_eq!(seen, [(30, Some(20)), (90_000, None)]);
+        drop(early);
+        pose(40);
+        assert!(lock(&session.hub.state).subscribers.is_empty());
+        let batch = session.subscribe().drain();
+        assert_eq!(told(&batch), seen);
+        assert!(batch.poses.is_empty());
+    }
+
+    #[test]
+    fn poses_of_a_restarted_device_do_not_change_earlier_events() {
+        let (session, publisher) = open(scene());
+        publisher.pose(Pose { tick: 490, ..Pose::default() });
+        publisher.event(Event { tick: 500, kind: EventKind::Stopped });
+        publisher.pose(Pose::default());
+        let events = session.subscribe().drain().events;
+        assert_eq!(events[0].before.map(|pose| pose.tick), Some(490));
+    }
+
+    #[test]
+    fn controls_arrive_in_order_and_outlive_their_device() {
+        let (session, publisher) = open(scene());
+        session.control(Control::Start);
+        session.control(Control::Drag { depth_mm: 3.0 });
+        assert_eq!(publisher.next_control(), Some(Control::Start));
+        assert_eq!(publisher.next_control(), Some(Control::Drag { depth_mm: 3.0 }));
+        assert_eq!(publisher.next_control(), None);
+        drop(publisher);
+        session.control(Control::Stop);
+    }
+}

@@ -1,0 +1,215 @@
+//! Plays one programme on whatever device answers: asks for a step, waits until it has been played, asks for the next, and
+//! keeps every sample. A fault, a refusal or a lost sample ends it: a recording with a hole is no recording.
+
+use super::programme::{Programme, Step};
+use super::written::Track;
+use control_core::controller::Sample;
+use control_core::event::{Fault, State};
+use control_core::excitation::Reference;
+use control_core::{Config, TICK_HZ};
+use device_sim::driver::{Driver, Request};
+use device_sim::failure::Failure;
+use link::frames::{DeviceFrame, EventKind, SampleBlock};
+use recording::messages::Hello;
+use std::time::Duration;
+
+/// A step that has been asked for begins within this.
+const TO_BEGIN: Duration = Duration::from_secs(2);
+/// A device that is there answers within this.
+const TO_ANSWER: Duration = Duration::from_secs(5);
+
+/// The phase of the measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// Waiting until the device has taken its configuration.
+    Greeting { since: Duration },
+    /// Step `index` has been asked for.
+    Asked { index: usize, since: Duration },
+    /// Step `index` is played.
+    Playing { index: usize, since: Duration },
+    /// All steps are done.
+    Over,
+}
+
+/// Plays one programme.
+pub struct Conductor<'a> {
+    driver: Driver,
+    programme: &'a Programme,
+    phase: Phase,
+    now: Duration,
+    hello: Option<Hello>,
+    mm_per_count: f64,
+    samples: Vec<Sample>,
+    reference: Vec<f64>,
+    following: Option<(Reference, f64)>,
+    next_tick: Option<u64>,
+    failure: Option<Failure>,
+}
+
+impl<'a> Conductor<'a> {
+    /// Nothing is connected yet.
+    pub fn new(config: Config, programme: &'a Programme) -> Self {
+        Self {
+            driver: Driver::new(config.patient),
+            programme,
+            phase: Phase::Greeting { since: Duration::ZERO },
+            now: Duration::ZERO,
+            hello: None,
+            mm_per_count: f64::NAN,
+            samples: Vec::new(),
+            reference: Vec::new(),
+            following: None,
+            next_tick: None,
+            failure: None,
+        }
+    }
+
+    /// A connection is open.
+    pub fn connected(&mut self, now: Duration) {
+        self.now = now;
+        self.phase = Phase::Greeting { since: now };
+        self.driver.connected(now);
+    }
+
+    /// Returns the bytes to send now; calls `begins` for every step that is requested.
+    pub fn transmit(&mut self, now: Duration, mut begins: impl FnMut(&Step)) -> &[u8] {
+        self.now = now;
+        match self.phase {
+            Phase::Greeting { .. } if self.driver.is_ready(now) && self.hello.is_some() => {
+                self.ask(0, &mut begins);
+            }
+            Phase::Greeting { since } if now.saturating_sub(since) > TO_ANSWER => {
+                self.fail("the device did not answer; check that it runs this project's firmware");
+            }
+            Phase::Asked { index, since } if now.saturating_sub(since) > TO_BEGIN => {
+                self.fail(format_args!("the device did not begin step {}; restart it", index + 1));
+            }
+            _ => {}
+        }
+        if let Some(refused) = self.driver.refused().map(str::to_owned) {
+            self.fail(refused);
+        }
+        if let Phase::Playing { index, .. } = self.phase
+            && self.samples.last().is_some_and(|s| s.state == State::Idle as u8)
+        {
+            if index + 1 < self.programme.steps.len() {
+                self.ask(index + 1, &mut begins);
+            } else {
+                self.phase = Phase::Over;
+            }
+        }
+        self.driver.transmit(now)
+    }
+
+    /// Torque off now; what to send for it.
+    pub fn stop(&mut self, now: Duration) -> &[u8] {
+        self.driver.request(Request::Stop);
+        self.driver.transmit(now)
+    }
+
+    /// Takes bytes.
+    pub fn receive(&mut self, now: Duration, bytes: &[u8]) {
+        let mut frames = Vec::new();
+        self.driver.receive(now, bytes, |frame| frames.push(frame.clone()));
+        for frame in frames {
+            self.frame(&frame);
+        }
+    }
+
+    /// The step that is played, and since when.
+    pub fn playing(&self) -> Option<(&Step, Duration)> {
+        match self.phase {
+            Phase::Playing { index, since } => Some((&self.programme.steps[index], since)),
+            _ => None,
+        }
+    }
+
+    /// Seconds recorded.
+    pub fn played_s(&self) -> f64 {
+        self.samples.len() as f64 / f64::from(TICK_HZ)
+    }
+
+    /// True if there is nothing left to do.
+    pub fn is_over(&self) -> bool {
+        self.phase == Phase::Over || self.failure.is_some()
+    }
+
+    /// The recording, or why there is none.
+    pub fn finish(self) -> Result<Track, Failure> {
+        if let Some(failure) = self.failure {
+            return Err(failure);
+        }
+        let Some(hello) = self.hello else {
+            return Err(Failure::failed("the device did not identify itself; restart it"));
+        };
+        Ok(Track { file: self.programme.file, hello, samples: self.samples, reference: self.reference })
+    }
+
+    fn ask(&mut self, index: usize, begins: &mut impl FnMut(&Step)) {
+        let step = &self.programme.steps[index];
+        begins(step);
+        self.driver.request(Request::Excite(step.excitation.clone()));
+        self.phase = Phase::Asked { index, since: self.now };
+    }
+
+    fn fail(&mut self, why: impl std::fmt::Display) {
+        self.failure.get_or_insert_with(|| Failure::failed(why));
+    }
+
+    fn frame(&mut self, frame: &DeviceFrame) {
+        match frame {
+            DeviceFrame::Hello(hello) => {
+                self.mm_per_count = hello.mm_per_count.to_num();
+                self.hello = Some(Hello::from(hello));
+            }
+            DeviceFrame::Samples(block) => self.block(block),
+            DeviceFrame::Event(event) => {
+                if let EventKind::Fault { cause } = event.kind {
+                    self.fault(cause);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn fault(&mut self, cause: Fault) {
+        self.fail(format_args!("{cause}; see that nothing holds the roller and characterise again"));
+    }
+
+    fn block(&mut self, block: &SampleBlock) {
+        let recording = matches!(self.phase, Phase::Asked { .. } | Phase::Playing { .. });
+        if recording && self.next_tick.is_some_and(|next| next != block.first_tick) {
+            self.fail("samples were lost on the way; close other programs and characterise again");
+        }
+        self.next_tick = Some(block.first_tick + block.samples.len() as u64);
+        for sample in &block.samples {
+            self.sample(sample);
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample) {
+        let is_played = sample.state == State::Excitation as u8;
+        if let (true, Phase::Asked { index, .. }) = (is_played, self.phase) {
+            self.phase = Phase::Playing { index, since: self.now };
+            let reference = Reference::new(&self.programme.steps[index].excitation.signal);
+            // It begins where the motor was one tick earlier.
+            let begin = self.samples.last().map_or(sample.count, |last| last.count);
+            self.following = Some((reference, f64::from(begin)));
+        }
+        if !is_played {
+            self.following = None;
+        }
+        if self.phase == Phase::Over || (self.samples.is_empty() && !is_played) {
+            return;
+        }
+        let reference = match &mut self.following {
+            Some((reference, begin)) => {
+                *begin + reference.tick().position.0.to_num::<f64>() / self.mm_per_count
+            }
+            // Between two steps torque is off and nothing is followed.
+            None => self.reference.last().copied().unwrap_or(f64::from(sample.count)),
+        };
+        self.samples.push(*sample);
+        self.reference.push(reference);
+    }
+}

@@ -1,0 +1,126 @@
+//! `characterise`: makes a device run excitations that separate one physical effect from another, with no hand on the
+//! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
+
+pub mod conductor;
+pub mod mechanism;
+pub mod programme;
+pub mod written;
+
+use conductor::Conductor;
+use control_core::Config;
+use device_sim::device::{Port, Wire};
+use device_sim::failure::Failure;
+use device_sim::lockstep;
+use link::device::{Endpoint, Identity};
+use mechanism::BareDevice;
+use programme::{Programme, Step};
+use recording::messages::Hello;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use written::Track;
+
+/// The longest single wait for a real device.
+const PATIENCE: Duration = Duration::from_millis(2);
+
+/// The control configuration for characterising: no tissue matters, encoder and torque limits as they are.
+pub fn configuration() -> Config {
+    Config::commissioned_virtual()
+}
+
+/// The scale of a device that is configured with `config`.
+pub fn scale(config: &Config) -> Result<Hello, Failure> {
+    let plan = config.plan().map_err(Failure::failed)?;
+    let device = Endpoint::new(Identity::VIRTUAL, &plan, None);
+    Ok(Hello::from(&device.hello()))
+}
+
+/// The progress that a caller is shown meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub enum News<'a> {
+    /// A recording begins.
+    Recording(&'a Programme),
+    /// A person has something to do during the step that begins now.
+    Prompt(&'a str),
+    /// Seconds played of this recording.
+    Played(f64),
+}
+
+/// Records every programme on the virtual device. The clock is the device's: it takes as long as the computing does.
+pub fn on_virtual(
+    device: &mut BareDevice,
+    programmes: &[Programme],
+    mut news: impl FnMut(News),
+) -> Result<Vec<Track>, Failure> {
+    let mut tracks = Vec::new();
+    for programme in programmes {
+        news(News::Recording(programme));
+        let mut conductor = Conductor::new(configuration(), programme);
+        conductor.connected(lockstep::time(device.ticks()));
+        while !conductor.is_over() {
+            let now = lockstep::time(device.ticks());
+            device.receive(conductor.transmit(now, |step: &Step| {
+                device_tilt(step, &mut news);
+            }));
+            for _ in 0..lockstep::TICKS {
+                let tilt = conductor.playing().map_or(0.0, |(step, since)| step.tilt_at(now - since));
+                device.tick(tilt);
+            }
+            lockstep::empty(|frame| device.transmit(frame), |bytes| conductor.receive(now, bytes));
+            news(News::Played(conductor.played_s()));
+        }
+        tracks.push(conductor.finish()?);
+    }
+    Ok(tracks)
+}
+
+fn device_tilt(step: &Step, news: &mut impl FnMut(News)) {
+    if let Some(prompt) = step.prompt {
+        news(News::Prompt(prompt));
+    }
+}
+
+/// Records every programme on the device behind `port`, in real time. A cable that is pulled ends it.
+pub fn on_port(
+    port: &mut dyn Port,
+    programmes: &[Programme],
+    stop: &AtomicBool,
+    mut news: impl FnMut(News),
+) -> Result<Vec<Track>, Failure> {
+    let gone = |cause: std::io::Error| {
+        Failure::failed(format_args!("the device went away ({cause}); plug it in and characterise again"))
+    };
+    let mut wire: Box<dyn Wire> = port.open().map_err(gone)?;
+    let mut bytes = vec![0; 1 << 14];
+    let begin = Instant::now();
+    let mut tracks = Vec::new();
+    for programme in programmes {
+        news(News::Recording(programme));
+        let mut conductor = Conductor::new(configuration(), programme);
+        conductor.connected(begin.elapsed());
+        while !conductor.is_over() {
+            if stop.load(Ordering::Relaxed) {
+                let out = conductor.stop(begin.elapsed()).to_vec();
+                let _ = wire.write(&out);
+                return Err(Failure::failed("stopped before the end; nothing was written"));
+            }
+            let now = begin.elapsed();
+            let out = conductor.transmit(now, |step| device_tilt(step, &mut news)).to_vec();
+            if !out.is_empty() {
+                wire.write(&out).map_err(gone)?;
+            }
+            let count = wire.read(&mut bytes, PATIENCE).map_err(gone)?;
+            conductor.receive(begin.elapsed(), &bytes[..count]);
+            news(News::Played(conductor.played_s()));
+        }
+        tracks.push(conductor.finish()?);
+    }
+    Ok(tracks)
+}
+
+/// Checks that every step may be played under `config`; the device checks it again.
+pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
+    let refuse =
+        |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));
+    let plan = config.plan().map_err(refuse)?;
+    programmes.iter().flat_map(|p| &p.steps).try_for_each(|step| step.excitation.check(&plan).map_err(refuse))
+}

@@ -1,0 +1,6 @@
+//! The work of a lab before a trainee uses a device: commissioning, characterisation, compensation, force laws from tests.
+
+pub mod characterise;
+pub mod commission;
+pub mod compensate;
+pub mod force_fit;

@@ -1,0 +1,234 @@
+//! `import`: recordings as people have them become the files that `diagnose` reads, and whatever was assumed, changed or left
+//! out on the way is said. It reads tables and writes the contract's files; it may not know what is done with them.
+
+mod counts;
+mod folder;
+mod json;
+mod log;
+mod mat;
+mod npy;
+mod npy_array;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod roles;
+#[cfg(feature = "ros")]
+mod ros;
+mod rows;
+mod runs;
+mod separate;
+mod table;
+mod text;
+mod units;
+mod written;
+
+pub use roles::{Choice, choice};
+pub use rows::Known;
+pub use runs::Keep;
+pub use written::RigValues;
+
+use device_sim::failure::Failure;
+use diagnosis::rig::{Kind, Rig};
+use rows::Rows;
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+use table::Log;
+use units::Quantity;
+
+/// What to import, and what is known about it.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// In the order in which they were recorded.
+    pub files: Vec<PathBuf>,
+    /// `--column`.
+    pub columns: Vec<Choice>,
+    /// Rate or missing command.
+    pub known: Known,
+    /// Counts per turn of the coordinate.
+    pub counts_per_turn: Option<f64>,
+    /// Counts per rad or m.
+    pub counts_per_unit: Option<f64>,
+    /// Values for the rig.
+    pub values: RigValues,
+    /// A rig that exists: its resolution is used, and none is written.
+    pub rig: Option<PathBuf>,
+    /// What is left as it stands.
+    pub keep: Keep,
+    /// Each file is a run of its own, whatever clocks and names say.
+    pub runs: bool,
+    /// Cuts every run at this part of its length, the first for fitting, the second to hold out.
+    pub split: Option<f64>,
+    /// Folder to write to.
+    pub out: PathBuf,
+}
+
+/// A file that was written.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// Where.
+    pub path: PathBuf,
+    /// How many.
+    pub rows: usize,
+    /// From the first row to the last, s.
+    pub seconds: f64,
+}
+
+/// What was done.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The rig to diagnose with.
+    pub rig: PathBuf,
+    /// Whether values are still to be filled in there.
+    pub to_fill_in: bool,
+    /// One a run.
+    pub recordings: Vec<Written>,
+    /// What was assumed, changed or left out, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Reads, cleans and writes.
+pub fn import(request: &Request) -> Result<Imported, Failure> {
+    let mut notes = Vec::new();
+    let rig = match &request.rig {
+        Some(path) => Some(Rig::read(path).map_err(Failure::input)?),
+        None => None,
+    };
+    let paths = folder::files(&request.files)?;
+    let logs = paths.iter().map(|path| table::read(path)).collect::<Result<Vec<_>, _>>()?;
+    for log in &logs {
+        notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
+    }
+    roles::check(&logs, &request.columns)?;
+    let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
+    let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(&logs));
+    let wholes: Vec<Rows> = if !one_run && logs.iter().all(is_whole) {
+        let mut wholes = Vec::new();
+        for (index, log) in logs.iter().enumerate() {
+            let mut said = Vec::new();
+            wholes.push(rows::gather(std::slice::from_ref(log), &request.columns, request.known, &mut said)?);
+            // The same columns of further files need no further words.
+            if index == 0 {
+                notes.extend(said);
+            }
+        }
+        if !request.runs {
+            separate::check(&logs, &wholes)?;
+        }
+        joined(wholes, &mut notes)
+    } else {
+        vec![rows::gather(&logs, &request.columns, request.known, &mut notes)?]
+    };
+    let per_turn =
+        request.counts_per_turn.or_else(|| rig.as_ref().map(|rig| rig.encoder.counts_per_unit * TAU));
+    let mut all = Vec::new();
+    for whole in wholes {
+        all.extend(runs::runs(whole, request.keep, per_turn, &mut notes));
+    }
+    let Some(first) = all.first() else {
+        return Err(Failure::input(format_args!(
+            "{}: no stretch of at least a second is left ({}); record longer, or check the unit of the time with --column time=NAME:ms",
+            request.files.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(", "),
+            notes.join("; ")
+        )));
+    };
+    if all.iter().any(|run| run.position != first.position) {
+        return Err(Failure::input(
+            "the files measure their positions in different units; import them one by one",
+        ));
+    }
+    if let (Some(rig), false) = (&rig, first.position == Quantity::Counts)
+        && (rig.kind == Kind::Linear) != (first.position == Quantity::Length)
+    {
+        return Err(Failure::input(format_args!(
+            "the position is in {} and the rig {} is {}; correct one of them",
+            first.position.unit(),
+            rig.name,
+            if rig.kind == Kind::Linear { "linear" } else { "rotary" }
+        )));
+    }
+    let per_unit = request
+        .counts_per_unit
+        .or(request.counts_per_turn.map(|counts| counts / TAU))
+        .or_else(|| rig.as_ref().map(|rig| rig.encoder.counts_per_unit));
+    let scale = counts::scale(&all, per_unit, &mut notes);
+    rate(&all, &mut notes);
+    let name = request
+        .files
+        .first()
+        .and_then(|f| f.file_stem())
+        .map_or_else(String::new, |s| s.to_string_lossy().into());
+    let text = rig.is_none().then(|| written::rig(&name, first, scale, &request.values));
+    let to_fill_in = text.as_ref().is_some_and(|text| text.contains("= nan"));
+    let named = named(all, request.split);
+    let paths = written::files(&request.out, text.as_deref(), &named, scale)?;
+    let recordings = paths
+        .into_iter()
+        .zip(&named)
+        .map(|(path, (_, run))| Written { path, rows: run.time.len(), seconds: run.time[run.time.len() - 1] })
+        .collect();
+    let rig = request.rig.clone().unwrap_or_else(|| request.out.join("rig.toml"));
+    Ok(Imported { rig, to_fill_in, recordings, notes })
+}
+
+/// Files whose clock goes on where the one before ended are one run.
+fn joined(wholes: Vec<Rows>, notes: &mut Vec<String>) -> Vec<Rows> {
+    let mut out: Vec<Rows> = Vec::new();
+    for rows in wholes {
+        if let Some(last) = out.last_mut() {
+            let step = rows::median_step(&last.time).unwrap_or(0.0);
+            // The later file's clock, counted from the earlier one's zero.
+            let later = rows.origin - last.origin;
+            let between =
+                rows.time.first().copied().unwrap_or(0.0) + later - last.time.last().copied().unwrap_or(0.0);
+            let alike = last.columns.keys().eq(rows.columns.keys()) && last.position == rows.position;
+            if alike && between > 0.0 && between < 20.0 * step {
+                notes.push("a file goes on where the one before ends: joined to one run".into());
+                last.time.extend(rows.time.iter().map(|t| t + later));
+                for (role, column) in rows.columns {
+                    last.columns.entry(role).or_default().extend(column);
+                }
+                continue;
+            }
+        }
+        out.push(rows);
+    }
+    out
+}
+
+/// What the rate of the rows can and cannot show.
+fn rate(runs: &[Rows], notes: &mut Vec<String>) {
+    let steps: Vec<f64> = runs.iter().filter_map(|run| rows::median_step(&run.time)).collect();
+    let Some(step) = steps.into_iter().max_by(f64::total_cmp) else { return };
+    notes.push(diagnosis::recording::shown_at(1.0 / step));
+}
+
+/// Names of the files, and the runs cut in two where that was asked for.
+fn named(runs: Vec<Rows>, split: Option<f64>) -> Vec<(String, Rows)> {
+    let several = runs.len() > 1;
+    let mut out = Vec::new();
+    for (index, run) in runs.into_iter().enumerate() {
+        let tail = if several { format!("-{}", index + 1) } else { String::new() };
+        let Some(part) = split else {
+            out.push((format!("recording{tail}"), run));
+            continue;
+        };
+        let length = run.time[run.time.len() - 1];
+        let at = run.time.partition_point(|t| *t < part * length);
+        let of = |from: usize, to: usize| {
+            let zero = run.time[from];
+            Rows {
+                time: run.time[from..to].iter().map(|t| t - zero).collect(),
+                columns: run
+                    .columns
+                    .iter()
+                    .map(|(role, column)| (*role, column[from..to].to_vec()))
+                    .collect(),
+                ..run
+            }
+        };
+        if at > 1 && at + 1 < run.time.len() {
+            out.push((format!("fit{tail}"), of(0, at)));
+            out.push((format!("holdout{tail}"), of(at, run.time.len())));
+        }
+    }
+    out
+}

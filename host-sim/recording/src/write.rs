@@ -1,0 +1,210 @@
+//! Writes a recording while it happens. What is on disk can be read at any moment: a chunk is closed every quarter of a
+//! second, so that a full disk, a kill or a power cut cost no more than that.
+
+use super::messages::{CHANNELS, Hello, Link, Pose, Samples, Setup};
+use control_core::TICK_HZ;
+use control_core::controller::Sample;
+use device_sim::failure::Failure;
+use link::frames;
+use mcap::records::MessageHeader;
+use mcap::{McapError, WriteOptions, Writer};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Recordings of one name.
+const MOST_OF_A_NAME: u32 = 9_999;
+/// Ticks from one flush to the next: 0.25 s.
+const FLUSH_TICKS: u64 = TICK_HZ as u64 / 4;
+const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ as u64;
+
+/// A recording in progress.
+pub struct Recorder<W: Write + Seek = BufWriter<File>> {
+    file: String,
+    writer: Writer<Counted<W>>,
+    /// By the order of [`CHANNELS`].
+    channels: Vec<u16>,
+    /// Time of tick 0, ns since 1970.
+    epoch_ns: u64,
+    tick: u64,
+    flushed: u64,
+    bytes: Arc<AtomicU64>,
+    text: Vec<u8>,
+}
+
+impl Recorder {
+    /// Begins a recording in a new file; an old one of this name is replaced.
+    pub fn create(path: &Path, setup: &Setup) -> Result<Self, Failure> {
+        let shown = path.display().to_string();
+        let file = File::create(path).map_err(|cause| {
+            Failure::input(format_args!("{shown}: cannot be created ({cause}); choose another --record file"))
+        })?;
+        Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup)
+    }
+
+    /// Begins a recording called `name` in the current folder. An older one is never replaced: after `monday` come `monday-2` and so on.
+    pub fn create_new(name: &str, setup: &Setup) -> Result<Self, Failure> {
+        for number in 1..=MOST_OF_A_NAME {
+            let shown = if number == 1 { format!("{name}.mcap") } else { format!("{name}-{number}.mcap") };
+            match File::create_new(&shown) {
+                Ok(file) => return Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup),
+                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(cause) => {
+                    return Err(Failure::failed(format_args!(
+                        "{shown}: cannot be created ({cause}); start the program in a folder that can be written"
+                    )));
+                }
+            }
+        }
+        Err(Failure::failed(format_args!(
+            "there are {MOST_OF_A_NAME} recordings called {name}; choose another name"
+        )))
+    }
+}
+
+impl<W: Write + Seek> Recorder<W> {
+    /// Begins a recording in anything; `file` is what errors call it.
+    pub fn begin(file: String, to: W, setup: &Setup) -> Result<Self, Failure> {
+        let options = WriteOptions::new()
+            .compression(None)
+            .profile("needle-insertion")
+            .library(crate::version::program())
+            .chunk_size(None)
+            .disable_seeking(true);
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let bytes = Arc::<AtomicU64>::default();
+        let mut recorder = Self {
+            writer: Writer::with_options(Counted { inner: to, bytes: bytes.clone() }, options)
+                .map_err(|cause| lost(&file, &cause, 0))?,
+            file,
+            channels: Vec::new(),
+            epoch_ns: u64::try_from(since_1970.as_nanos()).unwrap_or(0),
+            tick: 0,
+            flushed: 0,
+            bytes,
+            text: Vec::new(),
+        };
+        for (topic, name, schema) in CHANNELS {
+            let added = recorder
+                .writer
+                .add_schema(name, "jsonschema", schema.as_bytes())
+                .and_then(|id| recorder.writer.add_channel(id, topic, "json", &BTreeMap::new()));
+            recorder.channels.push(added.map_err(|cause| recorder.lost(&cause))?);
+        }
+        recorder.put(0, setup)?;
+        recorder.flush()?;
+        Ok(recorder)
+    }
+
+    /// Set up anew: what follows is of another patient.
+    pub fn setup(&mut self, setup: &Setup) -> Result<(), Failure> {
+        self.put(0, setup)
+    }
+
+    /// Writes the device's identity and scale.
+    pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Failure> {
+        self.put(1, &Hello::from(hello))
+    }
+
+    /// Consecutive samples.
+    pub fn samples(&mut self, first_tick: u64, samples: &[Sample]) -> Result<(), Failure> {
+        self.tick = first_tick;
+        self.put(2, &Samples::from_block(first_tick, samples))?;
+        // A device that starts anew counts from 0 again.
+        if first_tick.abs_diff(self.flushed) >= FLUSH_TICKS { self.flush() } else { Ok(()) }
+    }
+
+    /// A pose.
+    pub fn pose(&mut self, pose: &frames::Pose) -> Result<(), Failure> {
+        self.put(3, &Pose::from(pose))
+    }
+
+    /// An event.
+    pub fn event(&mut self, event: &frames::Event) -> Result<(), Failure> {
+        self.put(4, event)
+    }
+
+    /// Bytes on their way to the disk so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+
+    /// Returns the file's name for errors.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Closes the recording, with the totals of the link.
+    pub fn finish(mut self, link: Link) -> Result<u64, Failure> {
+        self.put(5, &link)?;
+        self.writer.finish().map_err(|cause| self.lost(&cause))?;
+        let bytes = self.bytes();
+        let flushed = self.writer.into_inner().flush();
+        flushed.map_err(|cause| lost(&self.file, &McapError::Io(cause), bytes))?;
+        Ok(bytes)
+    }
+
+    fn put(&mut self, channel: usize, message: &impl Serialize) -> Result<(), Failure> {
+        self.text.clear();
+        // Only maps with odd keys and failing writers make this fail; there is neither.
+        if serde_json::to_writer(&mut self.text, message).is_err() {
+            return Err(Failure::failed("a message could not be put into words; report this"));
+        }
+        let time = self.epoch_ns + self.tick * NS_PER_TICK;
+        let header = MessageHeader {
+            channel_id: self.channels[channel],
+            sequence: 0,
+            log_time: time,
+            publish_time: time,
+        };
+        self.writer.write_to_known_channel(&header, &self.text).map_err(|cause| self.lost(&cause))
+    }
+
+    fn flush(&mut self) -> Result<(), Failure> {
+        self.flushed = self.tick;
+        self.writer.flush().map_err(|cause| self.lost(&cause))
+    }
+
+    fn lost(&self, cause: &McapError) -> Failure {
+        lost(&self.file, cause, self.bytes())
+    }
+}
+
+fn lost(file: &str, cause: &McapError, bytes: u64) -> Failure {
+    let why = match cause {
+        McapError::Io(io) => io.to_string(),
+        other => other.to_string(),
+    };
+    Failure::failed(format_args!(
+        "{file}: recording stopped after {bytes} bytes ({why}); what was written until then can be read; free some space"
+    ))
+}
+
+/// A writer that counts what has gone through it.
+struct Counted<W> {
+    inner: W,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.inner.write(bytes)?;
+        self.bytes.fetch_add(written as u64, Ordering::Relaxed);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+impl<W: Seek> Seek for Counted<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.inner.seek(to)
+    }
+}

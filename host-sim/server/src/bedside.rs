@@ -1,0 +1,193 @@
+//! Whom the needle goes into during a run, and changing it: what a person edits in the page becomes a checked profile, is asked of the
+//! device, and counts once the device has taken it whole. It sends nothing itself.
+
+use control_core::{Device, Patient};
+use device_sim::failure::Failure;
+use device_sim::library::Text;
+use device_sim::procedure::Procedure;
+use device_sim::profile::{self, Profile};
+use device_sim::session::{PatientAnswer, PatientStatus, PatientWish, Scene, Source};
+use recording::messages::Setup;
+
+/// The patient of a run.
+#[derive(Clone, Debug)]
+pub struct Bedside {
+    profile: Profile,
+    device: Device,
+    source: Source,
+    /// Name or file of what the scripted hand does, where one does anything.
+    procedure: Option<String>,
+    setup: Setup,
+    asked: Option<Asked>,
+}
+
+/// A patient that the device has been asked to take.
+#[derive(Clone, Debug)]
+struct Asked {
+    profile: Profile,
+    /// The procedure of the scripted hand in it, if it differs from the default.
+    procedure: Option<String>,
+}
+
+impl Bedside {
+    /// `profile` on `device`; `procedure` is what the scripted hand was asked to do.
+    pub fn new(profile: Profile, source: Source, procedure: Option<String>, setup: Setup) -> Self {
+        let device = profile.config.device;
+        Self { profile, device, source, procedure, setup, asked: None }
+    }
+
+    /// Checks a wish; what to ask of the device, or in one sentence why not.
+    pub fn ask(&mut self, wish: &PatientWish) -> Result<Patient, Failure> {
+        let profile = match wish {
+            PatientWish::Named(name) => {
+                let built_in = profile::BUILT_IN.iter().find(|(known, _)| known == name);
+                let (name, text) = built_in.ok_or_else(|| {
+                    Failure::input(format_args!(
+                        "there is no patient called \"{name}\"; choose one of the list"
+                    ))
+                })?;
+                let source = Text { origin: format!("profile {name}"), text: (*text).to_owned() };
+                Profile::parse_for(source, &self.device)?
+            }
+            PatientWish::Edited(json) => {
+                let text = toml::to_string(json).map_err(|cause| {
+                    Failure::input(format_args!("the edited patient is not a profile ({cause}); correct it"))
+                })?;
+                Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)?
+            }
+        };
+        // A patient that is chosen brings its own procedure; the scripted hand must find its way in any.
+        let own = matches!(wish, PatientWish::Named(_)).then(|| profile.procedure.clone());
+        let procedure = own.filter(|_| self.procedure.is_some());
+        let wanted = procedure.as_ref().or(self.procedure.as_ref());
+        wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
+        let patient = profile.config.patient.clone();
+        self.asked = Some(Asked { profile, procedure });
+        Ok(patient)
+    }
+
+    /// The device has taken what was asked; whether anything was.
+    pub fn taken(&mut self) -> bool {
+        let Some(Asked { profile, procedure }) = self.asked.take() else { return false };
+        if procedure.is_some() {
+            self.procedure = procedure;
+        }
+        self.setup.profile_toml = profile.source.text.clone();
+        self.setup.profile_origin = profile.source.origin.clone();
+        self.profile = profile;
+        if let Some(procedure) = self.procedure() {
+            self.setup.procedure = Some(procedure.name);
+        }
+        true
+    }
+
+    /// The device has refused it.
+    pub fn refused(&mut self) {
+        self.asked = None;
+    }
+
+    /// Returns the scene of the active patient.
+    pub fn scene(&self) -> Scene {
+        let procedure = self.setup.procedure.clone();
+        self.profile.scene(self.source.clone(), procedure)
+    }
+
+    /// Returns the procedure of the scripted hand in the active patient.
+    pub fn procedure(&self) -> Option<Procedure> {
+        self.procedure.as_ref().and_then(|wanted| hand(wanted, &self.profile).ok())
+    }
+
+    /// The patient that counts.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// For the recording.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// For the page.
+    pub fn status(&self, answer: Option<PatientAnswer>) -> PatientStatus {
+        PatientStatus {
+            names: profile::BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            // What has been parsed as a profile is TOML, and TOML is JSON but for its dates.
+            profile: toml::from_str(&self.profile.source.text).unwrap_or_default(),
+            answer,
+        }
+    }
+}
+
+/// Returns the requested procedure or, if it makes no sense in this patient, the one that the patient's file names.
+fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Failure> {
+    Procedure::find(wanted, profile)
+        .or_else(|cause| Procedure::find(&profile.procedure, profile).map_err(|_| cause))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bedside() -> Bedside {
+        let profile = Profile::find("adult").expect("it is built in");
+        let setup = Setup {
+            program: String::new(),
+            source: "virtual".into(),
+            profile_toml: profile.source.text.clone(),
+            profile_origin: String::new(),
+            procedure: Some("venepuncture".into()),
+            device_toml: None,
+        };
+        Bedside::new(profile, Source::Virtual, Some("venepuncture".into()), setup)
+    }
+
+    #[test]
+    fn an_edited_patient_counts_once_the_device_has_taken_it() {
+        let mut bedside = bedside();
+        let mut json = bedside.status(None).profile;
+        let force_before = bedside.scene().layers[0].friction_n_per_mm;
+        json["layer"][0]["friction_n_per_mm"] = serde_json::json!(0.03);
+        let patient = bedside.ask(&PatientWish::Edited(json)).expect("it may run");
+        assert!((patient.layers[0].friction.0.to_num::<f64>() - 0.03).abs() < 1e-4);
+        assert_eq!(bedside.scene().layers[0].friction_n_per_mm, force_before, "not yet");
+        assert!(bedside.taken() && !bedside.taken(), "once");
+        assert!((bedside.scene().layers[0].friction_n_per_mm - 0.03).abs() < 1e-4);
+        assert!(bedside.setup().profile_toml.contains("0.03"), "the recording is told");
+        bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        bedside.refused();
+        assert!(!bedside.taken(), "what was refused never counts");
+        bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        assert!(bedside.taken());
+        assert_eq!(bedside.scene().profile, "firm-skin");
+        bedside.ask(&PatientWish::Named("shoulder".into())).expect("built in");
+        assert!(bedside.taken());
+        assert_eq!(
+            bedside.setup().procedure.as_deref(),
+            Some("shoulder-straight"),
+            "it brings its procedure"
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_in_one_sentence() {
+        let mut bedside = bedside();
+        let good = bedside.status(None).profile;
+        let with = |pointer: &str, value: serde_json::Value| {
+            let mut json = good.clone();
+            *json.pointer_mut(pointer).expect("it is there") = value;
+            PatientWish::Edited(json)
+        };
+        for (wish, hint) in [
+            (with("/layer/0/friction_n_per_mm", serde_json::json!("much")), "friction_n_per_mm"),
+            (with("/layer/0/friction_n_per_mm", serde_json::json!(-1.0)), "friction_n_per_mm is -1"),
+            (with("/name", serde_json::json!(7)), "string"),
+            (with("/layer", serde_json::json!([])), "layer"),
+            (PatientWish::Edited(serde_json::json!(null)), "patient"),
+            (PatientWish::Named("giant".into()), "giant"),
+        ] {
+            let said = bedside.ask(&wish).expect_err(hint).to_string();
+            assert!(said.contains(hint) && !said.contains('\n'), "{hint}: {said}");
+            assert!(!bedside.taken());
+        }
+    }
+}

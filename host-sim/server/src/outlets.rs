@@ -1,0 +1,130 @@
+//! Everybody who wants what arrives from a device: the pages, the recording, the totals.
+
+use crate::live_gains::LiveGains;
+use device_sim::driver::Driver;
+use device_sim::failure::Failure;
+use device_sim::session::{LinkStatus, Publisher, RecordingStatus};
+use link::frames::{self, DeviceFrame};
+use recording::messages::{Hello, Setup};
+use recording::tally::Tally;
+use recording::write::Recorder;
+use std::time::Duration;
+
+/// The notice for a page while there is no device.
+const WAITING: &str = "no answer from the device; waiting for it";
+
+/// Everybody who wants what arrives.
+pub struct Outlets {
+    /// The pages.
+    pub publisher: Publisher,
+    /// The recording.
+    pub recorder: Option<Recorder>,
+    /// The totals.
+    pub tally: Tally,
+    pub(crate) gains: LiveGains,
+    pub(crate) failure: Option<Failure>,
+    /// The device's last hello, for a recording that begins later.
+    hello: Option<frames::Hello>,
+    /// Why there is no recording, where a person has asked for one in vain.
+    complaint: Option<String>,
+}
+
+impl Outlets {
+    /// Nothing has arrived yet.
+    pub fn new(publisher: Publisher, recorder: Option<Recorder>, tally: Tally) -> Self {
+        Self {
+            publisher,
+            recorder,
+            tally,
+            gains: LiveGains::default(),
+            failure: None,
+            hello: None,
+            complaint: None,
+        }
+    }
+
+    pub(crate) fn frame(&mut self, frame: &DeviceFrame) {
+        if self.tally.is_full() {
+            return;
+        }
+        if let Err(failure) = self.deliver(frame) {
+            // The rest of the run must not write on: the file ends where the disk did.
+            self.recorder = None;
+            self.failure = Some(failure);
+        }
+    }
+
+    fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Failure> {
+        match frame {
+            DeviceFrame::Hello(hello) => {
+                self.tally.hello(Hello::from(hello));
+                self.hello = Some(hello.clone());
+                self.publisher.frame(frame);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.hello(hello))
+            }
+            DeviceFrame::Samples(block) => {
+                let taken = self.tally.samples(&block.samples);
+                self.publisher.samples(block.first_tick, taken);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.samples(block.first_tick, taken))
+            }
+            DeviceFrame::Pose(pose) => {
+                self.publisher.frame(frame);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.pose(pose))
+            }
+            DeviceFrame::Event(event) => {
+                self.tally.event(event);
+                self.publisher.frame(frame);
+                self.recorder.as_mut().map_or(Ok(()), |r| r.event(event))
+            }
+            DeviceFrame::Timing(_) | DeviceFrame::Ack(_) => {
+                self.publisher.frame(frame);
+                Ok(())
+            }
+            DeviceFrame::Device(record) => {
+                self.gains.learn(&record.device);
+                Ok(())
+            }
+        }
+    }
+
+    /// Records from now on in a new file; one that is going on goes on.
+    pub(crate) fn record(&mut self, name: &str, setup: Option<&Setup>) {
+        let Some(setup) = setup.filter(|_| self.recorder.is_none()) else { return };
+        let begun = Recorder::create_new(name, setup).and_then(|mut recorder| {
+            self.hello.as_ref().map_or(Ok(()), |hello| recorder.hello(hello))?;
+            Ok(recorder)
+        });
+        self.complaint = begun.as_ref().err().map(ToString::to_string);
+        self.recorder = begun.ok();
+    }
+
+    /// Closes the recording, which may be read from then on.
+    pub(crate) fn end_recording(&mut self, driver: &Driver) {
+        if let Some(recorder) = self.recorder.take() {
+            self.complaint = recorder.finish(driver.counts().into()).err().map(|failure| failure.to_string());
+        }
+    }
+
+    pub(crate) fn status(&self, driver: &Driver, now: Duration) {
+        let counts = driver.counts();
+        let recording =
+            self.recorder.as_ref().map(|r| RecordingStatus { file: r.file().to_owned(), bytes: r.bytes() });
+        let connected = driver.is_ready(now);
+        let notice = driver.notice().or((!connected).then_some(WAITING)).or(self.complaint.as_deref());
+        let notice = notice.map(str::to_owned);
+        self.publisher.link(|status| {
+            *status = LinkStatus {
+                connected,
+                frames: counts.frames,
+                lost_frames: counts.lost_frames,
+                samples: counts.samples,
+                lost_samples: counts.lost_samples,
+                garbage: counts.garbage,
+                recording,
+                notice,
+                replay: None,
+                compensation: self.gains.share(),
+            };
+        });
+    }
+}

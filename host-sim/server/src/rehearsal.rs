@@ -1,0 +1,40 @@
+//! A procedure on the virtual device from its beginning to its end, as fast as it goes, recorded: what `reproduce` draws and tests
+//! read. The control core, the link and the recording are those of any other run.
+
+use crate::outlets::Outlets;
+use crate::pace::Pace;
+use crate::station::Station;
+use control_core::TICK_HZ;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::driver::Driver;
+use device_sim::failure::Failure;
+use device_sim::procedure::Procedure;
+use device_sim::profile::Profile;
+use device_sim::session::{self, Source};
+use recording::messages::Setup;
+use recording::read::Recording;
+use recording::tally::Tally;
+use recording::write::Recorder;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// One round of `procedure` on `profile`, recorded in `file`, and read from there.
+pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
+    let (_, publisher) = session::open(profile.scene(Source::Virtual, Some(procedure.name.clone())));
+    let setup = Setup {
+        program: recording::version::program(),
+        source: "virtual".into(),
+        profile_toml: profile.source.text.clone(),
+        profile_origin: profile.source.origin.clone(),
+        procedure: Some(procedure.name.clone()),
+        device_toml: None,
+    };
+    let recorder = Recorder::create(file, &setup)?;
+    let ticks = (procedure.round_s * f64::from(TICK_HZ)).ceil() as u64;
+    let outlets = Outlets::new(publisher, Some(recorder), Tally::new(Some(ticks)));
+    let stop = AtomicBool::new(false);
+    let driver = Driver::new(profile.config.patient.clone());
+    let device = VirtualDevice::new(profile, procedure);
+    Station::new(driver, outlets, &stop).run_in_step(device, Pace::Free, |_| {})?;
+    Recording::read(file)
+}

@@ -1,0 +1,338 @@
+//! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives (pages, the recording, the
+//! totals). In step with a simulated device, or in real time over a wire that may be pulled and come back.
+
+use crate::bedside::Bedside;
+use crate::outlets::Outlets;
+use crate::pace::Pace;
+use device_sim::device::virtual_device::VirtualDevice;
+use device_sim::device::{Port, Wire};
+use device_sim::driver::{Driver, Request};
+use device_sim::failure::Failure;
+use device_sim::lockstep;
+use device_sim::session::{Control, PatientAnswer, PatientWish, Subscription};
+use recording::tally::Tally;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use training::practice::Practice;
+
+/// A port that could not be opened is tried again after this.
+const RETRY: Duration = Duration::from_millis(300);
+/// The longest single wait for the device: short enough for heartbeats and a quick answer to a person.
+const PATIENCE: Duration = Duration::from_millis(2);
+/// A device that has never become ready after this is not one.
+const FIRST_ANSWER: Duration = Duration::from_secs(5);
+/// The extra time for a run with gaps in it.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// A run in progress.
+pub struct Station<'a> {
+    driver: Driver,
+    outlets: Outlets,
+    /// Set from outside (Ctrl-C) to end the run in good order.
+    stop: &'a AtomicBool,
+    was_ready: bool,
+    /// True if this device has been asked for its configuration since it was connected.
+    has_asked: bool,
+    /// Only a person starts the device, in the page: asked for, or because a person has stopped it.
+    person_starts: bool,
+    /// The tip is at depth 0 when it is started for the first time.
+    zeroes_first: bool,
+    /// The patient, if it may be changed.
+    bedside: Option<Bedside>,
+    /// The practice that judges insertions while somebody looks.
+    practice: Option<Practice>,
+}
+
+/// The totals of a run.
+pub struct Outcome {
+    /// Totals of the link.
+    pub link: link::host::Counts,
+    /// Totals of what happened.
+    pub tally: Tally,
+    /// Size of the recording, where there was one.
+    pub recorded_bytes: Option<u64>,
+}
+
+impl<'a> Station<'a> {
+    /// Not connected yet.
+    pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
+        Self {
+            driver,
+            outlets,
+            stop,
+            was_ready: false,
+            has_asked: false,
+            person_starts: false,
+            zeroes_first: false,
+            bedside: None,
+            practice: None,
+        }
+    }
+
+    /// The torque stays off until a person asks for it in the page.
+    pub fn wait_for_a_person(mut self) -> Self {
+        self.person_starts = true;
+        self
+    }
+
+    /// Depth 0 is where the needle is when the device is started for the first time.
+    pub fn zeroing_first(mut self) -> Self {
+        self.zeroes_first = true;
+        self
+    }
+
+    /// A person may change the patient in the page.
+    pub fn with_bedside(mut self, bedside: Bedside) -> Self {
+        self.outlets.publisher.patient(&bedside.status(None));
+        self.bedside = Some(bedside);
+        self
+    }
+
+    /// Insertions are judged while somebody looks.
+    pub fn with_practice(mut self, subscription: Subscription) -> Self {
+        let profile = self.bedside.as_ref().map(Bedside::profile);
+        self.practice = profile.map(|profile| Practice::new(subscription, profile, &self.outlets.publisher));
+        self
+    }
+
+    /// Runs a simulated device in step with it, `pace` saying how fast: the clock of both ends is the device's, so that a
+    /// busy computer slows both and neither finds the other silent. `progress` sees the samples so far, now and then.
+    pub fn run_in_step(
+        mut self,
+        mut device: VirtualDevice,
+        mut pace: Pace,
+        mut progress: impl FnMut(u64),
+    ) -> Result<Outcome, Failure> {
+        self.driver.connected(Duration::ZERO);
+        while !self.is_over() {
+            let now = lockstep::time(device.ticks());
+            while let Some(control) = self.outlets.publisher.next_control() {
+                self.control(control, |c| device.control(c));
+            }
+            self.start_once(now);
+            device.receive(self.driver.transmit(now));
+            for _ in 0..lockstep::TICKS {
+                device.tick();
+            }
+            lockstep::empty(
+                |frame| device.transmit(frame),
+                |bytes| self.driver.receive(now, bytes, |frame| self.outlets.frame(frame)),
+            );
+            if let Some(taken) = self.patient_answer() {
+                let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
+                procedure.into_iter().for_each(|procedure| device.follow(procedure));
+                // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
+                if !self.person_starts {
+                    self.driver.request(Request::Start);
+                }
+            }
+            if device.ticks().is_multiple_of(1_000) {
+                self.report(now);
+                progress(self.outlets.tally.samples);
+            }
+            if pace.wait(lockstep::time(device.ticks())).is_err() {
+                device.note_late();
+            }
+        }
+        self.finish()
+    }
+
+    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes and goes.
+    pub fn run_in_real_time(
+        mut self,
+        port: &mut dyn Port,
+        seconds: Option<f64>,
+        mut progress: impl FnMut(u64),
+    ) -> Result<Outcome, Failure> {
+        let begin = Instant::now();
+        let mut wire: Option<Box<dyn Wire>> = None;
+        let mut next_try = Duration::ZERO;
+        let mut bytes = vec![0; 1 << 14];
+        while !self.is_over() {
+            let now = begin.elapsed();
+            if seconds.is_some_and(|s| now > Duration::from_secs_f64(s) + GRACE) {
+                break;
+            }
+            if let Some(open) = &mut wire {
+                if self.exchange(open.as_mut(), &mut bytes, now, begin).is_err() {
+                    wire = None;
+                    self.driver.disconnected();
+                }
+            } else if now >= next_try {
+                next_try = now + RETRY;
+                wire = port.open().ok();
+                if wire.is_some() {
+                    self.driver.connected(now);
+                }
+            } else {
+                std::thread::sleep(PATIENCE);
+            }
+            if !self.was_ready && now > FIRST_ANSWER {
+                return Err(self.never_ready());
+            }
+            while let Some(control) = self.outlets.publisher.next_control() {
+                // The hand on a real needle is nobody's to move.
+                self.control(control, |_| {});
+            }
+            self.patient_answer();
+            self.start_once(now);
+            if let Some(why) =
+                self.driver.notice().filter(|_| !self.person_starts && !self.driver.has_started())
+            {
+                // Nobody would see it in a page.
+                return Err(Failure::failed(why));
+            }
+            self.report(now);
+            progress(self.outlets.tally.samples);
+        }
+        if let Some(mut open) = wire {
+            self.leave(open.as_mut(), begin);
+        }
+        self.finish()
+    }
+
+    fn exchange(
+        &mut self,
+        wire: &mut dyn Wire,
+        bytes: &mut [u8],
+        now: Duration,
+        begin: Instant,
+    ) -> std::io::Result<()> {
+        let out = self.driver.transmit(now);
+        if !out.is_empty() {
+            wire.write(out)?;
+        }
+        let count = wire.read(bytes, PATIENCE)?;
+        self.driver.receive(begin.elapsed(), &bytes[..count], |f| self.outlets.frame(f));
+        Ok(())
+    }
+
+    /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms later.
+    fn leave(&mut self, wire: &mut dyn Wire, begin: Instant) {
+        self.driver.request(Request::Stop);
+        for _ in 0..3 {
+            if wire.write(self.driver.transmit(begin.elapsed())).is_err() {
+                return;
+            }
+            std::thread::sleep(PATIENCE);
+        }
+    }
+
+    /// The person who started the program asked for a start: once, and not again after a stop or a reconnection.
+    fn start_once(&mut self, now: Duration) {
+        if !self.driver.is_ready(now) {
+            self.has_asked = false;
+            self.outlets.gains.forget();
+            return;
+        }
+        self.was_ready = true;
+        if !std::mem::replace(&mut self.has_asked, true) {
+            self.driver.request(Request::ReportDevice);
+        }
+        if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
+            if std::mem::take(&mut self.zeroes_first) {
+                self.driver.request(Request::Zero);
+            }
+            self.driver.request(Request::Start);
+        }
+    }
+
+    /// Tells whoever looks how the link does and which insertions have ended.
+    fn report(&mut self, now: Duration) {
+        self.outlets.status(&self.driver, now);
+        if let Some(practice) = &mut self.practice {
+            practice.judge(&self.outlets.publisher);
+        }
+    }
+
+    fn control(&mut self, control: Control, mut hand: impl FnMut(Control)) {
+        if let Some(practice) = &mut self.practice {
+            match control {
+                Control::Drag { .. } => practice.held(true),
+                Control::Script => practice.held(false),
+                _ => {}
+            }
+        }
+        match control {
+            Control::Record { name } => {
+                let setup = self.bedside.as_ref().map(Bedside::setup);
+                self.outlets.record(&name, setup);
+            }
+            Control::EndRecording => self.outlets.end_recording(&self.driver),
+            Control::Start => self.driver.request(Request::Start),
+            Control::Stop => {
+                self.person_starts = true;
+                self.driver.request(Request::Stop);
+            }
+            Control::Zero => self.driver.request(Request::Zero),
+            Control::Patient(wish) => self.wish_patient(&wish),
+            Control::Compensate { share } => {
+                if let Some(gains) = self.outlets.gains.at(share) {
+                    self.driver.request(Request::Compensate(gains));
+                }
+            }
+            other => hand(other),
+        }
+    }
+
+    fn wish_patient(&mut self, wish: &PatientWish) {
+        let Some(bedside) = &mut self.bedside else { return };
+        match bedside.ask(wish) {
+            Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
+            Err(why) => {
+                let answer = PatientAnswer { taken: false, reason: why.to_string() };
+                self.outlets.publisher.patient(&bedside.status(Some(answer)));
+            }
+        }
+    }
+
+    /// Tells everybody what the device has said to another patient, where it has: whether it has taken it.
+    fn patient_answer(&mut self) -> Option<bool> {
+        let answer = self.driver.take_change()?;
+        let bedside = self.bedside.as_mut()?;
+        let taken = answer.is_ok() && bedside.taken();
+        if taken {
+            self.outlets.publisher.scene(&bedside.scene());
+            if let Some(practice) = &mut self.practice {
+                practice.patient(bedside.profile(), &self.outlets.publisher);
+            }
+            let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(bedside.setup()));
+            if let Err(failure) = written {
+                self.outlets.recorder = None;
+                self.outlets.failure = Some(failure);
+            }
+        } else {
+            bedside.refused();
+        }
+        let answer = PatientAnswer { taken, reason: answer.err().unwrap_or_default() };
+        self.outlets.publisher.patient(&bedside.status(Some(answer)));
+        Some(taken)
+    }
+
+    fn is_over(&self) -> bool {
+        self.outlets.tally.is_full()
+            || self.outlets.failure.is_some()
+            || self.driver.refused().is_some()
+            || self.stop.load(Ordering::Relaxed)
+    }
+
+    fn never_ready(&self) -> Failure {
+        Failure::failed(format_args!(
+            "the device did not answer within {} s; check that it runs this project's firmware and is not in use elsewhere",
+            FIRST_ANSWER.as_secs()
+        ))
+    }
+
+    fn finish(mut self) -> Result<Outcome, Failure> {
+        let link = self.driver.counts();
+        let recorder = self.outlets.recorder.take();
+        let recorded_bytes = recorder.map(|recorder| recorder.finish(link.into())).transpose();
+        if let Some(failure) = self.outlets.failure {
+            return Err(failure);
+        }
+        if let Some(refused) = self.driver.refused() {
+            return Err(Failure::failed(refused));
+        }
+        Ok(Outcome { link, tally: self.outlets.tally, recorded_bytes: recorded_bytes? })
+    }
+}

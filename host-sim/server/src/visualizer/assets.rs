@@ -1,0 +1,66 @@
+//! The files of `host-sim/page`, inside the program: the page needs no disk and no network.
+
+/// A file as it is served.
+pub(super) struct Asset {
+    pub(super) path: &'static str,
+    pub(super) content_type: &'static str,
+    pub(super) body: &'static [u8],
+}
+
+const PAGE: &str = "text/html; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+macro_rules! asset {
+    ($path:literal, $file:literal, $content_type:expr) => {
+        Asset {
+            path: $path,
+            content_type: $content_type,
+            body: include_bytes!(concat!("../../../page/", $file)),
+        }
+    };
+}
+
+/// The page of one device.
+pub(super) const DEVICE_PAGE: Asset = asset!("/", "index.html", PAGE);
+/// The page of a class.
+pub(super) const CLASS_PAGE: Asset = asset!("/", "class.html", PAGE);
+/// The page of a guide.
+pub(super) const GUIDE_PAGE: Asset = asset!("/", "guide.html", PAGE);
+
+/// The files of the pages.
+pub(super) const ASSETS: &[Asset] = &[
+    asset!("/style.css", "style.css", "text/css; charset=utf-8"),
+    asset!("/class.css", "class.css", "text/css; charset=utf-8"),
+    asset!("/class.js", "class.js", SCRIPT),
+    asset!("/guide.css", "guide.css", "text/css; charset=utf-8"),
+    asset!("/guide.js", "guide.js", SCRIPT),
+    asset!("/icon.svg", "icon.svg", "image/svg+xml"),
+    asset!("/main.js", "main.js", SCRIPT),
+    asset!("/link.js", "link.js", SCRIPT),
+    asset!("/canvas.js", "canvas.js", SCRIPT),
+    asset!("/panel.js", "panel.js", SCRIPT),
+    asset!("/section.js", "section.js", SCRIPT),
+    asset!("/needle.js", "needle.js", SCRIPT),
+    asset!("/inset.js", "inset.js", SCRIPT),
+    asset!("/tissue.js", "tissue.js", SCRIPT),
+    asset!("/plots.js", "plots.js", SCRIPT),
+    asset!("/trace.js", "trace.js", SCRIPT),
+    asset!("/events.js", "events.js", SCRIPT),
+    asset!("/hand.js", "hand.js", SCRIPT),
+    asset!("/patient.js", "patient.js", SCRIPT),
+    asset!("/practice.js", "practice.js", SCRIPT),
+    asset!("/learning_curve.js", "learning_curve.js", SCRIPT),
+    asset!("/own_forces.js", "own_forces.js", SCRIPT),
+    asset!("/scrub.js", "scrub.js", SCRIPT),
+    asset!("/slider.js", "slider.js", SCRIPT),
+    asset!("/body.js", "body.js", SCRIPT),
+    asset!("/bytes.js", "bytes.js", SCRIPT),
+    asset!("/picture.js", "picture.js", SCRIPT),
+    asset!("/limb_shapes.js", "limb_shapes.js", SCRIPT),
+    asset!("/limb_webgl.js", "limb_webgl.js", SCRIPT),
+    asset!("/limb_webgpu.js", "limb_webgpu.js", SCRIPT),
+    asset!("/tissue3d.js", "tissue3d.js", SCRIPT),
+    asset!("/ultrasound.js", "ultrasound.js", SCRIPT),
+    // A build product: `cargo xtask wasm`.
+    asset!("/picture.wasm", "picture.wasm", "application/wasm"),
+];

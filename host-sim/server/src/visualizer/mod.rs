@@ -1,0 +1,35 @@
+//! The page: serves it from the program itself, streams to it what the device does, and passes on what a person does.
+//!
+//! [`messages`] is what is said between server and page, [`condense`] turns 10 kHz into what a picture needs,
+//! `server` and `connection` carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide), `assets` holds the files of
+//! `host-sim/page`.
+//!
+//! This module may not touch the device, the link or a recording: it knows a [`device_sim::session::Session`] and nothing
+//! behind it. A page that is slow, asleep or gone costs the session nothing but its own bounded queue.
+
+mod assets;
+mod connection;
+mod server;
+mod watched;
+
+pub use server::{ServeError, Server, serve, serve_guide, serve_watched};
+pub use watched::{Said, Watch, Watches};
+
+#[cfg(test)]
+pub(crate) fn test_scene() -> device_sim::session::Scene {
+    device_sim::session::Scene {
+        source: device_sim::session::Source::Virtual,
+        profile: "adult".into(),
+        procedure: None,
+        layers: Vec::new(),
+        roller_radius_mm: 10.0,
+        travel_mm: 60.0,
+        largest_force_n: 2.88,
+        force_scale: 1.0,
+        tilt_rad: 0.5,
+        skin_tilt_rad: 0.0,
+        vessel: None,
+        needle: device_sim::session::SceneNeedle::reaching(15.6),
+        hand: true,
+    }
+}

@@ -1,0 +1,118 @@
+//! docs/glossary.md has every verdict, fault, rejection and refusal, in the words that the program prints.
+
+use control_core::Refusal;
+use control_core::event::Fault;
+use control_core::interlock::Interlock;
+use control_core::plan::Field;
+use diagnosis::Verdict;
+use fixed::types::I16F16;
+use link::frames::{Rejection, SaveFailure};
+
+const GLOSSARY: &str = include_str!("../../../docs/glossary.md");
+
+/// The rows of the table under a heading.
+fn rows(heading: &str) -> Vec<&'static str> {
+    let (_, section) =
+        GLOSSARY.split_once(&format!("## {heading}\n")).unwrap_or_else(|| panic!("no section {heading}"));
+    let lines = section.lines().take_while(|line| !line.starts_with("## "));
+    lines.filter(|line| line.starts_with("| ") && !line.starts_with("| ---")).collect()
+}
+
+#[test]
+fn the_glossary_quotes_every_fault_and_rejection_exactly() {
+    let faults = rows("Faults");
+    assert_eq!(faults.len(), 1 + Fault::ALL.len(), "a head and a row each");
+    for fault in Fault::ALL {
+        let wanted = format!("| {fault} |");
+        assert!(faults.iter().any(|row| row.contains(&wanted)), "{fault:?}: {wanted}");
+    }
+    let own = [
+        Rejection::Powered,
+        Rejection::Version,
+        Rejection::Full,
+        Rejection::NoSession,
+        // Any field.
+        Rejection::Commissioned(Field::TorqueLimit),
+        Rejection::NotShown,
+    ];
+    let interlocked = Interlock::ALL.map(Rejection::Interlocked);
+    let kept = [SaveFailure::Flash, SaveFailure::Full, SaveFailure::TooLong];
+    let sentences = own.iter().chain(&interlocked).map(ToString::to_string);
+    let sentences: Vec<String> = sentences.chain(kept.map(|failure| failure.to_string())).collect();
+    let rejections = rows("Rejections by the device");
+    // Two heads, and the row that points to the refusals.
+    assert_eq!(rejections.len(), 3 + sentences.len());
+    for sentence in sentences {
+        assert!(rejections.iter().any(|row| row.ends_with(&format!("| {sentence} |"))), "{sentence}");
+    }
+}
+
+/// Returns the glossary's name of a refusal. A new refusal needs one here.
+fn called(refusal: Refusal) -> &'static str {
+    match refusal {
+        Refusal::OutOfRange { .. } => "out of range",
+        Refusal::TooStiff { .. } => "too stiff",
+        Refusal::TooStrong { .. } => "too strong",
+        Refusal::Overlap { .. } => "overlap",
+        Refusal::ContactStep { .. } => "contact step",
+        Refusal::WrongWay { .. } => "wrong way",
+        Refusal::ReliefAboveElastic { .. } => "relief above elastic",
+        Refusal::BeyondTravel { .. } => "beyond travel",
+        Refusal::NoVessel { .. } => "no vessel",
+        Refusal::Count { .. } => "count",
+        Refusal::Empty => "empty",
+        Refusal::AboveCeiling { .. } => "above ceiling",
+        Refusal::CompensationTooStrong { .. } => "compensation too strong",
+        Refusal::CompensationUnstable { .. } => "compensation unstable",
+        Refusal::WouldRing { .. } => "would ring",
+    }
+}
+
+#[test]
+fn the_glossary_has_every_refusal_and_verdict() {
+    let (layer, x) = (0, I16F16::ONE);
+    let refusals = [
+        Refusal::OutOfRange { field: Field::Travel, value: x, low: x, high: x },
+        Refusal::TooStiff { layer, slope: x, limit: x },
+        Refusal::TooStrong { layer, force: x, limit: x },
+        Refusal::Overlap { layer },
+        Refusal::ContactStep { layer, force: x },
+        Refusal::WrongWay { layer },
+        Refusal::ReliefAboveElastic { layer },
+        Refusal::BeyondTravel { layer },
+        Refusal::NoVessel { layer },
+        Refusal::Count { field: Field::Travel, found: 1, wanted: 2 },
+        Refusal::Empty,
+        Refusal::AboveCeiling { force: x, ceiling: x },
+        Refusal::CompensationTooStrong { torque: x, limit: x },
+        Refusal::CompensationUnstable { stiffness: x, limit: x },
+        Refusal::WouldRing { stiffness: x, limit: x },
+    ];
+    let table = rows("Refusals of a configuration");
+    assert_eq!(table.len(), 1 + refusals.len());
+    for refusal in refusals {
+        let row = table.iter().find(|row| row.starts_with(&format!("| {} |", called(refusal))));
+        let row = row.unwrap_or_else(|| panic!("{refusal:?}"));
+        // What to do stands last in the sentence, and is the same where it holds no figures.
+        let said = refusal.to_string();
+        if let Some((_, advice)) =
+            said.rsplit_once("; ").filter(|(_, advice)| !advice.contains(|c: char| c.is_ascii_digit()))
+        {
+            assert!(row.contains(advice), "{row} does not say \"{advice}\"");
+        }
+    }
+    let verdicts = rows("Verdicts of the diagnosis");
+    let all = [
+        Verdict::NoMismatch,
+        Verdict::ParametersOnly,
+        Verdict::MissingPhysics,
+        Verdict::Unexplained,
+        Verdict::RandomDisturbance,
+        Verdict::InsufficientExcitation,
+    ];
+    for verdict in all {
+        let name = serde_json::to_value(verdict).expect("it has a name");
+        let name = name.as_str().expect("a word");
+        assert!(verdicts.iter().any(|row| row.starts_with(&format!("| `{name}` |"))), "{name}");
+    }
+}

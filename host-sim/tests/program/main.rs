@@ -1,0 +1,31 @@
+//! The tests of the program and of the crates behind it, in one program: one link instead of twenty-four.
+
+mod acceptance;
+mod characterise;
+#[cfg(all(unix, feature = "class"))]
+mod class;
+#[cfg(all(target_os = "linux", feature = "class"))]
+mod class_hostile;
+mod command_line;
+mod commission;
+mod common;
+mod compensate;
+mod fit_force;
+mod force_depth;
+mod glossary;
+mod guide;
+mod guide_page;
+mod hand;
+mod hostile;
+mod import;
+mod link_faults;
+mod papers_page;
+mod patients;
+mod plant;
+mod recordings;
+mod safety_page;
+#[cfg(unix)]
+mod serial;
+mod simulate;
+mod streams;
+mod training;

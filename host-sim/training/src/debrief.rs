@@ -1,0 +1,375 @@
+//! A trainee's insertions on a page to print: the gesture over the anatomy, force against depth, the figures, two attempts compared,
+//! and what they say in words. It takes its figures from [`crate::score`] and computes none of its own.
+
+use crate::score::gesture::{Gesture, RATE_HZ};
+use crate::score::target::{Outcome, Reached};
+use crate::score::{Insertion, Judge, Span, each};
+use control_core::TICK_HZ;
+use device_sim::failure::Failure;
+use device_sim::profile::Profile;
+use device_sim::session::{Scene, SceneNeedle, SceneVessel, Source};
+use html_report::chart::{Chart, Curve};
+use html_report::section::{Band, Needle, Section, Tube, Way};
+use html_report::{Cell, Sheet, decimal};
+use link::frames::EventKind;
+use recording::read::Recording;
+use std::rc::Rc;
+
+/// One insertion with all that is drawn of it.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    /// The file, and the number of the insertion in it.
+    pub name: String,
+    /// Its figures.
+    pub figures: Insertion,
+    patient: Rc<Profile>,
+    gesture: Gesture,
+    /// Depth along the needle, mm, and force, N, at [`RATE_HZ`].
+    force: Vec<(f64, f64)>,
+    /// Walls that gave way: where in the section, mm, and whose they were.
+    punctures: Vec<((f64, f64), String)>,
+}
+
+/// All insertions of a recording, judged by one profile or each by the one that it was recorded with.
+pub fn attempts(recording: &Recording, by: Option<&Profile>) -> Result<Vec<Attempt>, Failure> {
+    let mut attempts = Vec::new();
+    each(recording, by, |span, judge, profile| {
+        attempts.push(attempt(recording, profile, judge, attempts.len(), span));
+    })?;
+    Ok(attempts)
+}
+
+fn attempt(
+    recording: &Recording,
+    profile: &Rc<Profile>,
+    judge: &Judge,
+    index: usize,
+    span: Span<'_>,
+) -> Attempt {
+    let gesture = span.gesture(profile.skin_tilt_rad());
+    let hello = &span.stretch.hello;
+    let every = (f64::from(TICK_HZ) / RATE_HZ) as usize;
+    let force = span.samples().chunks_exact(every).map(|part| {
+        let mean = |value: &dyn Fn(&control_core::controller::Sample) -> f64| {
+            part.iter().map(value).sum::<f64>() / part.len() as f64
+        };
+        (mean(&|s| f64::from(s.count) * hello.mm_per_count), mean(&|s| hello.force_n(s.dac)))
+    });
+    let layers = &profile.config.patient.layers;
+    let punctures = span.events().filter_map(|event| match event.kind {
+        EventKind::Puncture { layer } => {
+            let at = ((event.tick - span.begin) as f64 / f64::from(TICK_HZ) * RATE_HZ) as usize;
+            let name = layers.get(usize::from(layer)).map(|l| device_sim::session::tissue_name(l.tissue))?;
+            Some((gesture.places.get(at)?.in_section(), name.to_owned()))
+        }
+        _ => None,
+    });
+    Attempt {
+        name: format!("{}, insertion {}", recording.file, index + 1),
+        figures: judge.insertion(span),
+        force: force.collect(),
+        punctures: punctures.collect(),
+        patient: profile.clone(),
+        gesture,
+    }
+}
+
+/// The page; none of no attempt. The first and the last are compared, over the anatomy of the last one's patient.
+pub fn html(attempts: &[Attempt]) -> Option<String> {
+    let patient = &attempts.last()?.patient;
+    let scene = patient.scene(Source::Virtual, None);
+    let compared: Vec<&Attempt> = match attempts {
+        [] => Vec::new(),
+        [only] => vec![only],
+        [first, .., last] => vec![first, last],
+    };
+    let lead = format!(
+        "Patient {}. {} insertion{}{}",
+        patient.name,
+        attempts.len(),
+        if attempts.len() == 1 { "" } else { "s" },
+        if compared.len() > 1 { "; the first and the last are compared." } else { "." }
+    );
+    let mut sheet = Sheet::new("Debrief", &lead);
+    for one in &compared {
+        let words = in_words(&one.figures);
+        sheet.paragraph(&format!("{}: {}", one.name, words.join(" ")));
+    }
+    sheet.heading("The gesture and what was felt");
+    sheet.figures(&pictures(&compared, &scene));
+    sheet.heading("Figures");
+    compare(&mut sheet, &compared);
+    if attempts.len() > 2 {
+        sheet.heading("All insertions");
+        list(&mut sheet, attempts);
+    }
+    sheet.note(
+        "Angles are to the skin. Smoothness is the spectral arc length of the tip's speed on the way in: about −1.4 for one smooth \
+         movement, more negative for one that stops and starts. Path counts the way in, out and sideways.",
+    );
+    Some(sheet.finish())
+}
+
+/// Layers and vessel of a scene as they are drawn on paper.
+pub fn anatomy(scene: &Scene) -> (Vec<Band>, Option<Tube>) {
+    let bands = scene.layers.iter().filter(|layer| !layer.is_vessel && !layer.is_far_wall);
+    let bands = bands.map(|layer| Band { name: layer.name.clone(), top_mm: layer.depth_mm });
+    (bands.collect(), scene.vessel.as_ref().map(tube))
+}
+
+/// The needle of the scene where an attempt was deepest.
+fn needle(attempt: &Attempt, scene: &Scene) -> Option<Needle> {
+    let places = attempt.gesture.places.iter();
+    let deepest = places.max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm))?;
+    let SceneNeedle { length_mm, diameter_mm, bevel_mm, .. } = scene.needle;
+    Some(Needle {
+        tip_mm: deepest.in_section(),
+        angle_rad: deepest.angle_rad,
+        cannula_mm: [length_mm, diameter_mm, bevel_mm],
+    })
+}
+
+fn tube(vessel: &SceneVessel) -> Tube {
+    Tube { near_mm: vessel.axis_mm - vessel.height_mm / 2.0, high_mm: vessel.height_mm }
+}
+
+fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
+    let (bands, vessel) = anatomy(scene);
+    let colour = |index: usize| (index % 6) as u8;
+    let ways = compared.iter().enumerate().map(|(index, one)| Way {
+        name: one.name.clone(),
+        colour: colour(index),
+        points: one.gesture.places.iter().map(|p| p.in_section()).collect(),
+        marks: one.punctures.clone(),
+    });
+    let needle = compared.last().and_then(|one| needle(one, scene));
+    let section = Section { title: "Way of the tip".into(), bands, vessel, ways: ways.collect(), needle };
+    let curves = |points: &dyn Fn(&Attempt) -> Vec<(f64, f64)>| -> Vec<Curve> {
+        let each = compared.iter().enumerate();
+        each.map(|(index, one)| Curve {
+            name: one.name.clone(),
+            colour: colour(index),
+            dashed: false,
+            points: points(one),
+        })
+        .collect()
+    };
+    let seconds = |values: Vec<f64>| -> Vec<(f64, f64)> {
+        values.into_iter().enumerate().map(|(n, v)| (n as f64 / RATE_HZ, v)).collect()
+    };
+    let chart = |title: &str, x_label: &str, y_label: &str, curves: Vec<Curve>| {
+        let (title, x_label, y_label) = (title.into(), x_label.into(), y_label.into());
+        Chart { title, x_label, y_label, curves, ..Chart::default() }.svg()
+    };
+    let depth = curves(&|a| seconds(a.gesture.places.iter().map(|p| p.depth_mm).collect()));
+    let angle = curves(&|a| seconds(a.gesture.places.iter().map(|p| p.angle_rad.to_degrees()).collect()));
+    let caption = |words: &str| words.to_owned();
+    vec![
+        (
+            section.svg(),
+            caption(
+                "Circles: walls that gave way. The needle is drawn where the last attempt was deepest. The picture is to scale.",
+            ),
+        ),
+        (
+            chart(
+                "Force against depth",
+                "depth along the needle, mm",
+                "force, N",
+                curves(&|a| a.force.clone()),
+            ),
+            caption(
+                "Positive resists insertion; below zero the tissue holds the needle back on its way out.",
+            ),
+        ),
+        (
+            chart("Depth", "time, s", "depth along the needle, mm", depth),
+            caption("From the first touch of the skin."),
+        ),
+        (chart("Angle", "time, s", "angle to the skin, °", angle), caption("")),
+    ]
+}
+
+/// Returns a teacher's comments.
+fn in_words(one: &Insertion) -> Vec<String> {
+    let mut words = Vec::new();
+    let aims_elsewhere = one.target.as_ref().filter(|target| target.name != "lumen");
+    if let Some(target) = aims_elsewhere {
+        words.push(of_target(target));
+    } else if one.through_far_wall {
+        words.push("The needle went through the vessel's far wall.".to_owned());
+    } else if one.vessel {
+        words.push(format!("The vessel was entered and held for {} s.", decimal(one.in_lumen_s, 1)));
+    } else if one.vessel_contact_path_mm.is_some() {
+        words.push("The vessel was touched and not entered.".to_owned());
+    } else {
+        words.push("The vessel was not met.".to_owned());
+    }
+    if !one.hit.is_empty() {
+        words.push(format!("To be spared and touched, {}: {}.", times(one.spared_hits), one.hit.join(", ")));
+    }
+    if !one.spared.is_empty() {
+        words.push(format!("Spared: {}.", one.spared.join(", ")));
+    }
+    if one.redirections > 0 {
+        words.push(format!("The needle was redirected {}.", times(one.redirections)));
+    }
+    if one.barriers > 0 {
+        words.push(format!("It was turned further than the tissue allows {}.", times(one.barriers)));
+    }
+    if let Some(error) = one.angle_largest_error_deg.filter(|e| e.abs() > 10.0) {
+        let which = if error > 0.0 { "steep" } else { "flat" };
+        words.push(format!("It was too {which} by up to {}°.", decimal(error.abs(), 0)));
+    }
+    words
+}
+
+/// Says in a sentence whether a target was reached.
+fn of_target(target: &Reached) -> String {
+    let beside = match target.passed_beside {
+        0 => String::new(),
+        count => format!(" The needle passed beside it {}.", times(count)),
+    };
+    let name = &target.name;
+    let said = match target.outcome {
+        Outcome::Missed => format!("The {name} was missed."),
+        Outcome::Reached => {
+            format!("The {name} was reached and held for {} s.", decimal(target.time_s, 1))
+        }
+        Outcome::Beyond => {
+            format!(
+                "The {name} was reached, and the needle went on beyond it; {} s in it.",
+                decimal(target.time_s, 1)
+            )
+        }
+    };
+    said + &beside
+}
+
+fn times(count: u32) -> String {
+    match count {
+        1 => "once".into(),
+        2 => "twice".into(),
+        n => format!("{n} times"),
+    }
+}
+
+/// A figure of the table: its words, its value, its decimals.
+type Figure = (&'static str, fn(&Insertion) -> Option<f64>, usize);
+
+const FIGURES: [Figure; 22] = [
+    ("time in tissue, s", |i| Some(i.time_s), 2),
+    ("time in the lumen, s", |i| Some(i.in_lumen_s), 2),
+    ("time in the target, s", |i| i.target.as_ref().map(|target| target.time_s), 2),
+    ("path of the tip, mm", |i| Some(i.path_mm), 1),
+    ("deepest, along the needle, mm", |i| Some(i.depth_mm), 1),
+    ("vessel first touched at, mm", |i| i.vessel_contact_path_mm, 2),
+    ("went on in the vessel by, mm", |i| i.overshoot_mm, 1),
+    ("walls that gave way", |i| Some(f64::from(i.punctures)), 0),
+    ("layers met again in the needle's track", |i| Some(f64::from(i.met_in_track)), 0),
+    ("layers pierced once more", |i| Some(f64::from(i.pierced_again)), 0),
+    ("blood in the hub, times", |i| Some(f64::from(i.flashbacks)), 0),
+    ("through the far wall", |i| Some(f64::from(u8::from(i.through_far_wall))), 0),
+    ("touches of what was to be spared", |i| Some(f64::from(i.spared_hits)), 0),
+    ("passes", |i| Some(f64::from(i.passes)), 0),
+    ("redirections", |i| Some(f64::from(i.redirections)), 0),
+    ("largest force, N", |i| Some(i.peak_force_n), 2),
+    ("angle at the first puncture, °", |i| i.angle_deg, 1),
+    ("angle error along the way, ° rms", |i| i.angle_rms_error_deg, 1),
+    ("largest angle error, °", |i| i.angle_largest_error_deg, 1),
+    ("turned beyond the largest angle, times", |i| Some(f64::from(i.barriers)), 0),
+    ("largest lateral force, N", |i| i.largest_lateral_n, 2),
+    ("smoothness", |i| i.smoothness, 2),
+];
+
+fn compare(sheet: &mut Sheet, compared: &[&Attempt]) {
+    let mut head = vec![""];
+    head.extend(compared.iter().map(|one| one.name.as_str()));
+    if compared.len() == 2 {
+        head.push("change");
+    }
+    let rows = FIGURES.iter().map(|(words, value, decimals)| {
+        let values: Vec<Option<f64>> = compared.iter().map(|one| value(&one.figures)).collect();
+        let mut row = vec![Cell::text(*words)];
+        row.extend(values.iter().map(|v| Cell::number(*v, *decimals)));
+        if let [Some(first), Some(last)] = values[..] {
+            row.push(Cell::number(Some(last - first), *decimals));
+        } else if values.len() == 2 {
+            row.push(Cell::number(None, 0));
+        }
+        row
+    });
+    sheet.table(&head, &rows.collect::<Vec<_>>());
+}
+
+fn list(sheet: &mut Sheet, attempts: &[Attempt]) {
+    let head = [
+        "",
+        "time, s",
+        "lumen, s",
+        "path, mm",
+        "force, N",
+        "angle, ° rms",
+        "smoothness",
+        "far wall",
+        "redirections",
+    ];
+    let rows = attempts.iter().map(|one| {
+        let figures = &one.figures;
+        vec![
+            Cell::text(one.name.clone()),
+            Cell::number(Some(figures.time_s), 1),
+            Cell::number(Some(figures.in_lumen_s), 1),
+            Cell::number(Some(figures.path_mm), 1),
+            Cell::number(Some(figures.peak_force_n), 2),
+            Cell::number(figures.angle_rms_error_deg, 1),
+            Cell::number(figures.smoothness, 2),
+            Cell::text(if figures.through_far_wall { "through" } else { "" }),
+            Cell::number(Some(f64::from(figures.redirections)), 0),
+        ]
+    });
+    sheet.table(&head, &rows.collect::<Vec<_>>());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_teacher_would_say_follows_from_the_figures() {
+        let good = Insertion { vessel: true, in_lumen_s: 1.25, ..Insertion::default() };
+        assert_eq!(in_words(&good), ["The vessel was entered and held for 1.2 s."]);
+        let bad = Insertion {
+            through_far_wall: true,
+            spared_hits: 2,
+            hit: vec!["tendon".into()],
+            spared: vec!["cartilage".into()],
+            redirections: 3,
+            barriers: 1,
+            angle_largest_error_deg: Some(-14.2),
+            ..good
+        };
+        let said = in_words(&bad).join(" ");
+        for words in [
+            "far wall",
+            "touched, twice: tendon.",
+            "Spared: cartilage.",
+            "redirected 3 times",
+            "tissue allows once",
+            "too flat by up to 14°",
+        ] {
+            assert!(said.contains(words), "{said}");
+        }
+        assert_eq!(in_words(&Insertion::default()), ["The vessel was not met."]);
+        let of = |outcome, passed_beside| {
+            let target = Reached { name: "bursa".into(), outcome, time_s: 0.74, passed_beside };
+            in_words(&Insertion { target: Some(target), ..Insertion::default() }).join(" ")
+        };
+        assert_eq!(of(Outcome::Missed, 1), "The bursa was missed. The needle passed beside it once.");
+        assert_eq!(of(Outcome::Reached, 0), "The bursa was reached and held for 0.7 s.");
+        assert!(
+            of(Outcome::Beyond, 2)
+                .contains("went on beyond it; 0.7 s in it. The needle passed beside it twice.")
+        );
+    }
+}

@@ -1,0 +1,6 @@
+//! Recorded insertions judged: scores, comparisons of attempts, learning curves, practice goals.
+
+pub mod debrief;
+pub mod live_score;
+pub mod practice;
+pub mod score;

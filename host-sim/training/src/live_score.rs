@@ -1,0 +1,99 @@
+//! A trainee's insertions while they happen, judged by the same code as a recording: the samples of an insertion are kept
+//! until the needle has left the skin, and then scored as `host-sim score` scores them.
+
+use crate::score::{Insertion, Judge, Span, spans};
+use control_core::TICK_HZ;
+use control_core::controller::Sample;
+use device_sim::profile::Profile;
+use device_sim::session::Batch;
+use link::frames::EventKind;
+use recording::export::Stretch;
+use recording::messages::Hello;
+
+/// Samples kept while the needle is outside: an event may be told a moment before or after its samples. 0.5 s.
+const OUTSIDE: usize = TICK_HZ as usize / 2;
+/// An insertion that takes longer than five minutes is left to the recording.
+const LONGEST: usize = 300 * TICK_HZ as usize;
+
+/// The insertion in progress.
+#[derive(Debug, Default)]
+pub struct LiveScore {
+    profile: Option<Profile>,
+    stretch: Option<Stretch>,
+    /// Tick of the first sample ever: begins are counted from it, as in a recording.
+    zero_tick: Option<u64>,
+}
+
+impl LiveScore {
+    /// Insertions from now on are into `profile`; one in progress is dropped.
+    pub fn patient(&mut self, profile: Profile) {
+        self.profile = Some(profile);
+        if let Some(stretch) = &mut self.stretch {
+            let end = stretch.end_tick();
+            begin_at(stretch, end);
+        }
+    }
+
+    /// Takes what has arrived; the insertions that have ended with it.
+    pub fn take(&mut self, batch: &Batch) -> Vec<Insertion> {
+        let mut ended = Vec::new();
+        self.take_each(batch, |_, insertion| ended.push(insertion));
+        ended
+    }
+
+    /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its figures.
+    pub fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
+        if let Some(hello) = &batch.hello {
+            let hello = Hello::from(hello);
+            let (samples, events) = (Vec::new(), Vec::new());
+            self.stretch = Some(Stretch { hello, first_tick: 0, samples, events, setup: None });
+        }
+        let Some(stretch) = &mut self.stretch else { return };
+        for (tick, sample) in &batch.samples {
+            self.zero_tick.get_or_insert(*tick);
+            append(stretch, *tick, *sample);
+        }
+        let first = stretch.first_tick;
+        stretch.events.extend(batch.events.iter().map(|h| h.event).filter(|event| event.tick >= first));
+        self.ended(see);
+    }
+
+    /// Shows the insertions whose samples are all here; they are forgotten.
+    fn ended(&mut self, mut see: impl FnMut(Span<'_>, Insertion)) {
+        let (Some(stretch), Some(profile)) = (&mut self.stretch, &self.profile) else { return };
+        let end = stretch.end_tick();
+        let leaves = |event: &&link::frames::Event| {
+            matches!(event.kind, EventKind::Exit { layer: 0 }) && event.tick < end
+        };
+        let Some(left) = stretch.events.iter().rfind(leaves).map(|event| event.tick) else {
+            if !stretch.events.iter().any(|event| matches!(event.kind, EventKind::Contact { layer: 0 })) {
+                let first = end.saturating_sub(OUTSIDE as u64).max(stretch.first_tick);
+                begin_at(stretch, first);
+            }
+            return;
+        };
+        let judge = Judge::new(profile, self.zero_tick.unwrap_or_default());
+        for span in spans(stretch).into_iter().filter(|span| span.end <= left) {
+            see(span, judge.insertion(span));
+        }
+        begin_at(stretch, left + 1);
+    }
+}
+
+/// Adds a sample. After a gap the insertion begins anew: one with a hole in it has no score, as in a recording.
+fn append(stretch: &mut Stretch, tick: u64, sample: Sample) {
+    if stretch.end_tick() != tick || stretch.samples.len() >= LONGEST {
+        stretch.samples.clear();
+        stretch.events.retain(|event| event.tick >= tick);
+        stretch.first_tick = tick;
+    }
+    stretch.samples.push(sample);
+}
+
+/// Forgets what was before `tick`, which lies in the stretch or at its end.
+fn begin_at(stretch: &mut Stretch, tick: u64) {
+    let gone = (tick - stretch.first_tick) as usize;
+    stretch.samples.drain(..gone.min(stretch.samples.len()));
+    stretch.first_tick = tick;
+    stretch.events.retain(|event| event.tick >= tick);
+}

@@ -1,0 +1,185 @@
+//! What an insertion was to reach and what it was to spare, by name, from the device's events and where the tip was along the skin.
+//!
+//! A target is a layer, or a part of it that ends to either side: layers of the device go on for ever, so that a bursa is missed here only
+//! where its patient says how far it reaches. What the hand feels there is the layer all the same.
+
+use device_sim::profile::Goal;
+use link::frames::{Event, EventKind};
+use serde::{Deserialize, Serialize};
+
+/// Whether a target was reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The tip was never in it.
+    #[default]
+    Missed,
+    /// The tip was in it and never deeper.
+    Reached,
+    /// The tip was in it and went through it.
+    Beyond,
+}
+
+/// What became of a target.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reached {
+    /// What it is called.
+    pub name: String,
+    /// Whether it was reached.
+    pub outcome: Outcome,
+    /// Time in it, all visits together, s.
+    pub time_s: f64,
+    /// How often the tip passed its depth where it does not reach.
+    pub passed_beside: u32,
+}
+
+/// Reads `events`, which are in their order in time, of the insertion from `begin` to `end`. `along_mm` tells where the tip was along the
+/// skin at a tick, and a tick lasts `tick_s`.
+pub fn reached(
+    events: &[Event],
+    (begin, end): (u64, u64),
+    target: &Goal,
+    along_mm: impl Fn(u64) -> Option<f64>,
+    tick_s: f64,
+) -> Reached {
+    let mut found = Reached { name: target.name.clone(), ..Reached::default() };
+    let (mut since, mut ticks, mut beyond) = (None::<u64>, 0, false);
+    let is_there = |tick: u64| match (target.reach_mm, along_mm(tick)) {
+        (Some((from, to)), Some(along)) => (from..=to).contains(&along),
+        _ => true,
+    };
+    for event in events.iter().filter(|event| (begin..=end).contains(&event.tick)) {
+        let tick = event.tick;
+        if enters(&event.kind, target.layer, target.has_wall)
+            || leaves_below(&event.kind, target.below) && found.outcome != Outcome::Missed
+        {
+            if is_there(tick) {
+                since = since.or(Some(tick));
+                found.outcome = if beyond { Outcome::Beyond } else { Outcome::Reached };
+            } else {
+                found.passed_beside += 1;
+            }
+        } else if target.below.is_some_and(|(layer, has_wall)| enters(&event.kind, layer, has_wall)) {
+            beyond |= since.is_some();
+            ticks += since.take().map_or(0, |since| tick - since);
+            found.outcome = if beyond { Outcome::Beyond } else { found.outcome };
+        } else if event.kind == (EventKind::Exit { layer: target.layer }) {
+            ticks += since.take().map_or(0, |since| tick - since);
+        }
+    }
+    ticks += since.map_or(0, |since| end - since);
+    found.time_s = ticks as f64 * tick_s;
+    found
+}
+
+/// Whether the tip comes into a layer from above.
+fn enters(kind: &EventKind, layer: u8, has_wall: bool) -> bool {
+    match kind {
+        EventKind::Contact { layer: met } => *met == layer && !has_wall,
+        EventKind::Puncture { layer: met } | EventKind::InTrack { layer: met } => *met == layer && has_wall,
+        _ => false,
+    }
+}
+
+/// Whether the tip comes back from the layer below.
+fn leaves_below(kind: &EventKind, below: Option<(u8, bool)>) -> bool {
+    below.is_some_and(|(layer, _)| *kind == EventKind::Exit { layer })
+}
+
+/// Names of what was to be spared: touched, and left alone. `spared` has number and name of each.
+pub fn hit_and_spared(
+    events: &[Event],
+    (begin, end): (u64, u64),
+    spared: &[(u8, String)],
+) -> (Vec<String>, Vec<String>) {
+    let is_hit = |number: u8| {
+        let within = events.iter().filter(|event| (begin..=end).contains(&event.tick));
+        within.into_iter().any(|event| event.kind == EventKind::Contact { layer: number })
+    };
+    let (hit, left): (Vec<_>, Vec<_>) = spared.iter().cloned().partition(|(number, _)| is_hit(*number));
+    let names = |all: Vec<(u8, String)>| all.into_iter().map(|(_, name)| name).collect();
+    (names(hit), names(left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use EventKind::{Contact, Exit, Puncture};
+
+    fn at(told: &[(u64, EventKind)]) -> Vec<Event> {
+        told.iter().map(|(tick, kind)| Event { tick: *tick, kind: *kind }).collect()
+    }
+
+    fn bursa(reach_mm: Option<(f64, f64)>) -> Goal {
+        Goal { name: "bursa".into(), layer: 3, has_wall: false, below: Some((4, false)), reach_mm }
+    }
+
+    fn judge(told: &[(u64, EventKind)], target: &Goal, along: impl Fn(u64) -> f64) -> Reached {
+        reached(&at(told), (0, 1_000), target, |tick| Some(along(tick)), 1e-3)
+    }
+
+    /// Touched at 100, out again at 400: 0.3 s, worked by hand.
+    #[test]
+    fn a_target_is_reached_with_its_time() {
+        let told = [(0, Contact { layer: 0 }), (100, Contact { layer: 3 }), (400, Exit { layer: 3 })];
+        let found = judge(&told, &bursa(None), |_| 0.0);
+        assert_eq!((found.outcome, found.passed_beside), (Outcome::Reached, 0));
+        assert!((found.time_s - 0.3).abs() < 1e-9);
+        assert_eq!(judge(&told[..1], &bursa(None), |_| 0.0).outcome, Outcome::Missed);
+        // Until the end where it is not left.
+        assert!((judge(&told[..2], &bursa(None), |_| 0.0).time_s - 0.9).abs() < 1e-9);
+    }
+
+    /// In at 100, through at 300, back at 600, out at 700: 0.2 and 0.1 s.
+    #[test]
+    fn beyond_is_beyond_even_when_it_comes_back() {
+        let told = [
+            (100, Contact { layer: 3 }),
+            (300, Contact { layer: 4 }),
+            (600, Exit { layer: 4 }),
+            (700, Exit { layer: 3 }),
+        ];
+        let found = judge(&told, &bursa(None), |_| 0.0);
+        assert!(found.outcome == Outcome::Beyond && (found.time_s - 0.3).abs() < 1e-9, "{found:?}");
+    }
+
+    /// First beside it, at 26 mm along the skin, then redirected to 20 mm.
+    #[test]
+    fn a_target_that_ends_is_passed_beside_and_then_reached() {
+        let told = [
+            (100, Contact { layer: 3 }),
+            (200, Exit { layer: 3 }),
+            (500, Contact { layer: 3 }),
+            (600, Exit { layer: 3 }),
+        ];
+        let along = |tick: u64| if tick < 300 { 26.0 } else { 20.0 };
+        let found = judge(&told, &bursa(Some((12.0, 24.0))), along);
+        assert_eq!((found.outcome, found.passed_beside), (Outcome::Reached, 1));
+        assert!((found.time_s - 0.1).abs() < 1e-9, "{found:?}");
+        let missed = judge(&told[..2], &bursa(Some((12.0, 24.0))), along);
+        assert_eq!((missed.outcome, missed.passed_beside), (Outcome::Missed, 1));
+    }
+
+    #[test]
+    fn a_target_with_a_wall_is_entered_where_it_gives_way() {
+        let lumen =
+            Goal { name: "lumen".into(), layer: 2, has_wall: true, below: Some((3, true)), reach_mm: None };
+        let touched = [(100, Contact { layer: 2 }), (200, Exit { layer: 2 })];
+        assert_eq!(judge(&touched, &lumen, |_| 0.0).outcome, Outcome::Missed);
+        let told = [
+            (100, Contact { layer: 2 }),
+            (150, Puncture { layer: 2 }),
+            (250, Contact { layer: 3 }),
+            (400, Puncture { layer: 3 }),
+        ];
+        let found = judge(&told, &lumen, |_| 0.0);
+        assert!(found.outcome == Outcome::Beyond && (found.time_s - 0.25).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn what_was_to_be_spared_is_named() {
+        let spared = [(4, "tendon".to_owned()), (5, "cartilage".to_owned())];
+        let (hit, left) = hit_and_spared(&at(&[(10, Contact { layer: 4 })]), (0, 100), &spared);
+        assert_eq!((hit, left), (vec!["tendon".to_owned()], vec!["cartilage".to_owned()]));
+    }
+}
