@@ -77,6 +77,9 @@ export class BodyView {
   setScene(scene) {
     this.scene = scene;
     this.depth.max = scene.needle.length_mm;
+    // A real device and a recording have no hand that a slider could move.
+    this.depth.disabled = !scene.hand;
+    this.depth.closest("figcaption").hidden = !scene.hand;
     if (this.picture) this.build();
   }
 
@@ -99,7 +102,6 @@ export class BodyView {
   draw(view) {
     if (!this.open || !this.picture?.built) return;
     const angle = view.angle ?? view.tilt - this.scene.skin_tilt_rad;
-    this.depth.disabled = !view.canDrag;
     // While a person holds the slider it says where the hand wants to be, else where the needle is.
     if (!view.person || document.activeElement !== this.depth) this.depth.value = view.depth.toFixed(1);
     const begin = performance.now();
@@ -108,7 +110,7 @@ export class BodyView {
     const stepped = performance.now();
     this.limb?.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
     const drawn = performance.now();
-    this.ultrasound.draw(this.picture, view.seconds);
+    this.ultrasound.draw(this.picture, view.seconds, view.depth);
     this.stats.stepMs = stepped - begin;
     this.stats.drawMs = drawn - stepped;
     this.stats.imageMs = performance.now() - drawn;

@@ -2,19 +2,23 @@
 
 const MOST_PIXELS_PER_POINT = 2;
 
-/** Keeps `canvas` at its size on screen; `surface.width` and `height` are in CSS pixels, and so are all drawings. */
+/** Keeps `canvas` at its size on screen; `surface.width` and `height` are in points, and so are all drawings. A point is `surface.unit`
+ *  CSS pixels: a tenth of the size of text of the whole page (style.css), so that words on a canvas grow with those beside it. */
 export function surface(canvas) {
   const context = canvas.getContext("2d", { alpha: false });
-  const result = { canvas, context, width: 1, height: 1 };
+  const result = { canvas, context, width: 1, height: 1, unit: 1 };
   const fit = () => {
     const ratio = Math.min(window.devicePixelRatio || 1, MOST_PIXELS_PER_POINT);
-    result.width = Math.max(1, canvas.clientWidth);
-    result.height = Math.max(1, canvas.clientHeight);
-    canvas.width = Math.round(result.width * ratio);
-    canvas.height = Math.round(result.height * ratio);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const root = getComputedStyle(document.documentElement);
+    result.unit = parseFloat(root.fontSize) / 10 || 1;
+    result.width = Math.max(1, canvas.clientWidth) / result.unit;
+    result.height = Math.max(1, canvas.clientHeight) / result.unit;
+    const pixels = ratio * result.unit;
+    canvas.width = Math.round(result.width * pixels);
+    canvas.height = Math.round(result.height * pixels);
+    context.setTransform(pixels, 0, 0, pixels, 0, 0);
     // What cannot be seen through is black until it is drawn on, and after every change of size.
-    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--panel").trim();
+    context.fillStyle = root.getPropertyValue("--panel").trim();
     context.fillRect(0, 0, result.width, result.height);
   };
   new ResizeObserver(fit).observe(canvas);

@@ -60,7 +60,18 @@ export class Hand {
     this.canvas.setAttribute("aria-valuemin", String(DRAWN_BACK_MM));
     this.canvas.setAttribute("aria-valuemax", this.deepest.toFixed(0));
     this.demo.hidden = !this.movable;
+    this.nameButtons(this.source === "recording");
     this.say();
+  }
+
+  /** A recording has no torque: the same two buttons play and pause it. */
+  nameButtons(recording) {
+    const [start, stop] = [document.getElementById("start"), document.getElementById("stop")];
+    start.textContent = recording ? "Play" : "Start";
+    start.title = recording ? "The recording goes on" : "Amplifier on; torque fades in";
+    stop.firstChild.data = recording ? "Pause" : "Stop";
+    const what = recording ? "The recording pauses" : "Torque off at once";
+    stop.title = `${what}: Escape, or Space while no control has the focus`;
   }
 
   /** Takes the server's message of who moves the needle, and its position. */

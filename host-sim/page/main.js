@@ -35,7 +35,7 @@ let linkStatus = null;
 /** The newest state, which is drawn. */
 const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, lateral: 0, vessel: "outside", state: "idle",
-  hand: 0, person: false, canDrag: false, seconds: 0, ghost: NaN,
+  hand: 0, person: false, seconds: 0, ghost: NaN,
 };
 /** The number of jumps of the played recording when this was drawn. */
 let jumps = 0;
@@ -46,7 +46,6 @@ const receive = {
     view.known = false;
     view.tilt = scene.tilt_rad;
     view.angle = scene.tilt_rad - scene.skin_tilt_rad;
-    view.canDrag = scene.hand;
     forget();
     hand.followScene(scene);
     panel.scene(scene);

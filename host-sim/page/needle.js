@@ -1,6 +1,8 @@
 // The needle in the section: cannula, bevel and hub to scale, what a person takes hold of, and the force in the hand. Its measures are
 // the scene's, the same that the three-dimensional view and the ultrasound draw.
 
+import { number } from "./panel.js";
+
 /** Length of the arrow for a force, mm. */
 const MM_PER_N = 4;
 /** The tip waits so far outside before an insertion, mm along the needle; pictures have room for it. */
@@ -111,7 +113,9 @@ export function drawForce(g, colours, scale, needle, force) {
   g.translate(tail, y);
   g.lineJoin = "round";
   g.lineCap = "round";
-  const head = Math.sign(length) * Math.min(10, Math.abs(length));
+  // A small force has a small head, so that it still looks like an arrow.
+  const head = Math.sign(length) * Math.min(10, 0.6 * Math.abs(length));
+  const half = Math.max(2.5, 0.6 * Math.abs(head));
   const arrow = () => {
     g.beginPath();
     g.moveTo(0, -5);
@@ -119,13 +123,13 @@ export function drawForce(g, colours, scale, needle, force) {
     if (Math.abs(length) > 2) {
       g.moveTo(0, 0);
       g.lineTo(-length, 0);
-      g.moveTo(head - length, -6);
+      g.moveTo(head - length, -half);
       g.lineTo(-length, 0);
-      g.lineTo(head - length, 6);
+      g.lineTo(head - length, half);
     }
     g.stroke();
   };
-  for (const [colour, width] of [[colours.panel, 8], [colours.force, 4]]) {
+  for (const [colour, width] of [[colours.panel, 6], [colours.force, 2.5]]) {
     g.strokeStyle = colour;
     g.lineWidth = width;
     arrow();
@@ -136,8 +140,9 @@ export function drawForce(g, colours, scale, needle, force) {
   const at = (length < 0 ? -length : 0) + 10;
   g.strokeStyle = colours.panel;
   g.lineWidth = 5;
-  g.strokeText(`${force.toFixed(2)} N`, at, 0);
+  const text = `${number(force, 2)} N`;
+  g.strokeText(text, at, 0);
   g.fillStyle = colours.force;
-  g.fillText(`${force.toFixed(2)} N`, at, 0);
+  g.fillText(text, at, 0);
   g.restore();
 }

@@ -53,9 +53,12 @@ function sayValue(slider) {
 
 const whole = new Intl.NumberFormat("en-GB");
 
-function stateWords(view, condition) {
+function stateWords(view, condition, played) {
   if (condition === "paused") return ["Recording paused", "off"];
-  return condition === "live" && view.known ? STATES[view.state] ?? STATES.unknown : ["No data", "warn"];
+  if (condition !== "live" || !view.known) return ["No data", "warn"];
+  const [text, tone] = STATES[view.state] ?? STATES.unknown;
+  // What a recording shows has been: nothing runs.
+  return played ? [text.replace("Running", "Recording"), tone] : [text, tone];
 }
 
 export class Panel {
@@ -79,6 +82,8 @@ export class Panel {
     write(byId("subtitle"), parts.join(" · "));
     byId("subtitle").title = parts.join(" · ");
     byId("lateral-row").hidden = true;
+    this.played = scene.source.kind === "recording";
+    byId("recording-chip").hidden = this.played;
   }
 
   device(device) {
@@ -115,11 +120,11 @@ export class Panel {
         lamp.setAttribute("aria-label", `${LIMITS[i][1]}: ${tone === "warn" ? "in force" : "not in force"}`);
       }
     });
-    const [state, tone] = stateWords(view, condition);
+    const [state, tone] = stateWords(view, condition, this.played);
     chip("state", state, tone);
     // A screen reader is told what has changed, not each phase of an insertion.
     const banner = byId("banner");
-    write(byId("announcement"), banner.hidden ? (tone === "good" ? "Running" : state) : banner.textContent);
+    write(byId("announcement"), banner.hidden ? (tone === "good" ? state.split(":")[0] : state) : banner.textContent);
     for (const slider of this.sliders) sayValue(slider);
     const powered = condition === "live" && view.state !== "idle" && view.state !== "fault";
     byId("start").disabled = condition !== "paused" && (condition !== "live" || powered);

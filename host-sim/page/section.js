@@ -31,12 +31,12 @@ export class Section {
     /** While a person drags the needle: what a pixel means stays as it was when it was taken. */
     this.held = false;
     /** The values for tests: the drawn places of layers, tip and the hub's end and the needle's angle, in CSS pixels and rad. */
-    this.drawn = { tops: [], entry: this.origin, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
+    this.drawn = { tops: [], entry: { x: NaN, y: NaN }, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
   }
 
   /** Millimetres along the needle for a movement of `dx`, `dy` CSS pixels. */
   along(dx, dy) {
-    return (dx * this.axis.x + dy * this.axis.y) / this.scale;
+    return (dx * this.axis.x + dy * this.axis.y) / (this.scale * this.surface.unit);
   }
 
   /** One picture. `view` is { depth, force, motor, angle, hand, person, ghost, seconds }, `tissue` a Tissue. */
@@ -106,12 +106,14 @@ export class Section {
   /** Says what was drawn where. */
   note(view, tissue) {
     const { drawn } = this;
-    const end = view.depth - wholeLength(tissue.needle);
-    drawn.scale = this.scale;
+    const { unit } = this.surface;
+    const place = (mm) => ({ x: unit * this.x(mm * this.axis.x), y: unit * this.y(mm * this.axis.y) });
+    drawn.scale = unit * this.scale;
     drawn.angle = this.axis.angle;
-    drawn.tops = tissue.layers.map((layer) => this.y(layer.depth_mm));
-    drawn.tip = { x: this.x(view.depth * this.axis.x), y: this.y(view.depth * this.axis.y) };
-    drawn.hub = { x: this.x(end * this.axis.x), y: this.y(end * this.axis.y) };
+    drawn.tops = tissue.layers.map((layer) => unit * this.y(layer.depth_mm));
+    drawn.entry = place(0);
+    drawn.tip = place(view.depth);
+    drawn.hub = place(view.depth - wholeLength(tissue.needle));
   }
 
   x(mm) { return this.origin.x + mm * this.scale; }
@@ -214,7 +216,7 @@ export class Section {
       g.lineTo(mm * this.scale, mm % 5 ? 4 : 8);
     }
     g.stroke();
-    g.font = `12px ${this.colours.font}`;
+    g.font = `600 12px ${this.colours.font}`;
     g.textAlign = "center";
     g.textBaseline = "top";
     // Where five millimetres are narrower than their label, every second one has it.
@@ -310,7 +312,7 @@ export class Section {
       g.lineWidth = wide;
       g.stroke();
     }
-    g.font = `12px ${this.colours.font}`;
+    g.font = `600 12px ${this.colours.font}`;
     g.textAlign = "left";
     g.textBaseline = "bottom";
     this.onTissue(g, "5 mm", x + 4, y - 4);

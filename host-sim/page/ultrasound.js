@@ -37,7 +37,7 @@ export class Ultrasound {
     });
     canvas.addEventListener("pointermove", (event) => {
       if (last?.pointerId !== event.pointerId) return;
-      const mm = IMAGE_WIDTH_MM / this.shown.width;
+      const mm = IMAGE_WIDTH_MM / (this.shown.width * this.surface.unit);
       const [dx, dy] = [event.clientX - last.clientX, event.clientY - last.clientY];
       if (event.shiftKey) this.move("azimuth", dx * 0.006);
       else {
@@ -84,8 +84,8 @@ export class Ultrasound {
     }
   }
 
-  /** One picture, `seconds` after the last. */
-  draw(picture, seconds) {
+  /** One picture, `seconds` after the last, with the tip at `depth` mm along the needle. */
+  draw(picture, seconds, depth) {
     this.since += seconds;
     if (this.since >= EVERY_S) {
       const grey = picture.image(this.probe, Math.min(this.since, 0.5), 0);
@@ -107,7 +107,7 @@ export class Ultrasound {
     g.drawImage(this.image, 0, 0);
     g.restore();
     this.ruler(g, left, top, scale);
-    this.words_(g, left, top);
+    this.words_(g, left, top, depth);
   }
 
   ruler(g, left, top, scale) {
@@ -125,13 +125,14 @@ export class Ultrasound {
     for (let mm = 0; mm <= this.probe.depth; mm += 5) g.fillText(`${mm}`, left - 14, top + mm * scale);
   }
 
-  words_(g, left, top) {
+  words_(g, left, top, depth) {
     if (!this.seen) return;
     const { share, tip, beside, tipShare, inserted } = this.seen;
-    let text = "Needle outside";
-    if (inserted > 0) {
+    const soFar = inserted > 0 ? `tip seen ${(100 * tipShare).toFixed(0)} % of the time` : "";
+    let text = ["Needle outside", soFar].filter(Boolean).join("; ");
+    if (depth > 0) {
       const where = tip ? "tip in view" : Math.abs(beside) > 0.3 ? `tip ${Math.abs(beside).toFixed(1)} mm beside the plane` : "tip out of view";
-      text = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}; tip seen ${(100 * tipShare).toFixed(0)} % of the time`;
+      text = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}; ${soFar}`;
     }
     g.fillStyle = "#e8eff4";
     g.font = `12px ${this.colours.font}`;

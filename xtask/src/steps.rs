@@ -146,8 +146,13 @@ fn board() -> Result<(), Failure> {
     shell::run(tests.args(["--test", "board"]))
 }
 
+/// Checks a page for accessibility, at the version that the page was checked with. MPL 2.0: it is used by the test only, and is no
+/// part of any product.
+const ACCESSIBILITY: [&str; 1] = ["axe-core@4.14.1"];
+
 fn browser() -> Result<(), Failure> {
     setup::browser()?;
+    setup::node_packages(&ACCESSIBILITY)?;
     site::build()?;
     shell::run(tests().args(["--test", "page"]))
 }

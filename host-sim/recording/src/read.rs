@@ -6,6 +6,7 @@ use device_sim::failure::Failure;
 use device_sim::library::Text;
 use device_sim::profile::Profile;
 use mcap::read::{MessageStream, Options};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// A recording in memory.
@@ -21,11 +22,23 @@ pub struct Recording {
     pub cut: Option<String>,
 }
 
+/// Adds the extension that a person left out, if that is the file that exists.
+fn with_extension(path: &Path) -> Cow<'_, Path> {
+    if path.extension().is_none() && !path.exists() {
+        let whole = path.with_extension("mcap");
+        if whole.exists() {
+            return Cow::Owned(whole);
+        }
+    }
+    Cow::Borrowed(path)
+}
+
 impl Recording {
-    /// Reads a recording. A file that was cut is read up to the cut.
+    /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap` unless there is a file of that name.
     pub fn read(path: &Path) -> Result<Self, Failure> {
+        let path = with_extension(path);
         let shown = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|cause| {
+        let bytes = std::fs::read(&path).map_err(|cause| {
             Failure::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
         })?;
         Self::parse(shown, &bytes)

@@ -125,6 +125,19 @@ fn misspelt_missing_and_empty_input_is_named_with_a_remedy() {
 }
 
 #[test]
+fn a_recording_is_found_without_its_extension() {
+    let dir = folder("without-extension");
+    for day in ["monday", "friday"] {
+        let file = dir.join(format!("{day}.mcap"));
+        run_well(&["run", "--headless", "--fast", "--quiet", "--seconds", "6", "--record", text(&file)]);
+    }
+    let (monday, friday, out) = (dir.join("monday"), dir.join("friday"), dir.join("debrief"));
+    let said = run_well(&["debrief", text(&monday), text(&friday), "--out", text(&out)]);
+    assert!(said.trim_end().ends_with("insertions=2"), "{said}");
+    refused(&run(&["score", text(&dir.join("tuesday"))]), 2, &["tuesday", "check its path"]);
+}
+
+#[test]
 fn a_port_in_use_is_one_line_and_status_one() {
     let taken = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
     let port = taken.local_addr().expect("it is bound").port().to_string();

@@ -1,7 +1,10 @@
 //! The page, in a real browser.
 
+mod access;
 mod browser;
 mod graphics;
 mod guide;
+mod needle;
 mod patient;
+mod practice;
 mod views;

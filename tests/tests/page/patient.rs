@@ -1,5 +1,6 @@
 //! A patient is chosen and edited in the page while the demo goes on; a recording is played and scrubbed.
 
+use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -107,6 +108,7 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failur
         ))?;
         page.wait(&format!("the needle at {at_s} s"), SOON, &format!("{place} && {punctures} === {given}"))?;
     }
+    only_what_a_recording_has(&mut page)?;
     let paused = page.number("__stats.depthMm")?;
     std::thread::sleep(Duration::from_millis(600));
     let still = page.number("__stats.depthMm")?;
@@ -116,3 +118,26 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failur
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
+
+/// A recording has no device to start, no hand and no patient to choose: their controls are not there, and its computed force is
+/// drawn at the place that was sought.
+fn only_what_a_recording_has(page: &mut Page) -> Result<(), Failure> {
+    let shown = page.evaluate(
+        "[...document.querySelectorAll('button, input, select')].filter(e => e.checkVisibility()).map(e => e.id)",
+    )?;
+    let expected = json!(["start", "stop", "view-section", "view-body", "scrub-place"]);
+    check("no dead controls", shown == expected, &shown)?;
+    let says = page.text("[...['start', 'stop'].map(id => document.getElementById(id).firstChild.data), document.getElementById('hand-note').textContent].join()")?;
+    check("words of a recording", says == "Play,Pause,Recording", &says)?;
+    page.wait("the computed force", SOON, COMPUTED_IS_DRAWN)
+}
+
+/// Some pixels of the plot against time have the colour of the computed force.
+const COMPUTED_IS_DRAWN: &str = "(() => {
+    const n = parseInt(getComputedStyle(document.documentElement).getPropertyValue('--force').trim().slice(1), 16);
+    const plot = document.getElementById('time-plot');
+    const { data } = plot.getContext('2d').getImageData(60, 0, plot.width - 60, plot.height);
+    let same = 0;
+    for (let i = 0; i < data.length; i += 4) same += (data[i] << 16 | data[i + 1] << 8 | data[i + 2]) === n;
+    return same > 100;
+})()";
