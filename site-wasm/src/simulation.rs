@@ -170,7 +170,7 @@ fn publish(publisher: &Publisher, frame: &DeviceFrame) {
         DeviceFrame::Pose(pose) => publisher.pose(*pose),
         DeviceFrame::Event(event) => publisher.event(*event),
         DeviceFrame::Timing(timing) => publisher.timing(*timing),
-        DeviceFrame::Ack(_) | DeviceFrame::Device(_) => {}
+        DeviceFrame::Ack(_) | DeviceFrame::Device(_) | DeviceFrame::Crash(_) => {}
     }
 }
 

@@ -14,7 +14,7 @@ use crate::crash::LAST_WORDS;
 use control_core::ceilings::Ceilings;
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};
-use firmware::reset::{ResetFlags, Said, cause};
+use firmware::reset::{Crash, ResetFlags, Said, cause};
 use firmware::store::{Store, Stored};
 use firmware::tasks::tick::BoardDrive;
 use firmware::timing;
@@ -89,6 +89,7 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) heat: u32,
     pub(crate) identity: Identity,
     pub(crate) reset_cause: Option<Fault>,
+    pub(crate) crash: Option<Crash>,
 }
 
 impl<W: Wiring> Parts<W> {
@@ -113,11 +114,9 @@ impl<W: Wiring> Parts<W> {
         }
         let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
         let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
-        let reset_cause = cause(flags, crash, torque).or(damage);
-        match crash {
-            Some(crash) => {
-                defmt::warn!("last run ended: kind {}, detail {=u32:#x}", crash.kind as u8, crash.detail)
-            }
+        let reset_cause = cause(flags, crash.as_ref(), torque).or(damage);
+        match &crash {
+            Some(crash) => say(crash),
             None => defmt::info!("started; torque is off"),
         }
 
@@ -147,8 +146,24 @@ impl<W: Wiring> Parts<W> {
             heat,
             identity: Identity { serial: serial_number(), firmware: version(), ceilings: W::CEILINGS },
             reset_cause,
+            crash,
         }
     }
+}
+
+/// Logs the crash that ended the last run.
+fn say(crash: &Crash) {
+    let Crash { kind, detail, pc, lr, fault_status, bus_address, file } = crash;
+    defmt::warn!(
+        "last run ended: kind {=u8}, detail {=u32:#x}, PC {=u32:#x}, LR {=u32:#x}, CFSR {=u32:#x}, BFAR {=u32:#x}, file {=str}",
+        *kind as u8,
+        *detail,
+        *pc,
+        *lr,
+        *fault_status,
+        *bus_address,
+        file.as_str()
+    );
 }
 
 /// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.

@@ -5,6 +5,7 @@ use super::queues::{Packet, SmallOrder, TelemetryEnds};
 use super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use crate::log;
 use crate::port::Board;
+use crate::reset::Crash;
 use crate::store::{Store, StoreError};
 use crate::supervision::Task;
 use crate::timing;
@@ -43,16 +44,19 @@ pub struct Telemetry<B: Board> {
 }
 
 impl<B: Board> Telemetry<B> {
-    /// `plan` is the one that the tick starts with, `reset_cause` what ended the last run.
+    /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last run, and `crash` the record that it
+    /// left where it gave up.
     pub fn new(
         shared: &'static Shared,
-        (identity, plan, reset_cause): (Identity, &Plan, Option<Fault>),
+        (identity, plan, reset_cause, crash): (Identity, &Plan, Option<Fault>, Option<Crash>),
         store: Store<B::Flash>,
         (ends, waiting): (TelemetryEnds, &'static mut Waiting),
     ) -> Self {
+        let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause);
+        endpoint.set_crash(crash);
         Self {
             shared,
-            endpoint: Endpoint::with(waiting, identity, plan, reset_cause),
+            endpoint,
             store,
             saved: (link::codec::hash(plan.device()), link::codec::hash(plan.patient())),
             ends,

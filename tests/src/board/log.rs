@@ -77,6 +77,12 @@ impl Log {
             Type::U16 => u16::from_le_bytes(take(rest)).to_string(),
             Type::U32 => u32::from_le_bytes(take(rest)).to_string(),
             Type::U64 => u64::from_le_bytes(take(rest)).to_string(),
+            Type::Str => {
+                let length = u32::from_le_bytes(take(rest)) as usize;
+                let (text, others) = rest.split_at(length);
+                *rest = others;
+                String::from_utf8_lossy(text).into_owned()
+            }
             Type::Format => {
                 let (_, format) = self.format(rest);
                 self.text(format, rest)

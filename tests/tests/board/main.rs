@@ -3,6 +3,7 @@
 mod commissioning;
 mod compensation;
 mod control;
+mod crash;
 mod faults;
 mod fitted;
 mod holding;
