@@ -346,9 +346,22 @@ impl Controller {
         };
         if let Some(fault) = fault
             && self.mode.is_powered()
-            // An excitation is faster than a hand on purpose, and its own travel bounds it.
-            && (self.mode, fault) != (Mode::Exciting, Fault::Overspeed)
         {
+            self.trip_by_movement(fault);
+        }
+    }
+
+    /// Trips because of the way the needle moves. An excitation may be faster than a hand on purpose, and then no faster than it
+    /// takes to follow.
+    #[cold]
+    #[inline(never)]
+    fn trip_by_movement(&mut self, fault: Fault) {
+        let is_asked_for = (self.mode, fault) == (Mode::Exciting, Fault::Overspeed)
+            && self
+                .player
+                .as_ref()
+                .is_some_and(|player| !player.is_too_fast(self.runaway.speed(self.plan.scale.mm_per_count)));
+        if !is_asked_for {
             self.trip(fault);
         }
     }
