@@ -68,6 +68,7 @@ mod app {
                 (parts.identity, &parts.plan, parts.reset_cause, parts.crash),
                 parts.store,
                 ends.telemetry,
+                parts.lamps,
             )),
             tilt: Tilt::new(&SHARED, parts.tilt),
         };

@@ -31,6 +31,8 @@ pub trait Board: 'static {
     type Watchdog: Watchdog;
     /// The tilt sensor.
     type Tilt: TiltSource;
+    /// The lamps.
+    type Lamps: Lamps;
     /// The port to the PC.
     type Serial: SerialPort;
     /// The configuration's flash.
@@ -82,6 +84,12 @@ pub trait Watchdog {
     fn feed(&mut self);
     /// Whether it stands still while a debugger halts the core.
     fn stop_on_debug(&mut self, stop: bool);
+}
+
+/// The lamps by which a person sees the device's state without a PC.
+pub trait Lamps {
+    /// Lights the one for torque, and the one for a fault that has latched or has ended the last run.
+    fn show(&mut self, powered: bool, fault: bool);
 }
 
 /// What a serial port does not do now: there is nothing to read, or no room to write.

@@ -144,6 +144,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.in_session
     }
 
+    /// The fault that has latched, or that ended the last run, until a person starts the device.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
     /// Sets the conditions that keep the device from being started, from now on.
     pub fn set_interlocks(&mut self, interlocks: Interlocks) {
         self.interlocks = interlocks;

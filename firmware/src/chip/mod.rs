@@ -8,6 +8,7 @@ mod brownout;
 mod clock;
 mod encoder;
 mod flash;
+mod lamps;
 mod monitors;
 mod outputs;
 mod pin;
@@ -19,6 +20,7 @@ mod watchdog;
 
 pub(crate) use clock::Source;
 pub(crate) use encoder::init as encoder;
+pub(crate) use lamps::Lamps;
 pub(crate) use monitors::{DriveLines, Line};
 pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac};
 pub(crate) use pin::{Pin, Placed};
@@ -66,6 +68,7 @@ impl<W: Wiring> Board for Stm32F4<W> {
     type Supply = supply::SupplyLevel;
     type Watchdog = watchdog::Watchdog;
     type Tilt = W::Tilt;
+    type Lamps = Lamps;
     type Serial = usb::Port;
     type Flash = flash::Sectors;
 

@@ -5,6 +5,7 @@ use super::brownout;
 use super::clock::{self, Source};
 use super::encoder::{Encoder, EncoderLines};
 use super::flash::Sectors;
+use super::lamps::Lamps;
 use super::monitors::DriveLines;
 use super::supply::{self, Supply, SupplyLevel};
 use super::tick_timer::TickTimer;
@@ -70,6 +71,7 @@ pub(crate) struct Wired<W: Wiring> {
     pub(crate) drive: BoardDrive<Stm32F4<W>>,
     pub(crate) drive_lines: DriveLines,
     pub(crate) tilt: W::Tilt,
+    pub(crate) lamps: Lamps,
 }
 
 /// What the tasks get.
@@ -80,6 +82,7 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) drive_lines: DriveLines,
     pub(crate) drive: BoardDrive<Stm32F4<W>>,
     pub(crate) tilt: W::Tilt,
+    pub(crate) lamps: Lamps,
     pub(crate) serial: usb::Port,
     pub(crate) watchdog: Watchdog,
     pub(crate) supply: Supply,
@@ -137,6 +140,7 @@ impl<W: Wiring> Parts<W> {
             drive_lines: wired.drive_lines,
             drive: wired.drive,
             tilt: wired.tilt,
+            lamps: wired.lamps,
             serial,
             watchdog,
             supply,

@@ -8,6 +8,7 @@ mod faults;
 mod fitted;
 mod holding;
 mod instructions;
+mod lamps;
 mod log;
 mod rate;
 mod runaway;

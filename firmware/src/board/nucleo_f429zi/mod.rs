@@ -15,11 +15,11 @@
 //! | PC0 | analogue inclinometer (ADC 1, channel 10) | CN9 3; needs an external pull-down of 100 kΩ, which a wire that is off leaves it with |
 //! | PA11, PA12 | USB | the micro-USB connector CN13 |
 //! | PG6 | power switch of CN13, for a host | low, always: this is a device |
-//! | PB0 | green LED LD1: running | on the board |
+//! | PB0, PB7, PB14 | lamps: green, running; blue, torque is on; red, a fault | LD1, LD2, LD3 on the board |
 
 use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Line, Lines, OnChipDac, Own, Parts, Source, Statics, Wired,
-    Wiring,
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Lines, OnChipDac, Own, Parts, Source, Statics,
+    Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
 use firmware::drive::{Drive, ParallelDac};
@@ -74,6 +74,7 @@ impl Wiring for NucleoF429zi {
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiog.pg6.into_push_pull_output().set_low();
         gpiob.pb0.into_push_pull_output().set_high();
+        let lamps = Lamps::new(gpiob.pb7, gpiob.pb14);
 
         let own = Own {
             flash: device.FLASH,
@@ -85,6 +86,6 @@ impl Wiring for NucleoF429zi {
             watchdog: device.IWDG,
             debug: device.DBGMCU,
         };
-        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt }, statics)
+        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
     }
 }

@@ -47,6 +47,7 @@ pub(super) struct World {
     pub(super) outgoing: RefCell<Vec<Vec<u8>>>,
     pub(super) room: Cell<usize>,
     pub(super) flash_fails: Cell<bool>,
+    pub(super) lamps: Cell<(bool, bool)>,
 }
 
 thread_local! {
@@ -71,6 +72,7 @@ impl Board for Fake {
     type Supply = Part;
     type Watchdog = Part;
     type Tilt = Part;
+    type Lamps = Part;
     type Serial = Part;
     type Flash = Words;
 
@@ -192,6 +194,12 @@ impl port::Watchdog for Part {
 
     fn stop_on_debug(&mut self, stop: bool) {
         world().stops_on_debug.set(stop);
+    }
+}
+
+impl port::Lamps for Part {
+    fn show(&mut self, powered: bool, fault: bool) {
+        world().lamps.set((powered, fault));
     }
 }
 
