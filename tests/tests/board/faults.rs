@@ -76,7 +76,7 @@ fn an_accelerometer_that_is_stuck() {
 fn an_accelerometer_that_loses_its_power_alone_is_set_up_again() {
     for model in [Model::Lis302dl, Model::Lis3dsh] {
         let mut rig = Rig::pressed_on(Wiring { tilt: Some(model), ..Wiring::default() });
-        let since = rig.board.now();
+        let (since, before) = (rig.board.now(), rig.pc.heard.samples.len());
         rig.board.at_stop(|stopped| {
             let chip = stopped.tilt().expect("an accelerometer");
             chip.lose_power();
@@ -87,11 +87,10 @@ fn an_accelerometer_that_loses_its_power_alone_is_set_up_again() {
         let reads = |tilt: i16| tilt.abs() < 20;
         let newest = rig.pc.heard.samples.last().map(|(_, sample)| sample.tilt_mrad);
         assert!(newest.is_some_and(reads), "{model:?}: {newest:?} mrad");
-        let ticks = rig.pc.heard.samples.iter();
-        let level = ticks.clone().find(|(tick, sample)| tick * TICK > since && reads(sample.tilt_mrad));
+        let found = rig.pc.heard.samples[before..].iter().position(|(_, sample)| reads(sample.tilt_mrad));
         report(
             &format!("{model:?} without its power, level again"),
-            level.map_or(0, |(tick, _)| tick * TICK - since),
+            found.map_or(0, |ticks| ticks as Nanos * TICK),
         );
         let off = rig
             .board
