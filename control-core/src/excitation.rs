@@ -402,10 +402,12 @@ impl Player {
         Some(MillinewtonMetres(saturating_multiply(force, roller_radius.0).saturating_add(target.torque.0)))
     }
 
-    /// True if the motor is faster than it has to be to follow.
+    /// True if the motor is faster than it has to be to follow, and than a torque without a servo makes it where a hand trips at `hand`:
+    /// three times that, half of what counts as a jump of the encoder. The pulses of `commission` reach 0.77 m/s where a hand
+    /// trips at 0.42, and a motor still runs on when the next excitation begins.
     #[cold]
-    pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond) -> bool {
-        speed > self.too_fast
+    pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond, hand: MillimetresPerSecond) -> bool {
+        speed > self.too_fast && speed.0 > hand.0.saturating_mul_int(3)
     }
 
     /// Whether the motor is further from the beginning than allowed.

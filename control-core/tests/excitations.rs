@@ -232,26 +232,26 @@ fn trips_at(signal: Signal, speed: f64) -> Option<(usize, Fault)> {
     })
 }
 
-/// An excitation may be faster than a hand, but only as fast as its own reference.
+/// An excitation may be faster than a hand, up to three times or to half as fast again as its own reference.
 #[test]
 fn overspeed_trips_during_an_excitation() {
     let triangle = |speed: f64| Signal::Triangle {
         stroke: Millimetres(q(200.0)),
         speed: MillimetresPerSecond(q(speed)),
     };
+    let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(q(1.0)), ramp_ms: 500 };
     for (signal, speed) in [
-        (Signal::Hold, 450.0),
-        (triangle(20.0), 450.0),
-        (triangle(400.0), 650.0),
-        (staircase(5, 3.0), 520.0),
-        (Signal::BreakawayRamps { torque: MillinewtonMetres(q(1.0)), ramp_ms: 500 }, 450.0),
+        (Signal::Hold, 1_310.0),
+        (triangle(20.0), 1_310.0),
+        (ramps.clone(), 1_310.0),
+        (triangle(1_000.0), 1_550.0),
     ] {
         let tripped = trips_at(signal.clone(), speed);
         let (tick, fault) = tripped.unwrap_or_else(|| panic!("{signal:?} at {speed} mm/s"));
         // 3 ms and a look.
         assert!(fault == Fault::Overspeed && tick < 50, "{signal:?}: {fault:?} at tick {tick}");
     }
-    for (signal, speed) in [(triangle(400.0), 580.0), (staircase(5, 3.0), 470.0), (Signal::Hold, 400.0)] {
+    for (signal, speed) in [(Signal::Hold, 1_230.0), (ramps, 1_230.0), (triangle(1_000.0), 1_460.0)] {
         assert_eq!(trips_at(signal.clone(), speed), None, "{signal:?} at {speed} mm/s");
     }
 }
