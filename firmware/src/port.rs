@@ -1,7 +1,7 @@
 //! What a board has to offer: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
 //! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
 
-use crate::drive::MotorDac;
+use crate::drive::Converters;
 use crate::lines::PulledLines;
 use crate::monitor::Readings;
 use crate::store::ConfigFlash;
@@ -15,10 +15,8 @@ pub trait Board: 'static {
     type Timer: TickTimer;
     /// The encoder.
     type Encoder: Encoder;
-    /// The converter of 12 bits.
-    type Dac12: MotorDac;
-    /// The converter of 8 bits.
-    type Dac8: MotorDac;
+    /// The converters.
+    type Converters: Converters;
     /// The amplifier's enable line.
     type Enable: OutputPin;
     /// The encoder's lines.

@@ -15,8 +15,10 @@ use crate::crash::LAST_WORDS;
 use control_core::ceilings::Ceilings;
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};
+use firmware::drive::Converters;
+use firmware::port::Board;
 use firmware::reset::{Crash, ResetFlags, Said, cause};
-use firmware::store::{Store, Stored};
+use firmware::store::{Nor, Store, Stored};
 use firmware::tasks::tick::BoardDrive;
 use firmware::timing;
 use link::device::Identity;
@@ -87,7 +89,7 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) watchdog: Watchdog,
     pub(crate) supply: Supply,
     pub(crate) supply_level: SupplyLevel,
-    pub(crate) store: Store<Sectors>,
+    pub(crate) store: Store<Nor<Sectors>>,
     pub(crate) plan: Plan,
     pub(crate) heat: u32,
     pub(crate) identity: Identity,
@@ -115,8 +117,9 @@ impl<W: Wiring> Parts<W> {
         if !supply_level.is_falling() {
             brownout::set(&own.flash);
         }
-        let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
-        let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
+        let (store, device_part, patient_part) = Store::open(Nor(Sectors::new(own.flash)));
+        let ceilings = W::CEILINGS.with_converters(<Stm32F4<W> as Board>::Converters::WIDTHS);
+        let (plan, damage) = plan(&ceilings, device_part, patient_part);
         let reset_cause = cause(flags, crash.as_ref(), torque).or(damage);
         match &crash {
             Some(crash) => say(crash),
@@ -148,7 +151,7 @@ impl<W: Wiring> Parts<W> {
             store,
             plan,
             heat,
-            identity: Identity { serial: serial_number(), firmware: version(), ceilings: W::CEILINGS },
+            identity: Identity { serial: serial_number(), firmware: version(), ceilings },
             reset_cause,
             crash,
         }
@@ -172,14 +175,16 @@ fn say(crash: &Crash) {
 
 /// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
 fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
-    let (device, lost_device) = device.or(Device::default());
+    // The widest converter that there is: none is left of a record.
+    let unknown = Device { dac: ceilings.converters[1], ..Device::default() };
+    let (device, lost_device) = device.or(unknown);
     let is_too_much = ceilings.check(&device).is_err();
-    let device = if is_too_much { Device::default() } else { device };
+    let device = if is_too_much { unknown } else { device };
     let (patient, lost_patient) = patient.or(Patient::default());
     let fault = (lost_device || lost_patient || is_too_much).then_some(Fault::StoredConfig);
     // A patient for another device leaves, and a device that may not be leaves the default.
     let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
-    let parts = [(device, Patient::nobody()), (Device::default(), Patient::default())];
+    let parts = [(device, Patient::nobody()), (unknown, Patient::default())];
     let plan = fitting.or_else(|_| {
         let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
         plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())

@@ -24,7 +24,7 @@ use crate::chip::{
 };
 use control_core::ceilings::Ceilings;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use firmware::drive::{Drive, ParallelDac};
+use firmware::drive::{Drive, ParallelDac, Two};
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
 use stm32f4xx_hal::gpio::{Analog, Output, PC1, PD7, PE3};
@@ -65,7 +65,7 @@ impl Wiring for Discovery {
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
         let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(dac, ParallelDac(lines), enable);
+        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
 
         let strap = gpiob.pb1.into_pull_down_input();
         // Whatever charge the pin had, its pull has taken away by then.

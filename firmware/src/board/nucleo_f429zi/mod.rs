@@ -22,7 +22,7 @@ use crate::chip::{
     Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
-use firmware::drive::{Drive, ParallelDac};
+use firmware::drive::{Drive, ParallelDac, Two};
 use firmware::tilt::Inclinometer;
 use stm32f4xx_hal::gpio::{Analog, Output, PC0, PF13};
 use stm32f4xx_hal::pac;
@@ -60,7 +60,7 @@ impl Wiring for NucleoF429zi {
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
         let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(dac, ParallelDac(lines), enable);
+        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
 
         let tilt = Inclinometer::new(InclinometerPin::new(device.ADC1, gpioc.pc0.into_analog(), rcc));
         let drive_lines = DriveLines::new(
