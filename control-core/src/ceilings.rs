@@ -1,11 +1,11 @@
 //! What no command raises: the ceilings that a board's firmware was built with, and those of a device that has been
 //! commissioned. It compares configurations; who may send which one is `link`'s business.
 
-use crate::config::Device;
+use crate::config::{DacWidth, Device, Mechanism};
 use crate::kinematics::mm_per_count;
 use crate::refusal::{Field, Refusal, milli, within};
 use crate::runaway::fastest;
-use crate::units::{MillimetresPerSecond, MillinewtonMetres};
+use crate::units::{Grams, MillimetresPerSecond, MillinewtonMetres, Newtons};
 use fixed::types::I16F16;
 
 /// The most that a board may ever be configured for. They are constants of its firmware.
@@ -15,19 +15,41 @@ pub struct Ceilings {
     pub torque: MillinewtonMetres,
     /// Of the speed past which [`crate::event::Fault::Overspeed`] trips.
     pub speed: MillimetresPerSecond,
+    /// Of what a record may claim of the mechanism, which decides how stiff a wall may be (`stability.rs`): the most mass and dry
+    /// friction, and the least delay.
+    pub mechanism: Mechanism,
+    /// The board's converters, the narrower one first; one that is alone is there twice.
+    pub converters: [DacWidth; 2],
 }
 
 impl Ceilings {
     /// Of a device without a motor that could hurt anybody: what [`crate::Plan`] takes.
-    pub const VIRTUAL: Self =
-        Self { torque: MillinewtonMetres(I16F16::MAX), speed: MillimetresPerSecond(I16F16::MAX) };
+    pub const VIRTUAL: Self = Self {
+        torque: MillinewtonMetres(I16F16::MAX),
+        speed: MillimetresPerSecond(I16F16::MAX),
+        mechanism: Mechanism { mass: Grams(I16F16::MAX), dry_friction: Newtons(I16F16::MAX), delay_us: 0 },
+        converters: [DacWidth::BITS_8, DacWidth::BITS_12],
+    };
 
-    /// Of so many whole mN·m and mm/s.
+    /// Of so many whole mN·m and mm/s, and a mechanism like those that the stiffness of walls was tested with: at most 200 g and 1 N
+    /// along the needle, at least 30 µs from the reading of the encoder to the torque, of which 20 are the wait for the converter's
+    /// instant.
     pub const fn new(torque_mnm: i16, speed_mm_per_s: i16) -> Self {
         Self {
             torque: MillinewtonMetres(I16F16::from_bits((torque_mnm as i32) << 16)),
             speed: MillimetresPerSecond(I16F16::from_bits((speed_mm_per_s as i32) << 16)),
+            mechanism: Mechanism {
+                mass: Grams(milli(200_000)),
+                dry_friction: Newtons(milli(1_000)),
+                delay_us: 30,
+            },
+            converters: [DacWidth::BITS_8, DacWidth::BITS_12],
         }
+    }
+
+    /// The same on a board with these converters, as in [`Self::converters`].
+    pub const fn with_converters(self, converters: [DacWidth; 2]) -> Self {
+        Self { converters, ..self }
     }
 
     /// Whether `device` stays below them.
@@ -35,7 +57,17 @@ impl Ceilings {
         let per_count = mm_per_count(device.roller_radius, device.counts_per_turn);
         let speed = fastest(per_count, device.limits.max_counts_per_tick);
         within(Field::TorqueLimit, device.limits.torque.0, milli(100), self.torque.0)?;
-        within(Field::SpeedCeiling, speed.0, I16F16::ZERO, self.speed.0)
+        within(Field::SpeedCeiling, speed.0, I16F16::ZERO, self.speed.0)?;
+        if !self.converters.contains(&device.dac) {
+            let bits = |width: DacWidth| I16F16::from_bits(i32::from(width.bits()) << 16);
+            let [low, high] = self.converters.map(bits);
+            return Err(Refusal::OutOfRange { field: Field::Converter, value: bits(device.dac), low, high });
+        }
+        let (claimed, most) = (&device.mechanism, &self.mechanism);
+        within(Field::MovingMass, claimed.mass.0, I16F16::ZERO, most.mass.0)?;
+        within(Field::MechanismFriction, claimed.dry_friction.0, I16F16::ZERO, most.dry_friction.0)?;
+        let delay_us = |us: u16| I16F16::from_bits(i32::from(us.min(i16::MAX.unsigned_abs())) << 16);
+        within(Field::DriveDelayUs, delay_us(claimed.delay_us), delay_us(most.delay_us), I16F16::MAX)
     }
 }
 
@@ -95,6 +127,41 @@ mod tests {
         assert_eq!(Ceilings::VIRTUAL.check(&device), Ok(()));
     }
 
+    /// A code for a converter that is not there would reach nobody, or another one.
+    #[test]
+    fn a_board_takes_the_widths_of_its_converters() {
+        let refused = |ceilings: Ceilings, dac| {
+            let device = Device { dac, ..Device::commissioned_virtual() };
+            matches!(ceilings.check(&device), Err(Refusal::OutOfRange { field: Field::Converter, .. }))
+        };
+        let widths = [DacWidth::BITS_8, DacWidth::BITS_12, DacWidth::BITS_16];
+        assert_eq!(widths.map(|dac| refused(BOARD, dac)), [false, false, true]);
+        let alone = BOARD.with_converters([DacWidth::BITS_16; 2]);
+        assert_eq!(widths.map(|dac| refused(alone, dac)), [true, true, false]);
+    }
+
+    /// More mass and friction, or less delay, would let a wall be stiffer than the mechanism bears.
+    #[test]
+    fn a_board_bounds_what_a_record_claims_of_its_mechanism() {
+        let sound = Device::commissioned_virtual();
+        let refused = |change: fn(&mut Mechanism)| {
+            let mut device = sound;
+            change(&mut device.mechanism);
+            assert_eq!(Ceilings::VIRTUAL.check(&device), Ok(()));
+            match BOARD.check(&device) {
+                Err(Refusal::OutOfRange { field, .. }) => Some(field),
+                _ => None,
+            }
+        };
+        assert_eq!(refused(|m| m.mass = BOARD.mechanism.mass), None);
+        assert_eq!(refused(|m| m.mass.0 = BOARD.mechanism.mass.0 + I16F16::DELTA), Some(Field::MovingMass));
+        assert_eq!(refused(|m| m.dry_friction = BOARD.mechanism.dry_friction), None);
+        let friction = refused(|m| m.dry_friction.0 = BOARD.mechanism.dry_friction.0 + I16F16::DELTA);
+        assert_eq!(friction, Some(Field::MechanismFriction));
+        assert_eq!(refused(|m| m.delay_us = 30), None);
+        assert_eq!(refused(|m| m.delay_us = 29), Some(Field::DriveDelayUs));
+    }
+
     /// Each value that is raised or exchanged alone.
     #[test]
     fn a_commissioned_device_is_lowered_and_never_raised_or_wired_anew() {
@@ -104,7 +171,7 @@ mod tests {
             (Field::CountsPerTurn, |d| d.counts_per_turn += 4),
             (Field::EncoderSign, |d| d.encoder_reversed = true),
             (Field::FullScaleTorque, |d| d.full_scale_torque.0 += I16F16::ONE),
-            (Field::Converter, |d| d.dac = crate::config::DacWidth::Bits8),
+            (Field::Converter, |d| d.dac = crate::config::DacWidth::BITS_8),
             (Field::DacZero, |d| d.dac_zero = 1),
             (Field::MotorSign, |d| d.motor_reversed = true),
             (Field::TorqueLimit, |d| d.limits.torque.0 += I16F16::DELTA),

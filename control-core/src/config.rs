@@ -112,22 +112,79 @@ pub struct Patient {
     pub vessel: Option<Vessel>,
 }
 
-/// Resolution of the converter that drives the amplifier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DacWidth {
-    /// DAC0800, as in Paper 001.
-    Bits8,
-    /// The microcontroller's own.
-    Bits12,
+/// Resolution of the converter that drives the amplifier, 8–16 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "WidthCode", into = "WidthCode")]
+pub struct DacWidth(u8);
+
+/// A width as it is sent and stored: the number of its bits, but for the two that were the only ones before they were numbers.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct WidthCode(u8);
+
+impl WidthCode {
+    const EIGHT: u8 = 0;
+    const TWELVE: u8 = 1;
+}
+
+impl TryFrom<WidthCode> for DacWidth {
+    type Error = NoWidth;
+
+    fn try_from(WidthCode(code): WidthCode) -> Result<Self, NoWidth> {
+        match code {
+            WidthCode::EIGHT => Ok(Self::BITS_8),
+            WidthCode::TWELVE => Ok(Self::BITS_12),
+            bits => bits.try_into(),
+        }
+    }
+}
+
+impl From<DacWidth> for WidthCode {
+    fn from(width: DacWidth) -> Self {
+        Self(match width {
+            DacWidth::BITS_8 => Self::EIGHT,
+            DacWidth::BITS_12 => Self::TWELVE,
+            DacWidth(bits) => bits,
+        })
+    }
+}
+
+/// A number of bits that is no converter's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoWidth(pub u8);
+
+impl core::fmt::Display for NoWidth {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "a converter has {} to {} bits, not {}", DacWidth::LEAST, DacWidth::MOST, self.0)
+    }
+}
+
+impl TryFrom<u8> for DacWidth {
+    type Error = NoWidth;
+
+    fn try_from(bits: u8) -> Result<Self, NoWidth> {
+        if (Self::LEAST..=Self::MOST).contains(&bits) { Ok(Self(bits)) } else { Err(NoWidth(bits)) }
+    }
 }
 
 impl DacWidth {
+    const LEAST: u8 = 8;
+    const MOST: u8 = 16;
+    /// DAC0800, as in Paper 001.
+    pub const BITS_8: Self = Self(8);
+    /// The microcontroller's own.
+    pub const BITS_12: Self = Self(12);
+    /// An external converter, or a timer's pulse width beside a line for the direction.
+    pub const BITS_16: Self = Self(16);
+
+    /// The number of bits.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
     /// The code of zero torque.
     pub const fn mid_scale(self) -> u16 {
-        match self {
-            DacWidth::Bits8 => 128,
-            DacWidth::Bits12 => 2048,
-        }
+        // At most 16 bits, so that it fits.
+        1 << (self.0 - 1)
     }
 
     /// The largest step away from mid-scale, the same both ways.
@@ -180,7 +237,7 @@ impl Default for Device {
             counts_per_turn: 4000,
             encoder_reversed: false,
             full_scale_torque: torque,
-            dac: DacWidth::Bits12,
+            dac: DacWidth::BITS_12,
             dac_zero: 0,
             motor_reversed: false,
             skin_tilt: Milliradians(0),
@@ -283,7 +340,33 @@ mod tests {
 
     #[test]
     fn a_converter_reaches_as_far_one_way_as_the_other() {
-        assert_eq!((DacWidth::Bits8.mid_scale(), DacWidth::Bits8.span()), (128, 127));
-        assert_eq!((DacWidth::Bits12.mid_scale(), DacWidth::Bits12.span()), (2048, 2047));
+        assert_eq!((DacWidth::BITS_8.mid_scale(), DacWidth::BITS_8.span()), (128, 127));
+        assert_eq!((DacWidth::BITS_12.mid_scale(), DacWidth::BITS_12.span()), (2048, 2047));
+        assert_eq!((DacWidth::BITS_16.mid_scale(), DacWidth::BITS_16.span()), (32_768, 32_767));
+    }
+
+    /// Devices hold records in which the two widths were the only ones.
+    #[test]
+    fn a_width_is_stored_as_it_always_was() {
+        let stored = |width| WidthCode::from(width).0;
+        assert_eq!([DacWidth::BITS_8, DacWidth::BITS_12, DacWidth::BITS_16].map(stored), [0, 1, 16]);
+        for code in 0..=u8::MAX {
+            let width = DacWidth::try_from(WidthCode(code));
+            assert_eq!(width.is_ok(), code < 2 || (8..=16).contains(&code), "{code}");
+            if let Ok(width) = width {
+                assert_eq!(DacWidth::try_from(WidthCode::from(width)), Ok(width), "{code}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_width_has_8_to_16_bits() {
+        for bits in 0..=u8::MAX {
+            let width = DacWidth::try_from(bits);
+            assert_eq!(
+                width.map(DacWidth::bits),
+                if (8..=16).contains(&bits) { Ok(bits) } else { Err(NoWidth(bits)) }
+            );
+        }
     }
 }

@@ -11,7 +11,7 @@ use crate::law::{Memory, Motion, Response};
 use crate::math::{saturating_multiply, truncating_product};
 use crate::passivity::{Elements, Observer};
 use crate::plan::Plan;
-use crate::runaway::{self, LOOK_TICKS};
+use crate::runaway::{self, LOOK_TICKS, fastest};
 use crate::safety::Limiter;
 use crate::stillness::{self, Stillness};
 use crate::thermal::{WARM_TICKS, Winding};
@@ -346,9 +346,23 @@ impl Controller {
         };
         if let Some(fault) = fault
             && self.mode.is_powered()
-            // An excitation is faster than a hand on purpose, and its own travel bounds it.
-            && (self.mode, fault) != (Mode::Exciting, Fault::Overspeed)
         {
+            self.trip_by_movement(fault);
+        }
+    }
+
+    /// Trips because of the way the needle moves. An excitation may be faster than a hand on purpose, and then only up to a bound of its
+    /// own.
+    #[cold]
+    #[inline(never)]
+    fn trip_by_movement(&mut self, fault: Fault) {
+        let is_asked_for = (self.mode, fault) == (Mode::Exciting, Fault::Overspeed)
+            && self.player.as_ref().is_some_and(|player| {
+                let mm_per_count = self.plan.scale.mm_per_count;
+                let hand = fastest(mm_per_count, self.plan.config.device.limits.max_counts_per_tick);
+                !player.is_too_fast(self.runaway.speed(mm_per_count), hand)
+            });
+        if !is_asked_for {
             self.trip(fault);
         }
     }

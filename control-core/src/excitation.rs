@@ -114,6 +114,19 @@ impl Excitation {
         torque <= GENTLE_TORQUE.0 && !has_servo
     }
 
+    /// The fastest speed of the reference: zero where it is at rest.
+    pub fn fastest(&self) -> MillimetresPerSecond {
+        match &self.signal {
+            Signal::SpeedStaircase { slowest, ratio, steps, .. } => {
+                MillimetresPerSecond(power(slowest.0, *ratio, steps.saturating_sub(1)))
+            }
+            Signal::Triangle { speed, .. } | Signal::ReversalLadder { speed, .. } => *speed,
+            Signal::Multisine { .. } | Signal::BreakawayRamps { .. } | Signal::Hold => {
+                MillimetresPerSecond::default()
+            }
+        }
+    }
+
     /// Whether the device may play it under `plan`.
     pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
         let limits = &plan.device().limits;
@@ -352,6 +365,8 @@ pub(crate) struct Player {
     servo: Servo,
     begin: Millimetres,
     travel: Millimetres,
+    /// The speed past which the motor no longer follows.
+    too_fast: MillimetresPerSecond,
     remaining_ticks: u32,
 }
 
@@ -362,6 +377,10 @@ impl Player {
             servo: excitation.servo,
             begin,
             travel: excitation.travel,
+            // Half as fast again: the servo overshoots where the reference turns round.
+            too_fast: MillimetresPerSecond(
+                excitation.fastest().0.saturating_mul(I16F16::from_bits(0x1_8000)),
+            ),
             remaining_ticks: excitation.duration_ms.saturating_mul(TICK_HZ / 1000),
         }
     }
@@ -381,6 +400,14 @@ impl Player {
         let force = saturating_multiply(behind, self.servo.stiffness.0)
             .saturating_add(saturating_times(slower, damping));
         Some(MillinewtonMetres(saturating_multiply(force, roller_radius.0).saturating_add(target.torque.0)))
+    }
+
+    /// True if the motor is faster than it has to be to follow, and than a torque without a servo makes it where a hand trips at `hand`:
+    /// three times that, half of what counts as a jump of the encoder. The pulses of `commission` reach 0.77 m/s where a hand
+    /// trips at 0.42, and a motor still runs on when the next excitation begins.
+    #[cold]
+    pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond, hand: MillimetresPerSecond) -> bool {
+        speed > self.too_fast && speed.0 > hand.0.saturating_mul_int(3)
     }
 
     /// Whether the motor is further from the beginning than allowed.

@@ -199,6 +199,16 @@ impl Watch {
         (speed.unsigned_abs() > bounds.fastest).then_some(Fault::Overspeed)
     }
 
+    /// The speed of the last span, for counts of this length in mm.
+    #[cold]
+    pub(crate) fn speed(&self, mm_per_count: I2F30) -> MillimetresPerSecond {
+        const SPAN_TICKS: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
+        let counts = self.count(0).wrapping_sub(self.count(SPAN_LOOKS)).unsigned_abs();
+        let per_span_q30 = i64::from(mm_per_count.to_bits()).saturating_mul(counts.into());
+        let bits = per_span_q30.saturating_mul(TICK_HZ.into()) / SPAN_TICKS >> 14;
+        MillimetresPerSecond(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+    }
+
     /// True if the motion of the spans continues in the last 3.2 ms. A motor that drives continues; a knock is over.
     fn still_gains(&self) -> bool {
         let middle = self.count(2);

@@ -127,19 +127,23 @@ mod tests {
     #[test]
     fn the_code_is_the_nearest_and_stays_within_the_span() {
         // A step a mN·m.
-        let scale = DacScale::new(&device(DacWidth::Bits8, 127.0));
+        let scale = DacScale::new(&device(DacWidth::BITS_8, 127.0));
         let torques = [0.0, 0.49, 0.51, -0.49, -0.51, 126.4, 127.0, 200.0, -127.0, -200.0];
         let wanted = [128, 128, 129, 128, 127, 254, 255, 255, 1, 1];
         assert_eq!(torques.map(|torque| scale.codes(mnm(torque)).written.0), wanted);
         assert_eq!(torques.map(|torque| scale.codes(mnm(torque)).plain.0), wanted);
         assert_eq!(scale.zero(), DacCode(128));
-        let wide = DacScale::new(&device(DacWidth::Bits12, 20.47));
+        let wide = DacScale::new(&device(DacWidth::BITS_12, 20.47));
         assert_eq!(wide.codes(mnm(-20.47)).written, DacCode(1));
+        let widest = DacScale::new(&device(DacWidth::BITS_16, 28.8));
+        let torques = [-40.0, -28.8, -0.001, 0.0, 0.001, 28.8, 40.0];
+        let wanted = [1, 1, 32_767, 32_768, 32_769, 65_535, 65_535];
+        assert_eq!(torques.map(|torque| widest.codes(mnm(torque)).written.0), wanted);
     }
 
     #[test]
     fn a_zero_beside_mid_scale_and_a_reversed_motor_are_for_the_converter_alone() {
-        let beside = Device { dac_zero: 5, motor_reversed: true, ..device(DacWidth::Bits8, 127.0) };
+        let beside = Device { dac_zero: 5, motor_reversed: true, ..device(DacWidth::BITS_8, 127.0) };
         let scale = DacScale::new(&beside);
         let torques = [0.0, 10.0, -10.0, 200.0, -200.0].map(|torque| scale.codes(mnm(torque)));
         assert_eq!(torques.map(|codes| codes.written.0), [133, 123, 143, 11, 255]);

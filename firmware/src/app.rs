@@ -65,9 +65,10 @@ mod app {
             usb: Port::new(&SHARED, parts.serial, ends.usb),
             telemetry: context.local.telemetry_place.write(Telemetry::new(
                 &SHARED,
-                (parts.identity, &parts.plan, parts.reset_cause),
+                (parts.identity, &parts.plan, parts.reset_cause, parts.crash),
                 parts.store,
                 ends.telemetry,
+                parts.lamps,
             )),
             tilt: Tilt::new(&SHARED, parts.tilt),
         };

@@ -26,15 +26,19 @@ fn safe_state() {
     chip::outputs_to_zero_torque();
 }
 
-fn end(kind: CrashKind, detail: u32) -> ! {
+fn end(crash: &Crash) -> ! {
     safe_state();
-    LAST_WORDS.crash(Crash { kind, detail });
+    LAST_WORDS.crash(crash);
     SCB::sys_reset()
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    end(CrashKind::Panic, info.location().map_or(0, |place| place.line()))
+    // The motor before anything else.
+    safe_state();
+    end(&info
+        .location()
+        .map_or(Crash::new(CrashKind::Panic, 0), |place| Crash::panic(place.file(), place.line())))
 }
 
 /// The clock from outside has stopped while the clock security (RM0090 7.2.7) watched it; the core goes on, on its own oscillator.
@@ -42,13 +46,13 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 unsafe fn NonMaskableInt() -> ! {
     // SAFETY: interrupts cannot mask this one; nobody else runs any more.
     let state = unsafe { &*RCC::ptr() }.cr().read().bits();
-    end(CrashKind::Clock, state)
+    end(&Crash::new(CrashKind::Clock, state))
 }
 
 /// An interrupt that no task serves.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    end(CrashKind::StrayInterrupt, number.unsigned_abs().into())
+    end(&Crash::new(CrashKind::StrayInterrupt, number.unsigned_abs().into()))
 }
 
 /// Takes a fresh stack, for the old one may be what broke, and keeps where the core says that it put its frame.
@@ -73,11 +77,20 @@ extern "C" fn hard_fault(frame: *const u32) -> ! {
     }
     safe_state();
     const FRAME_WORDS: usize = 8;
+    /// Places in the frame (ARMv7-M B1.5.7).
+    const LINK: usize = 5;
     const RETURN_ADDRESS: usize = 6;
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
     let at = frame as usize;
     let is_on_stack = at >= bottom && at + 4 * FRAME_WORDS <= top && at.is_multiple_of(4);
     // SAFETY: eight words from `frame` lie in the memory that is the stack's, and any word there is a number.
-    let address = if is_on_stack { unsafe { frame.add(RETURN_ADDRESS).read_volatile() } } else { 0 };
-    end(CrashKind::HardFault, address)
+    let word = |place| if is_on_stack { unsafe { frame.add(place).read_volatile() } } else { 0 };
+    // SAFETY: reads without a side effect; nobody else runs any more. The address comes before the status that says whether it
+    // is valid: another fault would end here anew.
+    let (bus_address, fault_status, hard) = unsafe {
+        let scb = &*SCB::PTR;
+        (scb.bfar.read(), scb.cfsr.read(), scb.hfsr.read())
+    };
+    let (pc, lr) = (word(RETURN_ADDRESS), word(LINK));
+    end(&Crash { pc, lr, fault_status, bus_address, ..Crash::new(CrashKind::HardFault, hard) })
 }

@@ -21,6 +21,10 @@ mod crash;
 #[cfg(target_os = "none")]
 static SHARED: firmware::tasks::shared::Shared = firmware::tasks::shared::Shared::new(&crash::LAST_WORDS);
 
+// Before each line of the log: milliseconds since the tasks were started. They wrap after 49 days, and are 0 in start-up.
+#[cfg(target_os = "none")]
+defmt::timestamp!("{=u32:ms}", SHARED.supervised_ms.load(core::sync::atomic::Ordering::Relaxed));
+
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
     launcher::run()

@@ -1,7 +1,7 @@
 //! What a board has to offer: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
 //! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
 
-use crate::drive::MotorDac;
+use crate::drive::Converters;
 use crate::lines::PulledLines;
 use crate::monitor::Readings;
 use crate::store::ConfigFlash;
@@ -15,10 +15,8 @@ pub trait Board: 'static {
     type Timer: TickTimer;
     /// The encoder.
     type Encoder: Encoder;
-    /// The converter of 12 bits.
-    type Dac12: MotorDac;
-    /// The converter of 8 bits.
-    type Dac8: MotorDac;
+    /// The converters.
+    type Converters: Converters;
     /// The amplifier's enable line.
     type Enable: OutputPin;
     /// The encoder's lines.
@@ -31,6 +29,8 @@ pub trait Board: 'static {
     type Watchdog: Watchdog;
     /// The tilt sensor.
     type Tilt: TiltSource;
+    /// The lamps.
+    type Lamps: Lamps;
     /// The port to the PC.
     type Serial: SerialPort;
     /// The configuration's flash.
@@ -82,6 +82,12 @@ pub trait Watchdog {
     fn feed(&mut self);
     /// Whether it stands still while a debugger halts the core.
     fn stop_on_debug(&mut self, stop: bool);
+}
+
+/// The lamps by which a person sees the device's state without a PC.
+pub trait Lamps {
+    /// Lights the one for torque, and the one for a fault that has latched or has ended the last run.
+    fn show(&mut self, powered: bool, fault: bool);
 }
 
 /// What a serial port does not do now: there is nothing to read, or no room to write.

@@ -3,6 +3,9 @@
 
 use control_core::event::Fault;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use link::crash::FILE_BYTES;
+pub use link::crash::{Crash, CrashKind};
 
 /// Flags that the microcontroller keeps of its last reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,48 +20,16 @@ pub struct ResetFlags {
     pub brownout: bool,
 }
 
-/// Why the program gave up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum CrashKind {
-    /// A panic; the detail is its line.
-    Panic = 1,
-    /// A fault of the core; the detail is the address of the instruction.
-    HardFault = 2,
-    /// An interrupt that nothing serves; the detail is its number.
-    StrayInterrupt = 3,
-    /// A task hung; the detail is its number.
-    HungTask = 4,
-    /// The crystal stopped; the detail is the state of its clock.
-    Clock = 5,
-}
-
-impl CrashKind {
-    fn from_code(code: u32) -> Option<Self> {
-        [Self::Panic, Self::HardFault, Self::StrayInterrupt, Self::HungTask, Self::Clock]
-            .into_iter()
-            .find(|kind| *kind as u32 == code)
-    }
-}
-
-/// A crash, as the words of RAM tell it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Crash {
-    /// Why.
-    pub kind: CrashKind,
-    /// Where; see [`CrashKind`].
-    pub detail: u32,
-}
-
 /// Words that no start-up code clears. After a power-up they hold anything: each says itself whether it means something.
 pub struct LastWords {
-    crash: [AtomicU32; 3],
+    /// The check of the others, then what [`words_of`] makes.
+    crash: [AtomicU32; 1 + CRASH_WORDS],
     torque: [AtomicU32; 2],
     heat: [AtomicU32; 2],
 }
 
 /// What was said before a reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Said {
     /// Why the program gave up, if it did.
     pub crash: Option<Crash>,
@@ -68,8 +39,51 @@ pub struct Said {
     pub heat: u32,
 }
 
+/// Words of a crash: six numbers, then the bytes of the file's name.
+const CRASH_WORDS: usize = 6 + FILE_BYTES / 4;
 const CRASH_MARK: u32 = 0x5AFE_C4A5;
 const TORQUE_MARK: u32 = 0x700D_0E0F;
+/// CRC-32 as in Ethernet, without a table: a handler of a fault would have it on its stack.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// The check of the words of a crash.
+fn check(words: &[u32; CRASH_WORDS]) -> u32 {
+    let mut digest = CRC.digest();
+    words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    CRASH_MARK ^ digest.finalize()
+}
+
+fn words_of(crash: &Crash) -> [u32; CRASH_WORDS] {
+    let mut words = [0; CRASH_WORDS];
+    let Crash { kind, detail, pc, lr, fault_status, bus_address, file } = crash;
+    let numbers = [*kind as u32, *detail, *pc, *lr, *fault_status, *bus_address];
+    let pieces = file.as_bytes().chunks(4).map(|piece| {
+        let mut bytes = [0; 4];
+        bytes.iter_mut().zip(piece).for_each(|(place, &byte)| *place = byte);
+        u32::from_le_bytes(bytes)
+    });
+    words.iter_mut().zip(numbers.into_iter().chain(pieces)).for_each(|(place, word)| *place = word);
+    words
+}
+
+/// Returns the crash that these words hold, if its kind is one.
+fn crash_of(words: &[u32; CRASH_WORDS]) -> Option<Crash> {
+    let [kind, detail, pc, lr, fault_status, bus_address, name @ ..] = words;
+    let kind = CrashKind::from_code(*kind)?;
+    let mut crash = Crash {
+        pc: *pc,
+        lr: *lr,
+        fault_status: *fault_status,
+        bus_address: *bus_address,
+        ..Crash::new(kind, *detail)
+    };
+    let bytes = name.iter().flat_map(|word| word.to_le_bytes()).take_while(|&byte| byte != 0);
+    let mut name = heapless::Vec::<u8, FILE_BYTES>::new();
+    name.extend(bytes);
+    // Its check held, so it is what was written: text.
+    crash.file = heapless::String::from_utf8(name).unwrap_or_default();
+    Some(crash)
+}
 
 impl Default for LastWords {
     fn default() -> Self {
@@ -81,27 +95,32 @@ impl LastWords {
     /// Nothing said.
     pub const fn new() -> Self {
         Self {
-            crash: [const { AtomicU32::new(0) }; 3],
+            crash: [const { AtomicU32::new(0) }; 1 + CRASH_WORDS],
             torque: [const { AtomicU32::new(0) }; 2],
             heat: [const { AtomicU32::new(0) }; 2],
         }
     }
 
     /// Leaves word of a crash. The first one counts: what follows is a consequence.
-    pub fn crash(&self, crash: Crash) {
-        if self.crashed().is_some() {
+    pub fn crash(&self, crash: &Crash) {
+        if self.crash_words().is_some() {
             return;
         }
-        let [check, kind, detail] = &self.crash;
-        kind.store(crash.kind as u32, Relaxed);
-        detail.store(crash.detail, Relaxed);
-        check.store(CRASH_MARK ^ crash.kind as u32 ^ crash.detail, Relaxed);
+        let words = words_of(crash);
+        let [mark, places @ ..] = &self.crash;
+        places.iter().zip(words).for_each(|(place, word)| place.store(word, Relaxed));
+        mark.store(check(&words), Relaxed);
+    }
+
+    /// Returns the words of a crash if they are whole.
+    fn crash_words(&self) -> Option<[u32; CRASH_WORDS]> {
+        let [mark, places @ ..] = &self.crash;
+        let words = places.each_ref().map(|word| word.load(Relaxed));
+        (mark.load(Relaxed) == check(&words)).then_some(words)
     }
 
     fn crashed(&self) -> Option<Crash> {
-        let [check, kind, detail] = self.crash.each_ref().map(|word| word.load(Relaxed));
-        let whole = check == CRASH_MARK ^ kind ^ detail;
-        CrashKind::from_code(kind).filter(|_| whole).map(|kind| Crash { kind, detail })
+        crash_of(&self.crash_words()?)
     }
 
     /// Whether torque is on, from now on.
@@ -139,7 +158,7 @@ impl LastWords {
 }
 
 /// The fault to report for the last reset; `None` where it was a person's (power, the button, a debugger).
-pub fn cause(flags: ResetFlags, crash: Option<Crash>, torque_was_on: bool) -> Option<Fault> {
+pub fn cause(flags: ResetFlags, crash: Option<&Crash>, torque_was_on: bool) -> Option<Fault> {
     let hung = crash.is_some_and(|crash| crash.kind == CrashKind::HungTask);
     if hung || (flags.watchdog && crash.is_none()) {
         Some(Fault::Watchdog)
@@ -162,16 +181,16 @@ mod tests {
     use super::*;
 
     const NOTHING: Said = Said { crash: None, torque: false, heat: 0 };
-    const PANIC: Crash = Crash { kind: CrashKind::Panic, detail: 42 };
+    const PANIC: Crash = Crash::new(CrashKind::Panic, 42);
 
     #[test]
     fn last_words_survive_and_are_said_once() {
         let words = LastWords::new();
         assert_eq!(words.take(), NOTHING);
-        words.crash(PANIC);
+        words.crash(&PANIC);
         words.torque(true);
         words.heat(77);
-        words.crash(Crash { kind: CrashKind::HardFault, detail: 1 });
+        words.crash(&Crash::new(CrashKind::HardFault, 1));
         assert_eq!(words.take(), Said { crash: Some(PANIC), torque: true, heat: 77 });
         assert_eq!(words.take(), Said { heat: 77, ..NOTHING }, "a motor does not cool by being asked");
         words.heat[1].fetch_xor(1, Relaxed);
@@ -187,13 +206,21 @@ mod tests {
             CrashKind::HungTask,
             CrashKind::Clock,
         ];
-        for crash in kinds.map(|kind| Crash { kind, detail: 0x0800_1235 }) {
+        for kind in kinds {
+            let crash = Crash {
+                kind,
+                pc: 0x0800_1235,
+                lr: 0x0800_0201,
+                fault_status: 0x8200,
+                bus_address: 0x6000_0000,
+                ..Crash::panic("firmware/src/tasks/telemetry.rs", 77)
+            };
             let words = LastWords::new();
-            words.crash(crash);
-            assert_eq!(words.take(), Said { crash: Some(crash), ..NOTHING });
-            for word in 0..3 {
+            words.crash(&crash);
+            assert_eq!(words.take(), Said { crash: Some(crash.clone()), ..NOTHING });
+            for word in 0..1 + CRASH_WORDS {
                 for bit in 0..32 {
-                    words.crash(crash);
+                    words.crash(&crash);
                     words.crash[word].fetch_xor(1 << bit, Relaxed);
                     assert_eq!(words.take().crash, None, "{crash:?}, bit {bit} of word {word}");
                 }
@@ -229,17 +256,17 @@ mod tests {
         let watchdog = ResetFlags { watchdog: true, ..flags };
         let software = ResetFlags { software: true, ..flags };
         let dip = ResetFlags { brownout: true, ..flags };
-        let hung = Crash { kind: CrashKind::HungTask, detail: 3 };
+        let hung = Crash::new(CrashKind::HungTask, 3);
         assert_eq!(cause(power_up, None, false), None);
         assert_eq!(cause(power_up, None, true), Some(Fault::Brownout));
         assert_eq!(cause(dip, None, false), Some(Fault::Brownout));
         assert_eq!(cause(watchdog, None, true), Some(Fault::Watchdog));
-        assert_eq!(cause(watchdog, Some(hung), true), Some(Fault::Watchdog));
-        assert_eq!(cause(software, Some(PANIC), true), Some(Fault::Crash));
-        let clock = Crash { kind: CrashKind::Clock, detail: 0 };
-        assert_eq!(cause(software, Some(clock), true), Some(Fault::Clock));
+        assert_eq!(cause(watchdog, Some(&hung), true), Some(Fault::Watchdog));
+        assert_eq!(cause(software, Some(&PANIC), true), Some(Fault::Crash));
+        let clock = Crash::new(CrashKind::Clock, 0);
+        assert_eq!(cause(software, Some(&clock), true), Some(Fault::Clock));
         // A crash whose own reset did not come and that the watchdog ended.
-        assert_eq!(cause(watchdog, Some(PANIC), true), Some(Fault::Crash));
+        assert_eq!(cause(watchdog, Some(&PANIC), true), Some(Fault::Crash));
         assert_eq!(cause(software, None, true), None);
         assert_eq!(cause(flags, None, false), None);
         assert_eq!(cause(flags, None, true), Some(Fault::Brownout));

@@ -3,9 +3,15 @@
 //! once, its last word last; losing power at any point leaves the record that was or the one that comes, never a mixture.
 //! A slot is erased at start-up, before the tick and the watchdog run, and where no cell is left: an erasure stops the
 //! processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
+//!
+//! Below it, the flash has the traits of `embedded-storage` ([`Nor`]), so that another store, such as `sequential-storage`, can take this
+//! one's place. This one is kept for three things: a bit that flips in the record saved last is told from a record that was never
+//! finished, so that a device never quietly runs on an older one; it is read and written without waiting in between, in a task
+//! that the watchdog looks after, and reports progress with every word; and its tests cut the power at every single write.
 
 use control_core::{Device, Patient};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -68,11 +74,41 @@ pub trait ConfigFlash {
     /// Cells that a slot holds.
     const CELLS: usize;
     /// Reads word `index` of `slot`.
-    fn word(&self, slot: Slot, index: usize) -> u32;
+    fn word(&mut self, slot: Slot, index: usize) -> u32;
     /// Programs a word that is blank.
     fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError>;
     /// Makes every word of `slot` blank.
     fn erase(&mut self, slot: Slot) -> Result<(), StoreError>;
+}
+
+/// Any flash with the traits of `embedded-storage`: its first two sectors are the slots. It programs four bytes at a time, and no less.
+pub struct Nor<F>(pub F);
+
+impl<F: NorFlash> Nor<F> {
+    /// Bytes from the beginning of the flash.
+    fn offset(slot: Slot, index: usize) -> u32 {
+        const { assert!(F::WRITE_SIZE == 4 && F::READ_SIZE <= 4, "a store of words of 32 bits") };
+        (slot as usize * F::ERASE_SIZE + 4 * index) as u32
+    }
+}
+
+impl<F: NorFlash> ConfigFlash for Nor<F> {
+    const CELLS: usize = F::ERASE_SIZE / (4 * CELL_WORDS);
+
+    /// A word that cannot be read is no part of anything whole, and is not blank.
+    fn word(&mut self, slot: Slot, index: usize) -> u32 {
+        let mut bytes = [0; 4];
+        self.0.read(Self::offset(slot, index), &mut bytes).map_or(0, |()| u32::from_le_bytes(bytes))
+    }
+
+    fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
+        self.0.write(Self::offset(slot, index), &word.to_le_bytes()).map_err(|_| StoreError::Flash)
+    }
+
+    fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
+        let from = Self::offset(slot, 0);
+        self.0.erase(from, from + F::ERASE_SIZE as u32).map_err(|_| StoreError::Flash)
+    }
 }
 
 /// Why a configuration was not saved. It is in force all the same, until the next reset.
@@ -193,7 +229,7 @@ impl<F: ConfigFlash> Store<F> {
         self.append(kind, payload)
     }
 
-    fn is_saved(&self, kind: Kind, payload: &[u8]) -> bool {
+    fn is_saved(&mut self, kind: Kind, payload: &[u8]) -> bool {
         let mut bytes = [0; PAYLOAD_BYTES];
         let newest = self.newest[kind as usize];
         newest.is_some_and(|newest| self.read(newest, &mut bytes) == Some(payload))
@@ -230,21 +266,21 @@ impl<F: ConfigFlash> Store<F> {
         self.flash.program(slot, at + CELL_WORDS - 1, COMMITTED)
     }
 
-    fn cell(&self, slot: Slot, cell: usize) -> Cell {
-        let word = |index| self.flash.word(slot, cell * CELL_WORDS + index);
+    fn cell(&mut self, slot: Slot, cell: usize) -> Cell {
+        let mut word = |index| self.flash.word(slot, cell * CELL_WORDS + index);
         if word(CELL_WORDS - 1) == BLANK {
             let blank = (0..CELL_WORDS).all(|index| word(index) == BLANK);
             return if blank { Cell::Blank } else { Cell::Torn };
         }
         let mut bytes = [0; PAYLOAD_BYTES];
-        let (header, sequence) = (word(0), word(1));
+        let (header, sequence, check) = (word(0), word(1), word(2));
         let is_ours = header >> 12 & 0xF == u32::from(LAYOUT_VERSION);
         // Another layout may have had its length where this one has the record's name.
         let length = header & if is_ours { LENGTH } else { 0xFFF };
         let kind = Kind::ALL.into_iter().find(|kind| kind.bits() == header & (0b11 << 10));
         let payload = self.read_payload(slot, cell, header, length, &mut bytes);
         match (payload, kind) {
-            (Some(payload), _) if checksum(header, sequence, payload) != word(2) => Cell::Damaged(kind),
+            (Some(payload), _) if checksum(header, sequence, payload) != check => Cell::Damaged(kind),
             (Some(_), _) if !is_ours => Cell::Foreign(sequence),
             (Some(_), Some(kind)) => Cell::Whole(kind, sequence),
             _ => Cell::Damaged(kind),
@@ -252,7 +288,7 @@ impl<F: ConfigFlash> Store<F> {
     }
 
     fn read_payload<'a>(
-        &self,
+        &mut self,
         slot: Slot,
         cell: usize,
         header: u32,
@@ -271,13 +307,13 @@ impl<F: ConfigFlash> Store<F> {
     }
 
     /// The bytes of a whole version.
-    fn read<'a>(&self, version: Version, bytes: &'a mut [u8]) -> Option<&'a [u8]> {
+    fn read<'a>(&mut self, version: Version, bytes: &'a mut [u8]) -> Option<&'a [u8]> {
         let header = self.flash.word(version.slot, version.cell * CELL_WORDS);
         self.read_payload(version.slot, version.cell, header, header & LENGTH, bytes)
     }
 
     /// What the newest version of a record says.
-    fn stored<T: DeserializeOwned>(&self, kind: Kind, is_damaged: bool) -> Stored<T> {
+    fn stored<T: DeserializeOwned>(&mut self, kind: Kind, is_damaged: bool) -> Stored<T> {
         let mut bytes = [0; PAYLOAD_BYTES];
         match self.newest[kind as usize] {
             _ if is_damaged => Stored::Damaged,
@@ -306,7 +342,8 @@ impl<F: ConfigFlash> Store<F> {
             }
         }
         self.next_sequence = last.map_or(0, |(last, _)| last.wrapping_add(1));
-        let damaged_in = |slot| (0..F::CELLS).any(|cell| matches!(self.cell(slot, cell), Cell::Damaged(_)));
+        let mut damaged_in =
+            |slot| (0..F::CELLS).any(|cell| matches!(self.cell(slot, cell), Cell::Damaged(_)));
         self.slot = match last {
             Some((_, slot)) => slot,
             None if damaged_in(Slot::B) && !damaged_in(Slot::A) => Slot::B,
@@ -319,7 +356,7 @@ impl<F: ConfigFlash> Store<F> {
 
     /// Whether a version of the record that was committed after its newest whole one cannot be read. The other slot does not
     /// count: it may be half erased.
-    fn is_damaged(&self, kind: Kind) -> bool {
+    fn is_damaged(&mut self, kind: Kind) -> bool {
         let from = match self.newest[kind as usize] {
             Some(newest) if newest.slot == self.slot => newest.cell + 1,
             Some(_) => return false,

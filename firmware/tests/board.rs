@@ -44,7 +44,7 @@ mod tests {
     use core::cell::RefCell;
     use cortex_m::peripheral::DWT;
     use firmware::port::{ReadDrive, SerialPort, SupplyLevel, TickTimer, Watchdog};
-    use firmware::store::{ConfigFlash, Slot, Store, StoreError, Stored};
+    use firmware::store::{ConfigFlash, Nor, Slot, Store, StoreError, Stored};
     use firmware::timing;
 
     type Parts = chip::Parts<Wires>;
@@ -58,7 +58,7 @@ mod tests {
     impl<F: ConfigFlash, W: Watchdog> ConfigFlash for Fed<F, W> {
         const CELLS: usize = F::CELLS;
 
-        fn word(&self, slot: Slot, index: usize) -> u32 {
+        fn word(&mut self, slot: Slot, index: usize) -> u32 {
             self.watchdog.borrow_mut().feed();
             self.flash.word(slot, index)
         }
@@ -151,7 +151,7 @@ mod tests {
     #[timeout(20)]
     fn a_configuration_is_saved_and_found_again(parts: Parts) {
         let watchdog = RefCell::new(parts.watchdog);
-        let mut scratch = Fed { flash: parts.store.close().scratch(), watchdog };
+        let mut scratch = Fed { flash: Nor(parts.store.close().0.scratch()), watchdog };
         for slot in [Slot::A, Slot::B] {
             assert!(scratch.erase(slot).is_ok(), "erased before");
         }

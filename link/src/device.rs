@@ -6,6 +6,7 @@ mod waiting;
 use crate::build::Build;
 use crate::codec::{self, Decoder, MAX_FRAME};
 use crate::commissioning::{Proof, Record, may_become};
+use crate::crash::Crash;
 use crate::frames::{
     Ack, BLOCK_SAMPLES, Command, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
     PROTOCOL_VERSION, Pose, Rejection, SampleBlock, SaveFailure, Timing,
@@ -60,8 +61,10 @@ pub struct Endpoint<W = Waiting> {
     interlocks: Interlocks,
     limits: Limits,
     fault: Option<Fault>,
+    crash: Option<Crash>,
     sequence: u32,
     hello_due: bool,
+    crash_due: bool,
     device_due: bool,
     filling: SampleBlock,
     pose: Option<Pose>,
@@ -93,8 +96,10 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             interlocks: Interlocks::default(),
             limits: Limits::default(),
             fault: reset_cause,
+            crash: None,
             sequence: 0,
             hello_due: false,
+            crash_due: false,
             device_due: false,
             filling: SampleBlock::default(),
             pose: None,
@@ -139,9 +144,19 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.in_session
     }
 
+    /// The fault that has latched, or that ended the last run, until a person starts the device.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
     /// Sets the conditions that keep the device from being started, from now on.
     pub fn set_interlocks(&mut self, interlocks: Interlocks) {
         self.interlocks = interlocks;
+    }
+
+    /// Sets the crash that ended the last run, to be sent after each hello until a person starts the device.
+    pub fn set_crash(&mut self, crash: Option<Crash>) {
+        self.crash = crash;
     }
 
     /// The configuration in force was not saved.
@@ -211,6 +226,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if core::mem::take(&mut self.hello_due) {
             return Some(DeviceFrame::Hello(self.hello()));
         }
+        if core::mem::take(&mut self.crash_due)
+            && let Some(crash) = &self.crash
+        {
+            return Some(DeviceFrame::Crash(crash.clone()));
+        }
         if let Some(ack) = self.waiting.borrow_mut().acks.pop_front() {
             return Some(DeviceFrame::Ack(ack));
         }
@@ -279,6 +299,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.forget_waiting();
                 self.in_session = true;
                 self.hello_due = true;
+                self.crash_due = true;
                 self.sequence = 0;
                 self.order(Order::Heartbeat)
             }
@@ -298,7 +319,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 }
                 self.order(Order::Start)?;
                 self.start_ordered = true;
-                self.fault = None;
+                self.forget_fault();
                 Ok(())
             }
             Command::ConfigurePatient(_)
@@ -327,7 +348,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.order(Order::Excite(excitation))?;
                 self.proof = if is_gentle { Proof::Ordered } else { Proof::None };
                 self.start_ordered = true;
-                self.fault = None;
+                self.forget_fault();
                 Ok(())
             }
             Command::ConfigurePatient(patient) => {
@@ -360,6 +381,12 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             }
             Command::Index(index) => self.order(Order::Index(index.map(Counts))),
         }
+    }
+
+    /// A person has started the device, and has been told what ended its last run.
+    fn forget_fault(&mut self) {
+        self.fault = None;
+        self.crash = None;
     }
 
     fn is_commissioned(&self) -> Result<(), Rejection> {

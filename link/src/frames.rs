@@ -2,6 +2,7 @@
 
 use crate::build::Build;
 use crate::commissioning::Record;
+use crate::crash::Crash;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
@@ -49,6 +50,8 @@ pub enum DeviceFrame {
     Ack(Ack),
     /// The device's part of the configuration in force; the answer to [`Command::ReportDevice`].
     Device(Record),
+    /// The crash that ended the device's last run, after the hello of each session until a person starts it.
+    Crash(Crash),
 }
 
 /// The device's identity and the scale in which it speaks.

@@ -11,6 +11,7 @@ use control_core::controller::Sample;
 use control_core::interlock::Interlock;
 use link::codec::MAX_FRAME;
 use link::commissioning::Record;
+use link::crash::Crash;
 use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
 use link::host::{Commands, Counts, Reception};
 use link::{Command, DeviceFrame};
@@ -31,6 +32,8 @@ const HELLOS: u64 = 2;
 pub struct Heard {
     /// The latest hello.
     pub hello: Option<Hello>,
+    /// The crash that ended the device's last run, with how many times it was sent.
+    pub crash: (Option<Crash>, u32),
     /// The device's part of the configuration, where it was asked for.
     pub record: Option<Record>,
     /// Every sample, with its tick.
@@ -214,6 +217,7 @@ impl Pc {
         match frame {
             DeviceFrame::Hello(hello) => heard.hello = Some(hello),
             DeviceFrame::Device(record) => heard.record = Some(record),
+            DeviceFrame::Crash(crash) => heard.crash = (Some(crash), heard.crash.1 + 1),
             DeviceFrame::Samples(block) => {
                 if self.keep_samples {
                     heard.samples.extend((block.first_tick..).zip(block.samples));

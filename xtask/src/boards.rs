@@ -68,6 +68,19 @@ mod tests {
         words.split_whitespace().map(String::from).collect()
     }
 
+    /// A chip of another board would be flashed with an image that is not for it.
+    #[test]
+    fn each_board_has_its_own_runner() {
+        let config = include_str!("../../.cargo/config.toml");
+        for board in &ALL {
+            let (_, alias) =
+                config.split_once(&format!("\n{} = [", board.name)).expect("an alias for the board");
+            let (alias, _) = alias.split_once("\n]").expect("its end");
+            assert!(alias.contains(&format!("\"--features\", \"{}\"", board.name)), "{alias}");
+            assert!(alias.contains(&format!("--chip {}'", board.chip)), "{alias}");
+        }
+    }
+
     #[test]
     fn a_board_is_taken_out_of_the_arguments() {
         let taken = |words| chosen(&arguments(words)).map(|(board, rest)| (board.name, rest.join(" "))).ok();

@@ -1,5 +1,6 @@
 //! Each reference against its description, in floating point, and each range at its ends.
 
+use control_core::event::Fault;
 use control_core::excitation::{Excitation, Reference, Servo, Signal, Target};
 use control_core::plan::Field;
 use control_core::units::{
@@ -211,5 +212,46 @@ fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
             "tick {tick}: {torque} for {}",
             force * 10.0
         );
+    }
+}
+
+/// Ticks until a motor that follows `signal` and then runs at `speed`, in mm/s, trips.
+fn trips_at(signal: Signal, speed: f64) -> Option<(usize, Fault)> {
+    let plan = Config::commissioned_virtual().plan().expect("sound");
+    let mm_per_count = plan.mm_per_count().to_num::<f64>();
+    let mut c = Controller::new(plan);
+    let servo = Servo { stiffness: Stiffness(q(0.01)), damping: Damping(I8F24::from_num(0)) };
+    c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
+    let travel = Millimetres(q(900.0));
+    c.order(Order::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
+    (0..5_000).find_map(|tick| {
+        c.order(Order::Heartbeat);
+        let count = (speed * f64::from(tick) / TICKS_PER_S / mm_per_count) as i32;
+        let output = c.tick(TickInput { count: Counts(count), tilt: STRAIGHT });
+        output.tripped.map(|fault| (tick as usize, fault))
+    })
+}
+
+/// An excitation may be faster than a hand, up to three times or to half as fast again as its own reference.
+#[test]
+fn overspeed_trips_during_an_excitation() {
+    let triangle = |speed: f64| Signal::Triangle {
+        stroke: Millimetres(q(200.0)),
+        speed: MillimetresPerSecond(q(speed)),
+    };
+    let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(q(1.0)), ramp_ms: 500 };
+    for (signal, speed) in [
+        (Signal::Hold, 1_310.0),
+        (triangle(20.0), 1_310.0),
+        (ramps.clone(), 1_310.0),
+        (triangle(1_000.0), 1_550.0),
+    ] {
+        let tripped = trips_at(signal.clone(), speed);
+        let (tick, fault) = tripped.unwrap_or_else(|| panic!("{signal:?} at {speed} mm/s"));
+        // 3 ms and a look.
+        assert!(fault == Fault::Overspeed && tick < 50, "{signal:?}: {fault:?} at tick {tick}");
+    }
+    for (signal, speed) in [(Signal::Hold, 1_230.0), (ramps, 1_230.0), (triangle(1_000.0), 1_460.0)] {
+        assert_eq!(trips_at(signal.clone(), speed), None, "{signal:?} at {speed} mm/s");
     }
 }

@@ -34,7 +34,7 @@ fn tremor(tick: i32) -> i32 {
 
 fn other_plan() -> Plan {
     let mut config = Config::commissioned_virtual();
-    config.device.dac = DacWidth::Bits8;
+    config.device.dac = DacWidth::BITS_8;
     config.plan().expect("sound")
 }
 
@@ -116,10 +116,10 @@ fn the_zero_is_where_the_needle_is_and_moves_only_while_torque_is_off() {
 fn a_plan_is_taken_only_while_torque_is_off() {
     let mut c = controller();
     c.order(Order::Configure(other_plan()));
-    assert_eq!(c.plan().config().device.dac, DacWidth::Bits8);
+    assert_eq!(c.plan().config().device.dac, DacWidth::BITS_8);
     let mut c = started_at(0);
     c.order(Order::Configure(other_plan()));
-    assert_eq!(c.plan().config().device.dac, DacWidth::Bits12);
+    assert_eq!(c.plan().config().device.dac, DacWidth::BITS_12);
 }
 
 #[test]

@@ -2,13 +2,15 @@
 #![allow(unsafe_code, reason = "flash is programmed by writes to its address")]
 
 use crate::SHARED;
-use firmware::store::{CELL_WORDS, ConfigFlash, Slot, StoreError};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
 use firmware::supervision::Task;
 use firmware::timing;
 use stm32f4xx_hal::pac::{FLASH, IWDG, RCC};
 
-/// Words of a sector: 128 KiB.
-const SECTOR_WORDS: usize = 128 * 1024 / 4;
+/// Bytes of a sector.
+const SECTOR_BYTES: usize = 128 * 1024;
 /// The configuration's first sector by its number (RM0090 3.3); the second one follows. Parts with two megabytes have the same twelve
 /// sectors in their first bank (3.4); those of the second bank, which begin at 16 in `SNB` (3.9.8), are left alone.
 const FIRST_SECTOR: u8 = 10;
@@ -34,17 +36,18 @@ impl Sectors {
         Self { below: 2, ..self }
     }
 
-    fn address(&self, slot: Slot, index: usize) -> *mut u32 {
+    /// The address of a byte of the two sectors.
+    fn address(&self, offset: u32) -> *mut u8 {
         unsafe extern "C" {
             static mut _config_start: u32;
         }
-        assert!(index < SECTOR_WORDS);
-        let first = (&raw mut _config_start).wrapping_sub(usize::from(self.below) * SECTOR_WORDS);
-        first.wrapping_add(slot as usize * SECTOR_WORDS + index)
+        let first =
+            (&raw mut _config_start).cast::<u8>().wrapping_sub(usize::from(self.below) * SECTOR_BYTES);
+        first.wrapping_add(offset as usize)
     }
 
     /// Carries out one operation between unlocking and locking; `turns` bound the wait for its end.
-    fn operate(&mut self, turns: u32, start: impl FnOnce(&FLASH)) -> Result<(), StoreError> {
+    fn operate(&mut self, turns: u32, start: impl FnOnce(&FLASH)) -> Result<(), NorFlashErrorKind> {
         for key in KEYS {
             self.flash.keyr().write(|w| w.key().set(key));
         }
@@ -60,7 +63,28 @@ impl Sectors {
             || sr.operr().bit();
         self.flash.cr().write(|w| w.lock().set_bit());
         self.forget_cached();
-        if is_done && !has_failed { Ok(()) } else { Err(StoreError::Flash) }
+        if is_done && !has_failed { Ok(()) } else { Err(NorFlashErrorKind::Other) }
+    }
+
+    /// Erases the first of the two sectors or the second.
+    fn erase_sector(&mut self, sector: u8) -> Result<(), NorFlashErrorKind> {
+        defmt::info!("erasing a sector of the configuration's flash");
+        let sector = FIRST_SECTOR - self.below + sector;
+        watchdog(PATIENT);
+        let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
+            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7): whatever came after
+            // would be lost without a word.
+            // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
+            flash.cr().write(|w| unsafe {
+                w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
+            });
+            flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
+        });
+        watchdog(ALERT);
+        for task in Task::ALL {
+            SHARED.reports.alive(task);
+        }
+        done
     }
 
     /// The data cache may still hold what was there before.
@@ -105,49 +129,54 @@ fn watchdog((prescaler, divider, ms): WatchdogTime) {
     iwdg.kr().write(|w| unsafe { w.key().bits(FEED) });
 }
 
-impl ConfigFlash for Sectors {
-    const CELLS: usize = SECTOR_WORDS / CELL_WORDS;
+impl ErrorType for Sectors {
+    type Error = NorFlashErrorKind;
+}
 
-    fn word(&self, slot: Slot, index: usize) -> u32 {
-        // SAFETY: an aligned word of flash that no variable lies in.
-        unsafe { self.address(slot, index).read_volatile() }
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 4;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        for (at, place) in (offset..).step_by(4).zip(bytes.chunks_exact_mut(4)) {
+            // SAFETY: an aligned word of flash, within the two sectors, that no variable lies in.
+            let word = unsafe { self.address(at).cast::<u32>().read_volatile() };
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        Ok(())
     }
 
-    fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
-        let address = self.address(slot, index).cast::<u16>();
-        let halves = [(address, word as u16), (address.wrapping_add(1), (word >> 16) as u16)];
-        let done = halves.into_iter().try_for_each(|(address, half)| {
+    fn capacity(&self) -> usize {
+        2 * SECTOR_BYTES
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR_BYTES;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        for (at, half) in (offset..).step_by(2).zip(bytes.chunks_exact(2)) {
+            let address = self.address(at).cast::<u16>();
+            let half = half.iter().rev().fold(0, |half, &byte| half << 8 | u16::from(byte));
             self.operate(timing::FLASH_WORD_TURNS, |flash| {
                 // A register written whole begins from its reset value, which locks. 16 bits at a time: 32 ask for 2.7 V, and
                 // the rail may be lower (RM0090 3.6.2).
                 flash.cr().write(|w| w.lock().clear_bit().psize().psize16().pg().set_bit());
-                // SAFETY: an aligned half of a word of flash that no variable lies in, open for programming.
+                // SAFETY: an aligned half of a word of flash, within the two sectors, that no variable lies in, open for programming.
                 unsafe { address.write_volatile(half) };
                 cortex_m::asm::dsb();
-            })
-        });
+            })?;
+        }
         // Telemetry is at work, not hung: a configuration has a hundred words and more.
         SHARED.reports.alive(Task::Telemetry);
-        done
+        Ok(())
     }
 
-    fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
-        defmt::info!("erasing a sector of the configuration's flash");
-        let sector = FIRST_SECTOR - self.below + slot as u8;
-        watchdog(PATIENT);
-        let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
-            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7): whatever came after
-            // would be lost without a word.
-            // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
-            flash.cr().write(|w| unsafe {
-                w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
-            });
-            flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
-        });
-        watchdog(ALERT);
-        for task in Task::ALL {
-            SHARED.reports.alive(task);
-        }
-        done
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        (from as usize / SECTOR_BYTES..to as usize / SECTOR_BYTES)
+            .try_for_each(|sector| self.erase_sector(sector as u8))
     }
 }

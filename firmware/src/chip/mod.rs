@@ -8,6 +8,7 @@ mod brownout;
 mod clock;
 mod encoder;
 mod flash;
+mod lamps;
 mod monitors;
 mod outputs;
 mod pin;
@@ -19,6 +20,7 @@ mod watchdog;
 
 pub(crate) use clock::Source;
 pub(crate) use encoder::init as encoder;
+pub(crate) use lamps::Lamps;
 pub(crate) use monitors::{DriveLines, Line};
 pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac};
 pub(crate) use pin::{Pin, Placed};
@@ -29,8 +31,9 @@ use control_core::ceilings::Ceilings;
 use core::marker::PhantomData;
 use cortex_m::peripheral::DWT;
 use embedded_hal::digital::OutputPin;
-use firmware::drive::ParallelDac;
+use firmware::drive::{ParallelDac, Two};
 use firmware::port::Board;
+use firmware::store::Nor;
 use firmware::tilt::TiltSource;
 use stm32f4xx_hal::pac::{Interrupt, Peripherals};
 
@@ -58,16 +61,16 @@ pub(crate) struct Stm32F4<W>(PhantomData<W>);
 impl<W: Wiring> Board for Stm32F4<W> {
     type Timer = tick_timer::TickTimer;
     type Encoder = encoder::Encoder;
-    type Dac12 = OnChipDac;
-    type Dac8 = ParallelDac<Lines>;
+    type Converters = Two<OnChipDac, ParallelDac<Lines>>;
     type Enable = W::Enable;
     type EncoderLines = encoder::EncoderLines;
     type DriveLines = DriveLines;
     type Supply = supply::SupplyLevel;
     type Watchdog = watchdog::Watchdog;
     type Tilt = W::Tilt;
+    type Lamps = Lamps;
     type Serial = usb::Port;
-    type Flash = flash::Sectors;
+    type Flash = Nor<flash::Sectors>;
 
     fn cycles() -> u32 {
         DWT::cycle_count()

@@ -27,7 +27,7 @@ impl OnChipDac {
         let control = unsafe { &*DAC::ptr() }.cr();
         // RM0090 14.3.6: which trigger cannot be changed while the channel is enabled.
         control.modify(|_, w| w.boff1().set_bit().tsel1().tim4trgo().ten1().clear_bit().en1().clear_bit());
-        let mid_scale = DacWidth::Bits12.mid_scale();
+        let mid_scale = DacWidth::BITS_12.mid_scale();
         channel.set_value(mid_scale);
         control.modify(|_, w| w.en1().set_bit());
         // 14.3.4: without a trigger the code is at the pin one bus clock later; from then on codes wait for the timer.
@@ -38,7 +38,7 @@ impl OnChipDac {
 }
 
 impl MotorDac for OnChipDac {
-    const WIDTH: DacWidth = DacWidth::Bits12;
+    const WIDTH: DacWidth = DacWidth::BITS_12;
 
     fn put(&mut self, code: DacCode) {
         self.0.set_value(code.0);
@@ -77,7 +77,7 @@ pub(super) fn lines_to_zero_torque() {
 
 /// Mid-scale at the microcontroller's own converter, after a crash, whatever it waited for.
 pub(super) fn dac_to_zero_torque() {
-    let mid_scale = DacWidth::Bits12.mid_scale().into();
+    let mid_scale = DacWidth::BITS_12.mid_scale().into();
     // SAFETY: valid codes and bits; whoever owned the converter never runs again.
     unsafe {
         // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out (14.3.4).

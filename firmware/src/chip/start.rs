@@ -5,6 +5,7 @@ use super::brownout;
 use super::clock::{self, Source};
 use super::encoder::{Encoder, EncoderLines};
 use super::flash::Sectors;
+use super::lamps::Lamps;
 use super::monitors::DriveLines;
 use super::supply::{self, Supply, SupplyLevel};
 use super::tick_timer::TickTimer;
@@ -14,8 +15,10 @@ use crate::crash::LAST_WORDS;
 use control_core::ceilings::Ceilings;
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};
-use firmware::reset::{ResetFlags, Said, cause};
-use firmware::store::{Store, Stored};
+use firmware::drive::Converters;
+use firmware::port::Board;
+use firmware::reset::{Crash, ResetFlags, Said, cause};
+use firmware::store::{Nor, Store, Stored};
 use firmware::tasks::tick::BoardDrive;
 use firmware::timing;
 use link::device::Identity;
@@ -70,6 +73,7 @@ pub(crate) struct Wired<W: Wiring> {
     pub(crate) drive: BoardDrive<Stm32F4<W>>,
     pub(crate) drive_lines: DriveLines,
     pub(crate) tilt: W::Tilt,
+    pub(crate) lamps: Lamps,
 }
 
 /// What the tasks get.
@@ -80,15 +84,17 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) drive_lines: DriveLines,
     pub(crate) drive: BoardDrive<Stm32F4<W>>,
     pub(crate) tilt: W::Tilt,
+    pub(crate) lamps: Lamps,
     pub(crate) serial: usb::Port,
     pub(crate) watchdog: Watchdog,
     pub(crate) supply: Supply,
     pub(crate) supply_level: SupplyLevel,
-    pub(crate) store: Store<Sectors>,
+    pub(crate) store: Store<Nor<Sectors>>,
     pub(crate) plan: Plan,
     pub(crate) heat: u32,
     pub(crate) identity: Identity,
     pub(crate) reset_cause: Option<Fault>,
+    pub(crate) crash: Option<Crash>,
 }
 
 impl<W: Wiring> Parts<W> {
@@ -111,13 +117,12 @@ impl<W: Wiring> Parts<W> {
         if !supply_level.is_falling() {
             brownout::set(&own.flash);
         }
-        let (store, device_part, patient_part) = Store::open(Sectors::new(own.flash));
-        let (plan, damage) = plan(&W::CEILINGS, device_part, patient_part);
-        let reset_cause = cause(flags, crash, torque).or(damage);
-        match crash {
-            Some(crash) => {
-                defmt::warn!("last run ended: kind {}, detail {=u32:#x}", crash.kind as u8, crash.detail)
-            }
+        let (store, device_part, patient_part) = Store::open(Nor(Sectors::new(own.flash)));
+        let ceilings = W::CEILINGS.with_converters(<Stm32F4<W> as Board>::Converters::WIDTHS);
+        let (plan, damage) = plan(&ceilings, device_part, patient_part);
+        let reset_cause = cause(flags, crash.as_ref(), torque).or(damage);
+        match &crash {
+            Some(crash) => say(crash),
             None => defmt::info!("started; torque is off"),
         }
 
@@ -138,6 +143,7 @@ impl<W: Wiring> Parts<W> {
             drive_lines: wired.drive_lines,
             drive: wired.drive,
             tilt: wired.tilt,
+            lamps: wired.lamps,
             serial,
             watchdog,
             supply,
@@ -145,22 +151,40 @@ impl<W: Wiring> Parts<W> {
             store,
             plan,
             heat,
-            identity: Identity { serial: serial_number(), firmware: version(), ceilings: W::CEILINGS },
+            identity: Identity { serial: serial_number(), firmware: version(), ceilings },
             reset_cause,
+            crash,
         }
     }
 }
 
+/// Logs the crash that ended the last run.
+fn say(crash: &Crash) {
+    let Crash { kind, detail, pc, lr, fault_status, bus_address, file } = crash;
+    defmt::warn!(
+        "last run ended: kind {=u8}, detail {=u32:#x}, PC {=u32:#x}, LR {=u32:#x}, CFSR {=u32:#x}, BFAR {=u32:#x}, file {=str}",
+        *kind as u8,
+        *detail,
+        *pc,
+        *lr,
+        *fault_status,
+        *bus_address,
+        file.as_str()
+    );
+}
+
 /// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
 fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
-    let (device, lost_device) = device.or(Device::default());
+    // The widest converter that there is: none is left of a record.
+    let unknown = Device { dac: ceilings.converters[1], ..Device::default() };
+    let (device, lost_device) = device.or(unknown);
     let is_too_much = ceilings.check(&device).is_err();
-    let device = if is_too_much { Device::default() } else { device };
+    let device = if is_too_much { unknown } else { device };
     let (patient, lost_patient) = patient.or(Patient::default());
     let fault = (lost_device || lost_patient || is_too_much).then_some(Fault::StoredConfig);
     // A patient for another device leaves, and a device that may not be leaves the default.
     let fitting = Plan::new(&device, &patient).map(|plan| (plan, fault));
-    let parts = [(device, Patient::nobody()), (Device::default(), Patient::default())];
+    let parts = [(device, Patient::nobody()), (unknown, Patient::default())];
     let plan = fitting.or_else(|_| {
         let plan = parts.iter().find_map(|(device, patient)| Plan::new(device, patient).ok());
         plan.map(|plan| (plan, Some(Fault::StoredConfig))).ok_or(())

@@ -48,7 +48,7 @@ impl Flash {
 impl ConfigFlash for &mut Flash {
     const CELLS: usize = CELLS;
 
-    fn word(&self, slot: Slot, index: usize) -> u32 {
+    fn word(&mut self, slot: Slot, index: usize) -> u32 {
         self.words[slot as usize][index]
     }
 

@@ -62,7 +62,7 @@ impl Shared {
             link: AtomicU8::new(0),
             discard: AtomicBool::new(false),
             last_words,
-            given: AtomicU16::new(DacWidth::Bits12.mid_scale()),
+            given: AtomicU16::new(DacWidth::BITS_16.mid_scale()),
             tilt_mrad: AtomicI32::new(0),
         }
     }
@@ -74,16 +74,13 @@ impl Shared {
 
     /// Gives the supervisor the code that a converter of this width was given.
     pub fn set_given(&self, width: DacWidth, code: DacCode) {
-        let code = match width {
-            DacWidth::Bits12 => code.0,
-            DacWidth::Bits8 => code.0 << 4,
-        };
-        self.given.store(code, Relaxed);
+        // As 16 bits: the highest of any width are in one place.
+        self.given.store(code.0 << (16 - width.bits()), Relaxed);
     }
 
     /// The code that was given out last, of 12 bits.
     pub fn given(&self) -> DacCode {
-        DacCode(self.given.load(Relaxed))
+        DacCode(self.given.load(Relaxed) >> 4)
     }
 
     /// Gives the tick a new inclination.

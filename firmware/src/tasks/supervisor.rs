@@ -76,7 +76,7 @@ impl<B: Board> Watch<B> {
             Err(task) => {
                 // Torque goes with the next tick, the device follows when the watchdog ends.
                 self.shared.trips.raise(Fault::Watchdog);
-                self.shared.last_words.crash(Crash { kind: CrashKind::HungTask, detail: task as u32 });
+                self.shared.last_words.crash(&Crash::new(CrashKind::HungTask, task as u32));
                 if !self.said {
                     self.said = true;
                     log::error!("task {} hangs", task as u8);

@@ -4,7 +4,8 @@
 use super::queues::{Packet, SmallOrder, TelemetryEnds};
 use super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use crate::log;
-use crate::port::Board;
+use crate::port::{Board, Lamps};
+use crate::reset::Crash;
 use crate::store::{Store, StoreError};
 use crate::supervision::Task;
 use crate::timing;
@@ -33,6 +34,7 @@ pub struct Telemetry<B: Board> {
     /// CRC-32 of the device's and of the patient's part that a reset would bring back.
     saved: (u32, u32),
     ends: TelemetryEnds,
+    lamps: B::Lamps,
     /// An order that the tick had no room for.
     held: Option<Order>,
     next_tick: u64,
@@ -43,19 +45,24 @@ pub struct Telemetry<B: Board> {
 }
 
 impl<B: Board> Telemetry<B> {
-    /// `plan` is the one that the tick starts with, `reset_cause` what ended the last run.
+    /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last run, and `crash` the record that it
+    /// left where it gave up.
     pub fn new(
         shared: &'static Shared,
-        (identity, plan, reset_cause): (Identity, &Plan, Option<Fault>),
+        (identity, plan, reset_cause, crash): (Identity, &Plan, Option<Fault>, Option<Crash>),
         store: Store<B::Flash>,
         (ends, waiting): (TelemetryEnds, &'static mut Waiting),
+        lamps: B::Lamps,
     ) -> Self {
+        let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause);
+        endpoint.set_crash(crash);
         Self {
             shared,
-            endpoint: Endpoint::with(waiting, identity, plan, reset_cause),
+            endpoint,
             store,
             saved: (link::codec::hash(plan.device()), link::codec::hash(plan.patient())),
             ends,
+            lamps,
             held: None,
             next_tick: 0,
             filling: Packet::new(),
@@ -73,6 +80,7 @@ impl<B: Board> Telemetry<B> {
         self.take_samples();
         self.take_commands();
         self.send_frames();
+        self.lamps.show(self.shared.is_powered(), self.endpoint.fault().is_some());
         self.shared.reports.alive(Task::Telemetry);
         self.shared.stages.note(Stage::Telemetry, B::cycles().wrapping_sub(entered));
     }

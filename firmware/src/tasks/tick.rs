@@ -34,7 +34,7 @@ pub struct Tick<B: Board> {
 }
 
 /// Converters and amplifier enable of a board.
-pub type BoardDrive<B> = Drive<<B as Board>::Dac12, <B as Board>::Dac8, <B as Board>::Enable>;
+pub type BoardDrive<B> = Drive<<B as Board>::Converters, <B as Board>::Enable>;
 
 impl<B: Board> Tick<B> {
     /// Torque off, under `plan`, with a motor as warm as `heat`.
@@ -178,8 +178,8 @@ impl<B: Board> Tick<B> {
     #[cold]
     #[inline(never)]
     fn late_code(&self) {
-        // The eight-bit converter has no such instant.
-        if self.is_saving() || self.width == DacWidth::Bits8 {
+        // Only the converter of 12 bits has such an instant.
+        if self.is_saving() || self.width != DacWidth::BITS_12 {
             return;
         }
         self.shared.late_codes.store(self.shared.late_codes.load(Relaxed).saturating_add(1), Relaxed);

@@ -4,8 +4,7 @@
 
 use super::{Acceleration, Reading, Smoother, TiltSource, TiltTrouble, angle::below_horizontal};
 use crate::timing;
-use embedded_hal::digital::OutputPin;
-use embedded_hal::spi::SpiBus;
+use embedded_hal::spi::SpiDevice;
 
 /// Set in the first byte of a transfer that reads.
 const READ: u8 = 0x80;
@@ -68,36 +67,39 @@ impl Model {
 }
 
 /// Whichever accelerometer answers.
-pub struct Accelerometer<B, S> {
-    bus: B,
-    select: S,
+pub struct Accelerometer<D> {
+    device: D,
     model: Option<Model>,
     smoother: Smoother,
     last: [u8; 7],
     repeats: u32,
 }
 
-impl<B: SpiBus, S: OutputPin> Accelerometer<B, S> {
-    /// On `bus` in SPI mode 3, selected while `select` is low.
-    pub fn new(bus: B, mut select: S) -> Self {
-        // A port pin of the microcontroller cannot fail.
-        let _ = select.set_high();
-        Self { bus, select, model: None, smoother: Smoother::default(), last: [0; 7], repeats: 0 }
+impl<D: SpiDevice> Accelerometer<D> {
+    /// On `device`, a bus in SPI mode 3 with the sensor's select line, which may have other sensors on it too.
+    pub fn new(device: D) -> Self {
+        Self { device, model: None, smoother: Smoother::default(), last: [0; 7], repeats: 0 }
     }
 
     fn transfer(&mut self, bytes: &mut [u8]) -> Result<(), TiltTrouble> {
-        let _ = self.select.set_low();
-        let done = self.bus.transfer_in_place(bytes).and_then(|()| self.bus.flush());
-        let _ = self.select.set_high();
-        done.map_err(|_| TiltTrouble::Absent)
+        self.device.transfer_in_place(bytes).map_err(|_| TiltTrouble::Absent)
     }
 
-    /// Looks for the sensor and, where one has just appeared, sets it up.
+    /// Looks for the sensor and sets it up if it has just appeared, or has forgotten what it was told: one that loses its power
+    /// alone comes back with its own registers, in power-down, under the identity that it had before.
     fn find(&mut self) -> Result<Model, TiltTrouble> {
         let mut identity = [READ | WHO_AM_I, 0];
         self.transfer(&mut identity)?;
         let found = Model::from_identity(identity[1]);
-        if found != self.model {
+        let is_set_up = match found {
+            Some(model) if found == self.model => {
+                let mut control = [READ | CONTROL, 0];
+                self.transfer(&mut control)?;
+                control[1] == model.control()
+            }
+            _ => false,
+        };
+        if !is_set_up {
             if let Some(model) = found {
                 self.transfer(&mut [CONTROL, model.control()])?;
             }
@@ -129,7 +131,7 @@ impl<B: SpiBus, S: OutputPin> Accelerometer<B, S> {
     }
 }
 
-impl<B: SpiBus, S: OutputPin> TiltSource for Accelerometer<B, S> {
+impl<D: SpiDevice> TiltSource for Accelerometer<D> {
     fn read(&mut self) -> Reading {
         self.measure().unwrap_or_else(Reading::Failed)
     }
@@ -147,7 +149,7 @@ mod tests {
     use crate::tilt::TiltWatch;
     use control_core::units::Milliradians;
     use core::convert::Infallible;
-    use embedded_hal::{digital, spi};
+    use embedded_hal::spi::{ErrorType, Operation};
 
     /// Registers as either sensor answers.
     struct Sensor {
@@ -175,21 +177,13 @@ mod tests {
         }
     }
 
-    impl spi::ErrorType for Sensor {
+    impl ErrorType for Sensor {
         type Error = Infallible;
     }
 
-    impl SpiBus for Sensor {
-        fn read(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
-            unreachable!()
-        }
-        fn write(&mut self, _: &[u8]) -> Result<(), Infallible> {
-            unreachable!()
-        }
-        fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
-            unreachable!()
-        }
-        fn transfer_in_place(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+    impl SpiDevice for Sensor {
+        fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+            let [Operation::TransferInPlace(bytes)] = operations else { unreachable!() };
             let (command, data) = bytes.split_first_mut().unwrap();
             let old = self.registers[0x0F] == 0x3B;
             let mut address = usize::from(*command & if old { 0x3F } else { 0x7F });
@@ -205,22 +199,6 @@ mod tests {
             }
             Ok(())
         }
-        fn flush(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
-    }
-
-    struct Select;
-    impl digital::ErrorType for Select {
-        type Error = Infallible;
-    }
-    impl OutputPin for Select {
-        fn set_low(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
-        fn set_high(&mut self) -> Result<(), Infallible> {
-            Ok(())
-        }
     }
 
     #[test]
@@ -229,23 +207,36 @@ mod tests {
         let old = (Sensor::lis302dl(-28, 0, 48), 0x47);
         let new = (Sensor::lis3dsh([-8333, 0, 14434]), 0x6F);
         for (sensor, control) in [old, new] {
-            let mut accelerometer = Accelerometer::new(sensor, Select);
+            let mut accelerometer = Accelerometer::new(sensor);
             let Reading::New(tilt) = accelerometer.read() else { panic!("no measurement") };
             assert!((515..=535).contains(&tilt.0), "{tilt}");
-            assert_eq!(accelerometer.bus.registers[0x20], control);
+            assert_eq!(accelerometer.device.registers[0x20], control);
         }
     }
 
     #[test]
     fn a_sensor_that_goes_and_comes_is_set_up_again() {
-        let mut accelerometer = Accelerometer::new(Sensor::lis3dsh([0, 0, 16_667]), Select);
+        let mut accelerometer = Accelerometer::new(Sensor::lis3dsh([0, 0, 16_667]));
         assert_eq!(accelerometer.read(), Reading::New(Milliradians(0)));
-        accelerometer.bus.present = false;
-        accelerometer.bus.registers[0x20] = 0;
+        accelerometer.device.present = false;
+        accelerometer.device.registers[0x20] = 0;
         assert_eq!(accelerometer.read(), Reading::Failed(TiltTrouble::Absent));
-        accelerometer.bus.present = true;
+        accelerometer.device.present = true;
         assert_eq!(accelerometer.read(), Reading::New(Milliradians(0)));
-        assert_eq!(accelerometer.bus.registers[0x20], 0x6F);
+        assert_eq!(accelerometer.device.registers[0x20], 0x6F);
+    }
+
+    #[test]
+    fn a_sensor_that_lost_its_power_alone_is_set_up_again() {
+        for (sensor, control) in [(Sensor::lis302dl(0, 0, 55), 0x47), (Sensor::lis3dsh([0, 0, 16_667]), 0x6F)]
+        {
+            let mut accelerometer = Accelerometer::new(sensor);
+            accelerometer.read();
+            // Out of its own reset; its identity is what it was.
+            accelerometer.device.registers[0x20] = 0x07;
+            accelerometer.read();
+            assert_eq!(accelerometer.device.registers[0x20], control);
+        }
     }
 
     #[test]
@@ -264,13 +255,13 @@ mod tests {
     fn no_new_data_is_no_measurement() {
         let mut sensor = Sensor::lis302dl(0, 0, 55);
         sensor.registers[0x27] = 0;
-        assert_eq!(Accelerometer::new(sensor, Select).read(), Reading::Unchanged);
+        assert_eq!(Accelerometer::new(sensor).read(), Reading::Unchanged);
     }
 
     #[test]
     fn what_cannot_be_is_nonsense() {
         for sensor in [Sensor::lis302dl(127, 127, 127), Sensor::lis302dl(0, 0, 0), Sensor::lis3dsh([0; 3])] {
-            let reading = Accelerometer::new(sensor, Select).read();
+            let reading = Accelerometer::new(sensor).read();
             assert_eq!(reading, Reading::Failed(TiltTrouble::Nonsense));
         }
     }
@@ -278,7 +269,7 @@ mod tests {
     #[test]
     fn a_fine_sensor_without_noise_is_stuck_and_a_coarse_one_is_not() {
         let verdict = |sensor| {
-            let mut accelerometer = Accelerometer::new(sensor, Select);
+            let mut accelerometer = Accelerometer::new(sensor);
             let mut watch = TiltWatch::default();
             (0..1000).map(|_| watch.judge(accelerometer.read())).last().unwrap()
         };

@@ -64,7 +64,7 @@ pub struct Hello {
     pub roller_radius_mm: f64,
     /// Torque at full scale of the converter.
     pub full_scale_torque_mnm: f64,
-    /// 8 or 12.
+    /// 8 to 16.
     pub dac_bits: u8,
     /// The fault that had latched.
     pub fault: Option<Fault>,
@@ -166,10 +166,7 @@ impl From<&frames::Hello> for Hello {
             mm_per_count: hello.mm_per_count.to_num(),
             roller_radius_mm: hello.roller_radius.0.to_num(),
             full_scale_torque_mnm: hello.full_scale_torque.0.to_num(),
-            dac_bits: match hello.dac {
-                DacWidth::Bits8 => 8,
-                DacWidth::Bits12 => 12,
-            },
+            dac_bits: hello.dac.bits(),
             fault: hello.fault,
         }
     }
@@ -185,7 +182,7 @@ impl Hello {
 
     /// The converter.
     pub fn dac(&self) -> DacWidth {
-        if self.dac_bits == 8 { DacWidth::Bits8 } else { DacWidth::Bits12 }
+        DacWidth::try_from(self.dac_bits).unwrap_or(DacWidth::BITS_12)
     }
 
     /// Force at the roller in N that resists insertion, for what was written to the converter.

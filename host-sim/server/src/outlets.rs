@@ -84,6 +84,11 @@ impl Outlets {
                 self.gains.learn(&record.device);
                 Ok(())
             }
+            DeviceFrame::Crash(crash) => {
+                eprintln!("host-sim: {crash}");
+                self.complaint = Some(crash.to_string());
+                Ok(())
+            }
         }
     }
 

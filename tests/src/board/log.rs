@@ -15,6 +15,8 @@ use super::elf;
 pub struct Log {
     /// By index: the kind of line (`defmt_info`, `defmt_prim`, …) and the format string.
     formats: BTreeMap<u16, (String, String)>,
+    /// The format string of the time stamp.
+    stamp: Option<String>,
 }
 
 impl Log {
@@ -26,23 +28,28 @@ impl Log {
             let text = |key: &str| entry.get(key)?.as_str().map(str::to_string);
             Some((symbol.address.try_into().ok()?, (text("tag")?, text("data")?)))
         });
-        Self { formats: formats.collect() }
+        let formats: BTreeMap<u16, (String, String)> = formats.collect();
+        let stamp =
+            formats.values().find(|(tag, _)| tag == "defmt_timestamp").map(|(_, format)| format.clone());
+        Self { formats, stamp }
     }
 
-    /// The lines of `terminal`, each with its level before it.
+    /// The lines of `terminal`, each after its time stamp, with its level before it.
     ///
     /// # Panics
     ///
     /// When the terminal holds anything that is not a frame of this image.
     #[must_use]
-    pub fn lines(&self, terminal: &[u8]) -> Vec<String> {
+    pub fn lines(&self, terminal: &[u8]) -> Vec<(String, String)> {
         let frames = terminal.split(|&byte| byte == 0).filter(|frame| !frame.is_empty());
         let lines = frames.map(|frame| {
             let bytes = rzcobs::decode(frame).unwrap_or_else(|why| panic!("{frame:02x?}: {why:?}"));
             let mut rest = bytes.as_slice();
             let (tag, format) = self.format(&mut rest);
+            // The time stamp comes before the arguments (the defmt book, "Encoding").
+            let time = self.stamp.as_ref().map(|stamp| self.text(stamp, &mut rest));
             let level = tag.trim_start_matches("defmt_");
-            format!("{level}: {}", self.text(format, &mut rest))
+            (time.unwrap_or_default(), format!("{level}: {}", self.text(format, &mut rest)))
         });
         lines.collect()
     }
@@ -77,6 +84,12 @@ impl Log {
             Type::U16 => u16::from_le_bytes(take(rest)).to_string(),
             Type::U32 => u32::from_le_bytes(take(rest)).to_string(),
             Type::U64 => u64::from_le_bytes(take(rest)).to_string(),
+            Type::Str => {
+                let length = u32::from_le_bytes(take(rest)) as usize;
+                let (text, others) = rest.split_at(length);
+                *rest = others;
+                String::from_utf8_lossy(text).into_owned()
+            }
             Type::Format => {
                 let (_, format) = self.format(rest);
                 self.text(format, rest)

@@ -57,6 +57,8 @@ pub struct Pins {
     pub encoder_supply: PartPin,
     /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to the supply.
     pub drive_lines: [PartPin; 3],
+    /// The lamps: running, torque is on, a fault.
+    pub lamps: [PartPin; 3],
     /// The strap that says that an analogue inclinometer is fitted, where it is a matter of choice.
     pub strap: Option<PartPin>,
     /// The inclinometer's channel of the converters.
@@ -74,6 +76,7 @@ pub const DISCOVERY: Pins = Pins {
     tracks: [PartPin::new('A', 15), PartPin::new('A', 1)],
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('E', 4), PartPin::new('E', 5), PartPin::new('E', 6)],
+    lamps: [PartPin::new('D', 12), PartPin::new('D', 13), PartPin::new('D', 14)],
     strap: Some(PartPin::new('B', 1)),
     inclinometer: 11,
     monitor: 12,
@@ -88,6 +91,7 @@ pub const NUCLEO_F429ZI: Pins = Pins {
     tracks: [PartPin::new('A', 15), PartPin::new('B', 3)],
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],
+    lamps: [PartPin::new('B', 0), PartPin::new('B', 7), PartPin::new('B', 14)],
     strap: None,
     inclinometer: 10,
     monitor: 12,

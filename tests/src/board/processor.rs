@@ -37,6 +37,10 @@ fn window(address: u64) -> u64 {
 /// The converter's holding register for twelve bits, right aligned (RM0090 14.5.3).
 const CONVERTER_CODE: u64 = 0x4000_7408;
 
+/// The part's reserved space between its RAM with the RAM's bits and its peripherals (RM0090 2.3): an access fails on the bus, and the
+/// core takes a fault (ARMv7-M B3.2.15, `PRECISERR`). The emulator answers zero by itself.
+const RESERVED: [std::ops::Range<u64>; 2] = [0x2010_0000..0x2200_0000, 0x2400_0000..0x4000_0000];
+
 /// The part's identity.
 const DBGMCU_IDCODE: u64 = 0xE004_2000;
 
@@ -472,6 +476,9 @@ struct Rerouted<'a> {
 impl CoreBus for Rerouted<'_> {
     fn access(&mut self, mut access: Access, from_code: bool) -> Option<u64> {
         let written = access.kind == AccessKind::Write;
+        if from_code && RESERVED.iter().any(|space| space.contains(&access.address)) {
+            return None;
+        }
         if WRITABLE.contains(&access.address) {
             let (address, value) = (access.address, access.value as u32);
             let mut array = self.flash.array();

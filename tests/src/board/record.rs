@@ -19,7 +19,7 @@ fn address(slot: Slot, index: usize) -> u64 {
 impl ConfigFlash for Cells<'_> {
     const CELLS: usize = SLOT_BYTES as usize / 4 / CELL_WORDS;
 
-    fn word(&self, slot: Slot, index: usize) -> u32 {
+    fn word(&mut self, slot: Slot, index: usize) -> u32 {
         self.0.word(address(slot, index))
     }
 

@@ -1,5 +1,6 @@
 //! The board between two instructions: what a test looks at, and what it does to the board.
 
+use rigless::device::Level;
 use rigless::emulator::Host;
 use rigless::session::{Reset, Session};
 use rigless::soc::Width;
@@ -7,7 +8,7 @@ use rigless::soc::stm32f427::peripherals::adc;
 use rigless::time::VirtualNanos;
 
 use super::amplifier::Amplifier;
-use super::machine::Machine;
+use super::machine::{Machine, pin};
 use super::plant::{Drive, Nanos, PlantSide};
 use super::run::{Contact, Log, World};
 use super::tilt::Accelerometer;
@@ -84,6 +85,14 @@ impl Stopped<'_> {
     #[must_use]
     pub fn drive(&self) -> Drive {
         Drive { code: self.world.code, enabled: self.world.enabled }
+    }
+
+    /// Returns true for each lamp that shines: running, torque is on, a fault.
+    pub fn lamps(&mut self) -> [bool; 3] {
+        self.world.wiring.pins.lamps.map(|place| {
+            let (gpio, registers) = self.session.board_mut().part().port(place.port);
+            gpio.level(pin(place.index), registers) == Level::High
+        })
     }
 
     /// Every restart of the part, with its cause.

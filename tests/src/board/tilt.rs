@@ -5,6 +5,9 @@ use rigless::chip::{Timeline, spi::Peer};
 use rigless::snapshot::Store;
 
 const WHO_AM_I: u8 = 0x0F;
+/// LIS302DL `CTRL_REG1`, LIS3DSH `CTRL_REG4`, and what either holds out of its reset: power-down.
+const CONTROL: u8 = 0x20;
+const POWERED_DOWN: u8 = 0x07;
 /// The first output register of either chip is the X axis; the LIS302DL has one byte an axis, in
 /// every second register, the LIS3DSH two.
 const OUT_X: u8 = 0x28;
@@ -57,21 +60,41 @@ pub struct Accelerometer {
 }
 
 impl Accelerometer {
-    /// A chip on a needle that points 30° down, as a hand holds it to a vein: X, along the needle, measures half a gravity.
-    #[must_use]
-    pub fn new(model: Model) -> Self {
+    /// The registers of a chip that has just been given power.
+    fn reset(model: Model) -> [u8; 128] {
         let mut registers = [0; 128];
         registers[usize::from(WHO_AM_I)] = match model {
             Model::Lis302dl => 0x3B,
             Model::Lis3dsh => 0x3F,
         };
-        registers[0x20] = 0x07;
+        registers[usize::from(CONTROL)] = POWERED_DOWN;
         // LIS3DSH: CTRL_REG6.ADD_INC is set out of reset.
         registers[0x25] = 0x10;
+        registers
+    }
+
+    /// Takes its power away for a moment, and its alone: it forgets what it was told.
+    pub fn lose_power(&mut self) {
+        self.registers = Self::reset(self.model);
+        self.address = None;
+    }
+
+    /// True if it measures: LIS302DL `PD` set (data sheet 7.2), LIS3DSH `ODR` not zero (data sheet 8.5).
+    fn is_awake(&self) -> bool {
+        let control = self.registers[usize::from(CONTROL)];
+        match self.model {
+            Model::Lis302dl => control & 0x40 != 0,
+            Model::Lis3dsh => control & 0xF0 != 0,
+        }
+    }
+
+    /// A chip on a needle that points 30° down, as a hand holds it to a vein: X, along the needle, measures half a gravity.
+    #[must_use]
+    pub fn new(model: Model) -> Self {
         let mut chip = Self {
             model,
             health: Health::Good,
-            registers,
+            registers: Self::reset(model),
             address: None,
             reading: false,
             steps: false,
@@ -110,7 +133,7 @@ impl Accelerometer {
 
     /// Measures if a hundredth of a second has passed.
     fn advance(&mut self, now: u64) {
-        if now < self.next || self.health == Health::Stuck {
+        if now < self.next || self.health == Health::Stuck || !self.is_awake() {
             return;
         }
         self.next = now - now % MEASURE_EVERY + MEASURE_EVERY;
@@ -219,9 +242,30 @@ mod tests {
         assert!(i16::from_le_bytes([bytes[4], bytes[5]]).abs_diff(16_666) <= 3);
     }
 
+    /// Writes the control register as a driver does that wants measurements.
+    fn wake(chip: &mut Accelerometer) {
+        chip.address = None;
+        chip.byte(CONTROL);
+        chip.byte(0x6F);
+    }
+
+    #[test]
+    fn a_chip_without_power_forgets_and_sleeps() {
+        for model in [Model::Lis302dl, Model::Lis3dsh] {
+            let mut chip = Accelerometer::new(model);
+            wake(&mut chip);
+            chip.advance(0);
+            assert_eq!(read(&mut chip, 0xE7, 7)[0], 0x0F);
+            chip.lose_power();
+            chip.advance(MEASURE_EVERY);
+            assert_eq!(read(&mut chip, 0xE7, 7)[0], 0);
+        }
+    }
+
     #[test]
     fn a_measurement_is_ready_once_and_taken_once() {
         let mut chip = Accelerometer::new(Model::Lis302dl);
+        wake(&mut chip);
         chip.advance(0);
         assert_eq!(read(&mut chip, 0xE7, 7)[0], 0x0F);
         chip.advance(MEASURE_EVERY - 1);
@@ -233,6 +277,7 @@ mod tests {
     #[test]
     fn each_illness_shows() {
         let mut chip = Accelerometer::new(Model::Lis3dsh);
+        wake(&mut chip);
         chip.health = Health::Frozen;
         let before = read(&mut chip, 0xA8, 6);
         chip.set_milligravities([1_000, 0, 0]);

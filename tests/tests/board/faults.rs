@@ -71,6 +71,34 @@ fn an_accelerometer_that_is_stuck() {
     tilt_fault(Model::Lis3dsh, Health::Frozen, 600 * MILLISECOND);
 }
 
+/// It answers as before, and is in power-down: it has to be told again what it is to do, and the device goes on.
+#[test]
+fn an_accelerometer_that_loses_its_power_alone_is_set_up_again() {
+    for model in [Model::Lis302dl, Model::Lis3dsh] {
+        let mut rig = Rig::pressed_on(Wiring { tilt: Some(model), ..Wiring::default() });
+        let (since, before) = (rig.board.now(), rig.pc.heard.samples.len());
+        rig.board.at_stop(|stopped| {
+            let chip = stopped.tilt().expect("an accelerometer");
+            chip.lose_power();
+            // Level from now on, which only a sensor that measures can tell.
+            chip.set_milligravities([0, 0, 1_000]);
+        });
+        rig.pc.run_ms(&mut rig.board, 1_000);
+        let reads = |tilt: i16| tilt.abs() < 20;
+        let newest = rig.pc.heard.samples.last().map(|(_, sample)| sample.tilt_mrad);
+        assert!(newest.is_some_and(reads), "{model:?}: {newest:?} mrad");
+        let found = rig.pc.heard.samples[before..].iter().position(|(_, sample)| reads(sample.tilt_mrad));
+        report(
+            &format!("{model:?} without its power, level again"),
+            found.map_or(0, |ticks| ticks as Nanos * TICK),
+        );
+        let off = rig
+            .board
+            .at_stop(move |stopped| stopped.log().enable.iter().any(|&(at, is_on)| at >= since && !is_on));
+        assert!(!off, "{model:?}: the torque stays");
+    }
+}
+
 #[test]
 fn a_host_that_goes_in_the_middle_of_an_insertion() {
     let mut rig = Rig::pressed();

@@ -31,7 +31,7 @@ fn eight_lines_carry_the_codes_of_an_eight_bit_configuration_and_never_another()
     let mut pc = Pc::new();
     pc.connect(&mut board);
     let mut config = Config::commissioned_virtual();
-    config.device.dac = DacWidth::Bits8;
+    config.device.dac = DacWidth::BITS_8;
     pc.configure(&mut board, &config);
     pc.run_ms(&mut board, 50);
     board.at_stop(|stopped| stopped.log().put_out.clear());

@@ -157,7 +157,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
         config.device.damping = Damping(I8F24::from_num(0.0002));
         config.device.encoder_reversed = is(0);
         config.device.motor_reversed = is(1);
-        config.device.dac = if is(2) { DacWidth::Bits8 } else { DacWidth::Bits12 };
+        config.device.dac = if is(2) { DacWidth::BITS_8 } else { DacWidth::BITS_12 };
         config.device.limits.continuous_torque = MillinewtonMetres(q(10.0));
         config.device.limits.stiffness = Stiffness(q(3.0));
         config

@@ -3,10 +3,12 @@
 mod commissioning;
 mod compensation;
 mod control;
+mod crash;
 mod faults;
 mod fitted;
 mod holding;
 mod instructions;
+mod lamps;
 mod log;
 mod rate;
 mod runaway;

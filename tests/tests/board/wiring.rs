@@ -43,6 +43,7 @@ fn check(section: &str, board: &Pins) {
     let monitor = pins(section, "current monitor");
     assert_eq!((monitor[0], channel(monitor[1])), (board.drive_lines[2], board.monitor));
     assert_eq!(pins(section, "the encoder's supply"), [board.encoder_supply]);
+    assert_eq!(pins(section, "lamps"), board.lamps);
     let inclinometer = pins(section, "analogue inclinometer");
     assert_eq!(channel(inclinometer[0]), board.inclinometer);
     assert_eq!(inclinometer.get(1).copied(), board.strap);

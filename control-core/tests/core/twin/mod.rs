@@ -30,7 +30,7 @@ fn device() -> impl Strategy<Value = Device> {
             roller_radius: Millimetres(q(radius)),
             counts_per_turn: counts,
             full_scale_torque: MillinewtonMetres(q(torque)),
-            dac: if narrow { DacWidth::Bits8 } else { DacWidth::Bits12 },
+            dac: if narrow { DacWidth::BITS_8 } else { DacWidth::BITS_12 },
             ..Device::commissioned_virtual()
         },
     )

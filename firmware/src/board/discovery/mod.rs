@@ -16,14 +16,15 @@
 //! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
 //! | PA11, PA12 | USB | the micro-USB connector CN5 |
 //! | PC0 | power switch of CN5, for a host; low is on | high for good: this is a device (UM1472, OTG) |
-//! | PD12 | green LED: running | on the board |
+//! | PD12, PD13, PD14 | lamps: green, running; orange, torque is on; red, a fault | LD4, LD3, LD5 on the board |
 
 use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Line, Lines, OnChipDac, Own, Parts, Source, Statics, Wired,
-    Wiring,
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Lines, OnChipDac, Own, Parts, Source, Statics,
+    Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
-use firmware::drive::{Drive, ParallelDac};
+use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use firmware::drive::{Drive, ParallelDac, Two};
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
 use stm32f4xx_hal::gpio::{Analog, Output, PC1, PD7, PE3};
@@ -64,7 +65,7 @@ impl Wiring for Discovery {
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
         let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(dac, ParallelDac(lines), enable);
+        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
 
         let strap = gpiob.pb1.into_pull_down_input();
         // Whatever charge the pin had, its pull has taken away by then.
@@ -77,7 +78,8 @@ impl Wiring for Discovery {
             let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
             let pins = (Some(gpioa.pa5), Some(gpioa.pa6), Some(gpioa.pa7));
             let bus = device.SPI1.spi(pins, mode, timing::TILT_SPI_HZ.Hz(), rcc);
-            BoardTilt::OnBoard(Accelerometer::new(bus, gpioe.pe3.into_push_pull_output()))
+            let Ok(device) = ExclusiveDevice::new_no_delay(bus, gpioe.pe3.into_push_pull_output());
+            BoardTilt::OnBoard(Accelerometer::new(device))
         };
 
         let drive_lines = DriveLines::new(
@@ -90,6 +92,7 @@ impl Wiring for Discovery {
         let tracks = (gpioa.pa15.into_pull_up_input(), gpioa.pa1.into_pull_up_input());
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiod.pd12.into_push_pull_output().set_high();
+        let lamps = Lamps::new(gpiod.pd13, gpiod.pd14);
 
         let own = Own {
             flash: device.FLASH,
@@ -101,13 +104,13 @@ impl Wiring for Discovery {
             watchdog: device.IWDG,
             debug: device.DBGMCU,
         };
-        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt }, statics)
+        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
     }
 }
 
 /// Either tilt sensor.
 pub(crate) enum BoardTilt {
-    OnBoard(Accelerometer<Spi<pac::SPI1>, PE3<Output>>),
+    OnBoard(Accelerometer<ExclusiveDevice<Spi<pac::SPI1>, PE3<Output>, NoDelay>>),
     Analogue(Inclinometer<InclinometerPin<PC1<Analog>>>),
 }
 

@@ -15,14 +15,14 @@
 //! | PC0 | analogue inclinometer (ADC 1, channel 10) | CN9 3; needs an external pull-down of 100 kΩ, which a wire that is off leaves it with |
 //! | PA11, PA12 | USB | the micro-USB connector CN13 |
 //! | PG6 | power switch of CN13, for a host | low, always: this is a device |
-//! | PB0 | green LED LD1: running | on the board |
+//! | PB0, PB7, PB14 | lamps: green, running; blue, torque is on; red, a fault | LD1, LD2, LD3 on the board |
 
 use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Line, Lines, OnChipDac, Own, Parts, Source, Statics, Wired,
-    Wiring,
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Lines, OnChipDac, Own, Parts, Source, Statics,
+    Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
-use firmware::drive::{Drive, ParallelDac};
+use firmware::drive::{Drive, ParallelDac, Two};
 use firmware::tilt::Inclinometer;
 use stm32f4xx_hal::gpio::{Analog, Output, PC0, PF13};
 use stm32f4xx_hal::pac;
@@ -60,7 +60,7 @@ impl Wiring for NucleoF429zi {
             gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
         ));
         let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(dac, ParallelDac(lines), enable);
+        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
 
         let tilt = Inclinometer::new(InclinometerPin::new(device.ADC1, gpioc.pc0.into_analog(), rcc));
         let drive_lines = DriveLines::new(
@@ -74,6 +74,7 @@ impl Wiring for NucleoF429zi {
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiog.pg6.into_push_pull_output().set_low();
         gpiob.pb0.into_push_pull_output().set_high();
+        let lamps = Lamps::new(gpiob.pb7, gpiob.pb14);
 
         let own = Own {
             flash: device.FLASH,
@@ -85,6 +86,6 @@ impl Wiring for NucleoF429zi {
             watchdog: device.IWDG,
             debug: device.DBGMCU,
         };
-        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt }, statics)
+        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
     }
 }

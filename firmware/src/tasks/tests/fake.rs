@@ -3,7 +3,7 @@
 use super::super::queues::{Queues, SmallOrder, TelemetryEnds, TickEnds, UsbEnds};
 use super::super::shared::Shared;
 use super::super::tick::Tick;
-use crate::drive::{Drive, MotorDac};
+use crate::drive::{Drive, MotorDac, Two};
 use crate::lines::{Pull, PulledLines};
 use crate::monitor::Readings;
 use crate::port::{self, Board, WouldBlock};
@@ -47,6 +47,7 @@ pub(super) struct World {
     pub(super) outgoing: RefCell<Vec<Vec<u8>>>,
     pub(super) room: Cell<usize>,
     pub(super) flash_fails: Cell<bool>,
+    pub(super) lamps: Cell<(bool, bool)>,
 }
 
 thread_local! {
@@ -63,14 +64,14 @@ pub(super) struct Part;
 impl Board for Fake {
     type Timer = Part;
     type Encoder = Part;
-    type Dac12 = Part;
-    type Dac8 = Eight;
+    type Converters = Two<Part, Eight>;
     type Enable = Part;
     type EncoderLines = Lines;
     type DriveLines = Part;
     type Supply = Part;
     type Watchdog = Part;
     type Tilt = Part;
+    type Lamps = Part;
     type Serial = Part;
     type Flash = Words;
 
@@ -122,7 +123,7 @@ impl port::Encoder for Part {
 }
 
 impl MotorDac for Part {
-    const WIDTH: DacWidth = DacWidth::Bits12;
+    const WIDTH: DacWidth = DacWidth::BITS_12;
 
     fn put(&mut self, code: DacCode) {
         world().codes.borrow_mut().push(code.0);
@@ -132,7 +133,7 @@ impl MotorDac for Part {
 pub(super) struct Eight;
 
 impl MotorDac for Eight {
-    const WIDTH: DacWidth = DacWidth::Bits8;
+    const WIDTH: DacWidth = DacWidth::BITS_8;
 
     fn put(&mut self, _code: DacCode) {}
 }
@@ -195,6 +196,12 @@ impl port::Watchdog for Part {
     }
 }
 
+impl port::Lamps for Part {
+    fn show(&mut self, powered: bool, fault: bool) {
+        world().lamps.set((powered, fault));
+    }
+}
+
 impl TiltSource for Part {
     fn read(&mut self) -> Reading {
         world().tilt.get().unwrap_or(Reading::Unchanged)
@@ -231,7 +238,7 @@ pub(super) struct Words(pub(super) [Vec<u32>; 2]);
 impl ConfigFlash for Words {
     const CELLS: usize = 8;
 
-    fn word(&self, slot: Slot, index: usize) -> u32 {
+    fn word(&mut self, slot: Slot, index: usize) -> u32 {
         self.0[slot as usize][index]
     }
 
@@ -269,7 +276,7 @@ pub(super) fn ends() -> (TickEnds, UsbEnds, (TelemetryEnds, &'static mut Waiting
 pub(super) fn tick() -> (Tick<Fake>, &'static Shared, TelemetryEnds) {
     let shared = shared();
     let (tick_ends, _, (telemetry, _)) = ends();
-    let drive = Drive::new(Part, Eight, Part);
+    let drive = Drive::new(Two { wide: Part, narrow: Eight }, Part);
     (Tick::new(shared, (Part, Part, drive), &plan(), 0, tick_ends), shared, telemetry)
 }
 

@@ -3,7 +3,7 @@
 use super::super::queues::{Packet, SmallOrder, TickEnds, Ticked, UsbEnds};
 use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use super::super::telemetry::Telemetry;
-use super::fake::{Fake, Words, ends, plan, shared, world};
+use super::fake::{Fake, Part, Words, ends, plan, shared, world};
 use crate::store::{CELL_WORDS, ConfigFlash, Store};
 use control_core::controller::TickInput;
 use control_core::event::{Fault, State};
@@ -34,7 +34,7 @@ impl Desk {
         let identity = Identity { firmware: [1, 2, 3], ..Identity::VIRTUAL };
         let blank = || std::vec![u32::MAX; Words::CELLS * CELL_WORDS];
         let (store, ..) = Store::open(Words([blank(), blank()]));
-        let telemetry = Telemetry::new(shared, (identity, &plan(), None), store, telemetry_ends);
+        let telemetry = Telemetry::new(shared, (identity, &plan(), None, None), store, telemetry_ends, Part);
         shared.link.store(LINK_CONFIGURED | LINK_READY, Relaxed);
         Self { telemetry, shared, tick, usb, commands: Commands::default(), reception: Reception::default() }
     }

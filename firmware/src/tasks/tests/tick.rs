@@ -40,7 +40,7 @@ fn the_tick_does_not_start_under_an_interlock_and_says_why() {
 #[test]
 fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let (mut tick, shared, mut telemetry) = tick();
-    let eight = Device { dac: DacWidth::Bits8, ..Device::commissioned_virtual() };
+    let eight = Device { dac: DacWidth::BITS_8, ..Device::commissioned_virtual() };
     let eight = Plan::new(&eight, &Patient::default()).unwrap();
     let configure = |telemetry: &mut TelemetryEnds| {
         assert!(telemetry.large_orders.enqueue(control_core::Order::Configure(eight.clone())).is_ok());
@@ -50,13 +50,13 @@ fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     run(&mut tick, shared, 2);
     configure(&mut telemetry);
     run(&mut tick, shared, 2);
-    assert_eq!(tick.width(), DacWidth::Bits12, "torque is on");
+    assert_eq!(tick.width(), DacWidth::BITS_12, "torque is on");
     shared.trips.raise(Fault::Tilt);
     run(&mut tick, shared, 1);
     assert!(!world().enabled.get());
     configure(&mut telemetry);
     run(&mut tick, shared, 2);
-    assert_eq!(tick.width(), DacWidth::Bits8);
+    assert_eq!(tick.width(), DacWidth::BITS_8);
 }
 
 #[test]

@@ -157,11 +157,9 @@ impl File {
         if let Some(torque) = drive.full_scale_torque_mnm {
             device.full_scale_torque = MillinewtonMetres(fix("full_scale_torque_mnm", torque)?);
         }
-        match drive.dac_bits {
-            Some(8) => device.dac = DacWidth::Bits8,
-            Some(12) => device.dac = DacWidth::Bits12,
-            None => {}
-            Some(other) => return Err(format!("dac_bits is {other}; it must be 8 or 12")),
+        if let Some(bits) = drive.dac_bits {
+            device.dac =
+                DacWidth::try_from(bits).map_err(|_| format!("dac_bits is {bits}; it must be 8 to 16"))?;
         }
         if let Some(degrees) = drive.skin_tilt_deg {
             device.skin_tilt = tilt("skin_tilt_deg", degrees)?;
@@ -205,10 +203,7 @@ impl File {
                 counts_per_turn: Some(device.counts_per_turn),
                 encoder_reversed: Some(device.encoder_reversed),
                 full_scale_torque_mnm: Some(device.full_scale_torque.0.to_num()),
-                dac_bits: Some(match device.dac {
-                    DacWidth::Bits8 => 8,
-                    DacWidth::Bits12 => 12,
-                }),
+                dac_bits: Some(device.dac.bits()),
                 dac_zero_codes: Some(device.dac_zero),
                 motor_reversed: Some(device.motor_reversed),
                 skin_tilt_deg: Some((f64::from(device.skin_tilt.0) * 1e-3).to_degrees()),
@@ -304,7 +299,7 @@ mod tests {
     fn what_is_written_is_read_again_to_the_last_place() {
         let mut device = Device {
             encoder_reversed: true,
-            dac: DacWidth::Bits8,
+            dac: DacWidth::BITS_8,
             dac_zero: -3,
             skin_tilt: Milliradians(-123),
             speed: SpeedMethod::EdgeTiming,

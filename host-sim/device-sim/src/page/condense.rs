@@ -2,7 +2,6 @@
 
 use super::messages::{self, Bucket, Device, Range, Timing};
 use crate::session::{Batch, Happening, state_name, vessel_name};
-use control_core::config::DacWidth;
 use link::build::Build;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
@@ -195,10 +194,7 @@ fn device(hello: &Hello) -> Device {
         tick_hz: hello.tick_hz,
         mm_per_count: hello.mm_per_count.to_num(),
         full_scale_torque_mnm: hello.full_scale_torque.0.to_num(),
-        dac_bits: match hello.dac {
-            DacWidth::Bits8 => 8,
-            DacWidth::Bits12 => 12,
-        },
+        dac_bits: hello.dac.bits(),
         fault: hello.fault.map(|fault| fault.to_string()),
     }
 }

@@ -175,7 +175,7 @@ impl Publisher {
             DeviceFrame::Pose(pose) => self.pose(*pose),
             DeviceFrame::Event(event) => self.event(*event),
             DeviceFrame::Timing(timing) => self.timing(*timing),
-            DeviceFrame::Ack(_) | DeviceFrame::Device(_) => {}
+            DeviceFrame::Ack(_) | DeviceFrame::Device(_) | DeviceFrame::Crash(_) => {}
         }
     }
 
