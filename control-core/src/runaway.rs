@@ -205,7 +205,7 @@ impl Watch {
         const SPAN_TICKS: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
         let counts = self.count(0).wrapping_sub(self.count(SPAN_LOOKS)).unsigned_abs();
         let per_span_q30 = i64::from(mm_per_count.to_bits()).saturating_mul(counts.into());
-        let bits = per_span_q30.saturating_mul(TICK_HZ.into()) / SPAN_TICKS >> 14;
+        let bits = (per_span_q30.saturating_mul(TICK_HZ.into()) / SPAN_TICKS) >> 14;
         MillimetresPerSecond(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
     }
 

@@ -9,9 +9,12 @@
 //! finished, so that a device never quietly runs on an older one; it is read and written without waiting in between, in a task
 //! that the watchdog looks after, and reports progress with every word; and its tests cut the power at every single write.
 
+mod nor;
+
+pub use nor::Nor;
+
 use control_core::{Device, Patient};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
-use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -79,36 +82,6 @@ pub trait ConfigFlash {
     fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError>;
     /// Makes every word of `slot` blank.
     fn erase(&mut self, slot: Slot) -> Result<(), StoreError>;
-}
-
-/// Any flash with the traits of `embedded-storage`: its first two sectors are the slots. It programs four bytes at a time, and no less.
-pub struct Nor<F>(pub F);
-
-impl<F: NorFlash> Nor<F> {
-    /// Bytes from the beginning of the flash.
-    fn offset(slot: Slot, index: usize) -> u32 {
-        const { assert!(F::WRITE_SIZE == 4 && F::READ_SIZE <= 4, "a store of words of 32 bits") };
-        (slot as usize * F::ERASE_SIZE + 4 * index) as u32
-    }
-}
-
-impl<F: NorFlash> ConfigFlash for Nor<F> {
-    const CELLS: usize = F::ERASE_SIZE / (4 * CELL_WORDS);
-
-    /// A word that cannot be read is no part of anything whole, and is not blank.
-    fn word(&mut self, slot: Slot, index: usize) -> u32 {
-        let mut bytes = [0; 4];
-        self.0.read(Self::offset(slot, index), &mut bytes).map_or(0, |()| u32::from_le_bytes(bytes))
-    }
-
-    fn program(&mut self, slot: Slot, index: usize, word: u32) -> Result<(), StoreError> {
-        self.0.write(Self::offset(slot, index), &word.to_le_bytes()).map_err(|_| StoreError::Flash)
-    }
-
-    fn erase(&mut self, slot: Slot) -> Result<(), StoreError> {
-        let from = Self::offset(slot, 0);
-        self.0.erase(from, from + F::ERASE_SIZE as u32).map_err(|_| StoreError::Flash)
-    }
 }
 
 /// Why a configuration was not saved. It is in force all the same, until the next reset.

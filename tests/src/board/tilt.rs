@@ -255,10 +255,10 @@ mod tests {
             let mut chip = Accelerometer::new(model);
             wake(&mut chip);
             chip.advance(0);
-            assert_eq!(read(&mut chip, 0xE7, 7)[0], 0x0F);
+            assert_eq!(read(&mut chip, 0xA7, 1), [0x0F]);
             chip.lose_power();
             chip.advance(MEASURE_EVERY);
-            assert_eq!(read(&mut chip, 0xE7, 7)[0], 0);
+            assert_eq!(read(&mut chip, 0xA7, 1), [0]);
         }
     }
 

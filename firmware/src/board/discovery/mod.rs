@@ -27,9 +27,10 @@ use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use firmware::drive::{Drive, ParallelDac, Two};
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
-use stm32f4xx_hal::gpio::{Analog, Output, PC1, PD7, PE3};
+use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD7, PE3};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
 
 /// This board.
@@ -75,11 +76,7 @@ impl Wiring for Discovery {
             let pin = InclinometerPin::new(device.ADC1, gpioc.pc1.into_analog(), rcc);
             BoardTilt::Analogue(Inclinometer::new(pin))
         } else {
-            let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
-            let pins = (Some(gpioa.pa5), Some(gpioa.pa6), Some(gpioa.pa7));
-            let bus = device.SPI1.spi(pins, mode, timing::TILT_SPI_HZ.Hz(), rcc);
-            let Ok(device) = ExclusiveDevice::new_no_delay(bus, gpioe.pe3.into_push_pull_output());
-            BoardTilt::OnBoard(Accelerometer::new(device))
+            accelerometer(device.SPI1, (gpioa.pa5, gpioa.pa6, gpioa.pa7), gpioe.pe3, rcc)
         };
 
         let drive_lines = DriveLines::new(
@@ -106,6 +103,19 @@ impl Wiring for Discovery {
         };
         Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
     }
+}
+
+/// The accelerometer on the board, alone on its bus: its pins are SCK, MISO and MOSI.
+fn accelerometer(
+    spi: pac::SPI1,
+    (sck, miso, mosi): (PA5, PA6, PA7),
+    select: PE3,
+    rcc: &mut Rcc,
+) -> BoardTilt {
+    let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
+    let bus = spi.spi((Some(sck), Some(miso), Some(mosi)), mode, timing::TILT_SPI_HZ.Hz(), rcc);
+    let Ok(device) = ExclusiveDevice::new_no_delay(bus, select.into_push_pull_output());
+    BoardTilt::OnBoard(Accelerometer::new(device))
 }
 
 /// Either tilt sensor.

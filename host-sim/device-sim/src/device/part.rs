@@ -346,7 +346,7 @@ mod tests {
             ("format = 1\nname = \"x\"\n[[layer]]\ntissue = \"skin\"", "layer"),
             ("format = 1\nname = \"x\"\n[drive]\nroller_radius_mm = 90.0", "roller_radius_mm is"),
             ("format = 1\nname = \"x\"\n[drive]\nroller_radius_mm = nan", "roller_radius_mm"),
-            ("format = 1\nname = \"x\"\n[drive]\ndac_bits = 10", "dac_bits"),
+            ("format = 1\nname = \"x\"\n[drive]\ndac_bits = 17", "dac_bits"),
             ("format = 1\nname = \"x\"\n[drive]\nskin_tilt_deg = 120.0", "skin_tilt_deg"),
             ("format = 2\nname = \"x\"", "format is 2"),
         ] {
