@@ -1,6 +1,6 @@
 //! The page: serves it from the program itself, streams to it what the device does, and passes on what a person does.
 //!
-//! [`messages`] is what is said between server and page, [`condense`] turns 10 kHz into what a picture needs,
+//! [`device_sim::page::messages`] is what is said between server and page, [`device_sim::page::condense`] turns 10 kHz into what a picture needs,
 //! `server` and `connection` carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide), `assets` holds the files of
 //! `host-sim/page`.
 //!
