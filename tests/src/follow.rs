@@ -1,13 +1,13 @@
 //! The board and the control core beside each other, tick for tick: what the pins show against what the core computes from the same
 //! counts and angles.
 
-use control_core::controller::{Order, TickInput};
+use control_core::controller::{Order, Sample, TickInput, TickOutput};
 use control_core::units::{Counts, Milliradians};
-use control_core::{Config, Controller};
+use control_core::{Config, Controller, Plan};
 use link::Command;
 use link::frames::EventKind;
 
-use crate::board::Board;
+use crate::board::{Board, Log};
 use crate::pc::Pc;
 
 /// A tick as the pins show it: the counter the firmware read, and the code it wrote before it read
@@ -16,6 +16,65 @@ struct PinTick {
     count: u32,
     code: u16,
     enabled: bool,
+}
+
+/// The ticks that the pins show.
+fn pin_ticks(log: &Log) -> Vec<PinTick> {
+    let mut written = log.written.iter().peekable();
+    let mut enable = log.enable.iter().peekable();
+    let (mut code, mut enabled) = (0, false);
+    log.encoder
+        .windows(2)
+        .map(|pair| {
+            while let Some(write) = written.next_if(|write| write.at < pair[1].at) {
+                code = write.code;
+            }
+            while let Some(&(_, level)) = enable.next_if(|&&(at, _)| at < pair[1].at) {
+                enabled = level;
+            }
+            PinTick { count: pair[0].value, code, enabled }
+        })
+        .collect()
+}
+
+/// What the control core is given, tick by tick, to do what a board has done.
+struct Replay<'a> {
+    plan: Plan,
+    /// The tick in which the board started.
+    started: u64,
+    samples: &'a [(u64, Sample)],
+}
+
+impl Replay<'_> {
+    /// The tilt of a tick, where it was streamed.
+    fn tilt(&self, tick: u64) -> Milliradians {
+        Milliradians(self.sample(tick).map_or(0, |(_, sample)| sample.tilt_mrad))
+    }
+
+    fn sample(&self, tick: u64) -> Option<(u64, Sample)> {
+        let first = self.samples.first().map_or(0, |&(tick, _)| tick);
+        self.samples.get(tick.checked_sub(first)? as usize).copied()
+    }
+
+    /// One tick of a controller that takes the patient in tick `taken`.
+    fn tick(&self, controller: &mut Controller, taken: Option<u64>, tick: u64, count: u32) -> TickOutput {
+        if Some(tick) == taken {
+            controller.order(Order::Configure(self.plan.clone()));
+        }
+        if tick == self.started {
+            controller.order(Order::Start);
+        }
+        controller.order(Order::Heartbeat);
+        controller.tick(TickInput { count: Counts(count.cast_signed()), tilt: self.tilt(tick) })
+    }
+
+    /// Whether a controller that takes the patient in tick `taken` computes every code.
+    fn agrees(&self, ticks: &[PinTick], taken: Option<u64>) -> bool {
+        let mut controller = Controller::new(self.plan.clone());
+        (0_u64..)
+            .zip(ticks)
+            .all(|(tick, pins)| self.tick(&mut controller, taken, tick, pins.count).dac.0 == pins.code)
+    }
 }
 
 /// Runs a board whose hand begins after a second, under `config` or the default, for ten seconds, and sees that its codes, its enable
@@ -38,67 +97,28 @@ pub fn follows(mut board: Board, config: Option<Config>) -> ([u32; 8], usize) {
         pc.run_ms(&mut board, 100);
     }
     let log = board.at_stop(|stopped| std::mem::take(stopped.log()));
-
-    let mut written = log.written.iter().peekable();
-    let mut enable = log.enable.iter().peekable();
-    let (mut code, mut enabled) = (0, false);
-    let ticks: Vec<PinTick> = log
-        .encoder
-        .windows(2)
-        .map(|pair| {
-            while let Some(write) = written.next_if(|write| write.at < pair[1].at) {
-                code = write.code;
-            }
-            while let Some(&(_, level)) = enable.next_if(|&&(at, _)| at < pair[1].at) {
-                enabled = level;
-            }
-            PinTick { count: pair[0].value, code, enabled }
-        })
-        .collect();
+    let ticks = pin_ticks(&log);
     assert!(ticks.len() > 100_000, "{} ticks", ticks.len());
+    assert!(!pc.heard.samples.is_empty(), "the device streamed nothing");
 
     // The device numbers its ticks from the first one, and says in which it started.
-    let started = pc
-        .heard
-        .events
-        .iter()
-        .find(|event| event.kind == EventKind::Started)
-        .expect("the device started")
-        .tick;
-    let tilt = |tick: u64| {
-        let first = pc.heard.samples.first().map_or(0, |&(tick, _)| tick);
-        let sample = tick.checked_sub(first).and_then(|place| pc.heard.samples.get(place as usize));
-        sample.map_or(0, |&(_, sample)| sample.tilt_mrad)
-    };
-    // The table of seed 000 looks up speed and angle in one tick of four, counted from the tick that took the patient. No frame names that
-    // tick; the needle rests until long after it, so that only its quarter matters.
-    let taken: Vec<Option<u64>> = config.as_ref().map_or(vec![None], |_| (0..4).map(Some).collect());
+    let mut events = pc.heard.events.iter();
+    let started = events.find(|event| event.kind == EventKind::Started).expect("the device started").tick;
+    // The table of seed 000 looks up speed and angle in one tick of four, counted from the tick that took the patient. No frame
+    // names that tick. The needle rests until long after it, so only its remainder by four matters.
+    let candidates: Vec<Option<u64>> = config.as_ref().map_or(vec![None], |_| (0..4).map(Some).collect());
     let plan = config.unwrap_or_else(Config::commissioned_virtual).plan().expect("it may run");
-    let step = |controller: &mut Controller, taken: Option<u64>, tick: u64, pins: &PinTick| {
-        if Some(tick) == taken {
-            controller.order(Order::Configure(plan.clone()));
-        }
-        if tick == started {
-            controller.order(Order::Start);
-        }
-        controller.order(Order::Heartbeat);
-        controller.tick(TickInput { count: Counts(pins.count.cast_signed()), tilt: Milliradians(tilt(tick)) })
-    };
-    let agrees = |taken: &Option<u64>| {
-        let mut controller = Controller::new(plan.clone());
-        (0_u64..).zip(&ticks).all(|(tick, pins)| step(&mut controller, *taken, tick, pins).dac.0 == pins.code)
-    };
-    let taken = taken.iter().copied().find(agrees).unwrap_or(taken[0]);
-    let mut controller = Controller::new(plan.clone());
+    let replay = Replay { plan, started, samples: &pc.heard.samples };
+    let taken =
+        candidates.iter().copied().find(|&taken| replay.agrees(&ticks, taken)).unwrap_or(candidates[0]);
+    let mut controller = Controller::new(replay.plan.clone());
     let mut states = [0_u32; 8];
     for (tick, pins) in (0_u64..).zip(&ticks) {
-        let output = step(&mut controller, taken, tick, pins);
+        let output = replay.tick(&mut controller, taken, tick, pins.count);
         assert_eq!((output.enable, output.tripped), (pins.enabled, None), "tick {tick}: enable");
         assert_eq!(output.dac.0, pins.code, "tick {tick}: the DAC's code");
         states[usize::from(output.sample.state)] += 1;
-        let streamed =
-            tick.checked_sub(pc.heard.samples[0].0).and_then(|place| pc.heard.samples.get(place as usize));
-        if let Some(&(streamed_tick, sample)) = streamed {
+        if let Some((streamed_tick, sample)) = replay.sample(tick) {
             assert_eq!((streamed_tick, sample), (tick, output.sample), "the sample that was streamed");
         }
     }
