@@ -92,7 +92,11 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
         let patched = context.fit(slow.model, &slow.noise, Colour::White);
         let is_there = |place: usize| {
             let values = parameters::parameters(context, &patched, place);
-            parameters::is_there(patched.model.effects[place].name, &values)
+            let name = patched.model.effects[place].name;
+            match weighed.effects[named[place]].found.material {
+                Some(_) => parameters::has_size(name, &values),
+                None => parameters::is_there(name, &values),
+            }
         };
         let gone: Vec<usize> =
             named.iter().enumerate().filter(|(place, _)| !is_there(*place)).map(|(_, i)| *i).collect();

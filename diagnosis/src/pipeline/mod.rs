@@ -1,10 +1,11 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
-//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds and removes effects; [`assess`]
-//! weighs those that stand; [`decide`] names them, or says why nothing is named. Each stage is one function that takes what the
+//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds and removes effects; [`by_shares`]
+//! selects them by shares of the force error where other physics and not noise limits; [`assess`] weighs those that stand; [`decide`] names them, or says why nothing is named. Each stage is one function that takes what the
 //! one before it returns, and changes none of it. What comes out is a [`diagnosis::Diagnosis`].
 
 mod assess;
+mod by_shares;
 mod decide;
 pub(crate) mod diagnosis;
 mod patched_rig;
@@ -18,7 +19,11 @@ use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
+use assess::Assessment;
+use by_shares::{ByShares, by_shares, confirmed};
 use diagnosis::{Diagnosis, Reason};
+use prepare::Prepared;
+use search::Found;
 
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
@@ -40,12 +45,27 @@ pub(crate) fn run(
     }
     let prepared = prepare::prepare(rig, fit, holdout, progress);
     let found = search::search(&prepared, progress);
+    progress("comparing shares of the force", 0.9);
+    let assessed = assessed(&prepared, found);
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
-    Ok(match assess::assess(&prepared, found) {
+    Ok(match assessed {
         Ok(assessment) => decide::decide(&prepared, &assessment, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     })
+}
+
+/// Assesses what was found, by shares of the force error where other physics limits; where those name nothing in the end, likelihoods
+/// decide as elsewhere.
+fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
+    match by_shares(prepared, &found) {
+        ByShares::Nothing => assess::assess(prepared, found),
+        ByShares::Confirmed(materials) => assess::assess(prepared, confirmed(found, materials)),
+        ByShares::Selected(selected) => match assess::assess(prepared, *selected) {
+            Ok(assessment) if !assessment.weighed.named().is_empty() => Ok(assessment),
+            _ => assess::assess(prepared, found),
+        },
+    }
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.

@@ -125,7 +125,7 @@ impl Search<'_> {
         let SearchState { white, slow, tracks, holdout } = now;
         let context = self.context(&tracks);
         let null = context.fit_slow(Model::default(), &[&self.prepared.noise, &white.noise]);
-        let standing = eliminate(slow, &context, &holdout, &null.noise, &white.noise);
+        let standing = eliminate(slow, &context, &holdout, &null.noise, &white.noise, &[]);
         Found { fit: tracks, holdout, null, standing }
     }
 
@@ -299,7 +299,7 @@ fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
 
 /// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
 /// its smoother, and next to rest and reversals such a smoother knows neither the speed nor its sign.
-fn in_its_own_motion(
+pub(super) fn in_its_own_motion(
     tracks: &[BlockedRecording],
     candidate: FittedModel,
     on: &FitContext,

@@ -8,6 +8,7 @@ use crate::thresholds::{
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
 use crate::validation::rejection::Rejection;
+use crate::validation::shares::material::Material;
 use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.
@@ -36,6 +37,8 @@ pub(crate) struct EffectEvidence {
     /// Size that it would have on each recording that plays it, over the size that it has on all, fitted ones first; none
     /// where no fitted or no held-out one does.
     pub(crate) sizes: Vec<f64>,
+    /// Its part in the force error, where that names it.
+    pub(crate) material: Option<Material>,
 }
 
 impl EffectEvidence {
@@ -211,6 +214,7 @@ mod tests {
             at_bound: false,
             is_comb: true,
             sizes: vec![1.0, 1.02, 0.95],
+            material: None,
         }
     }
 

@@ -11,13 +11,12 @@ use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{
-    ALIKE, BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD,
-};
+use crate::thresholds::{BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover};
+use crate::validation::contradictions::{are_alike, same_joint};
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library;
@@ -25,6 +24,7 @@ use crate::validation::parameters;
 use crate::validation::rejection::{Rather, Rejection};
 use crate::validation::repeats::correlation_of_repeats;
 use crate::validation::residuals::{Residuals, above};
+use crate::validation::shares::material::Material;
 
 use crate::validation::tonal::{self, TonalDisturbance};
 use std::collections::BTreeMap;
@@ -63,6 +63,8 @@ pub(crate) struct WeighedModel {
     pub(crate) slow: FittedModel,
     /// The hypotheses that were rejected on the way.
     pub(crate) rejected: Vec<RejectedHypothesis>,
+    /// The effects that shares of the force error name.
+    materials: Vec<Material>,
     pub(crate) shown: Shown,
     pub(crate) estimator: Estimator,
     /// Residual that reading whole counts alone causes, N·m or N.
@@ -141,8 +143,21 @@ impl WeighedModel {
         })
     }
 
+    /// Returns what rules out an effect that shares of the force error name; none if nothing does.
+    fn contradiction_of_material(&self, assessed: &WeighedEffect) -> Option<Rejection> {
+        if !assessed.is_there {
+            return Some(Rejection::NoSize);
+        }
+        let part = assessed.found.off_force;
+        let immaterial = (part < MATERIAL).then_some(Rejection::Immaterial { part });
+        immaterial.or_else(|| assessed.rather.clone().map(Rejection::Rather))
+    }
+
     /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
+        if assessed.found.material.is_some() {
+            return self.contradiction_of_material(assessed);
+        }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
@@ -165,23 +180,6 @@ impl WeighedModel {
     }
 }
 
-/// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
-/// next to reversals the other takes. Effects with what they gain.
-fn same_joint(
-    (name, gain): (EffectName, f64),
-    mut all: impl Iterator<Item = (EffectName, f64)>,
-) -> Option<EffectName> {
-    let of_joint = |name: EffectName| name.definition().coupling().is_some();
-    let more = |(other, theirs): &(EffectName, f64)| of_joint(*other) && *theirs > gain;
-    all.find(more).filter(|_| of_joint(name)).map(|(other, _)| other)
-}
-
-/// True if gain and friction change by the same part: over an inertia that changes, both do.
-fn are_alike(gain: f64, friction: f64) -> bool {
-    let ratio = friction / gain;
-    ratio < ALIKE && ratio * ALIKE > 1.0
-}
-
 /// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at
 /// that one's.
 fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
@@ -191,12 +189,13 @@ fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> 
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
 pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
     let best = scales.without_unsure(scales.once(found, None));
-    if !best.stands_for_swing() {
+    if !best.stands_for_swing() || !best.materials.is_empty() {
         return best;
     }
     // No model of the axis explains a force that ignores the axis.
     let model = scales.context.fit_slow(Model::default(), &[&scales.null.noise]);
-    let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected };
+    let materials = Vec::new();
+    let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected, materials };
     let refitted = scales.once(nothing, best.hertz);
     let dropped = best.dropped.into_iter().chain(best.effects).collect();
     WeighedModel { dropped, swing: best.swing, ..refitted }
@@ -220,7 +219,8 @@ impl Scales<'_> {
         less.effects.remove(i);
         let model = self.context.fit_slow(less, &[&self.null.noise, &best.slow.noise]);
         let noise = &best.shown.patched.noise;
-        let mut standing = eliminate(model, self.context, self.holdout, &self.null.noise, noise);
+        let mut standing =
+            eliminate(model, self.context, self.holdout, &self.null.noise, noise, &best.materials);
         standing.rejected.splice(..0, best.rejected.iter().cloned());
         self.once(standing, best.hertz)
     }
@@ -251,7 +251,7 @@ impl Scales<'_> {
     /// Weighs a model; `hertz` where the frequency of a swing is known from before.
     fn once(&self, standing: StandingModel, hertz: Option<f64>) -> WeighedModel {
         let Self { context, refit, holdout, .. } = *self;
-        let StandingModel { model: slow, effects: mut found, rejected } = standing;
+        let StandingModel { model: slow, effects: mut found, rejected, materials } = standing;
         let patched = context.fit(slow.model.clone(), &slow.noise, Colour::White);
         alternatives::fit_rivals(context, &patched, &slow, holdout, &mut found);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
@@ -271,6 +271,7 @@ impl Scales<'_> {
             understood: left.understood,
             slow,
             rejected,
+            materials,
             shown,
             estimator,
             hertz,
@@ -326,17 +327,33 @@ impl Scales<'_> {
         left: &LeftOver,
     ) -> WeighedEffect {
         let context = self.context;
-        let class = alternatives::class(&found, self.excitation, left.leaves_much, context);
-        let undecided = alternatives::nearest(&found, &class) < BEHIND_Z;
-        let evidence = confidence::evidence(&found, left.evidence);
         let parameters = parameters::parameters(context, patched, i);
         let is_there = parameters::is_there(found.effect.name, &parameters);
+        let evidence = confidence::evidence(&found, left.evidence);
+        let rather = out_of_library::rather(context, patched, i, found.fit.sum);
+        if let Some(Material { class, .. }) = &found.material {
+            let (class, is_there) = (class.clone(), parameters::has_size(found.effect.name, &parameters));
+            let confidence = found.material.as_ref().map_or(0.0, Material::confidence);
+            let (undecided, creeps) = (false, None);
+            return WeighedEffect {
+                found,
+                class,
+                evidence,
+                confidence,
+                parameters,
+                is_there,
+                undecided,
+                creeps,
+                rather,
+            };
+        }
+        let class = alternatives::class(&found, self.excitation, left.leaves_much, context);
+        let undecided = alternatives::nearest(&found, &class) < BEHIND_Z;
         let most = if undecided { UNDECIDED } else { 1.0 };
         let confidence = confidence::confidence(&evidence).min(most);
         let creeps = candidates::creeps(&found.effect, context.span)
             // A spring that creeps depends on time, so no law of the travel fits it everywhere, however far it bends.
             .filter(|_| !found.fits_everywhere());
-        let rather = out_of_library::rather(context, patched, i, found.fit.sum);
         WeighedEffect { found, class, evidence, confidence, parameters, is_there, undecided, creeps, rather }
     }
 }
@@ -366,24 +383,5 @@ mod tests {
         assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
         assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);
         assert_eq!(resting(0.5, 0.65, drift, &[]), 0.5);
-    }
-
-    #[test]
-    fn drifts_of_gain_and_friction_by_the_same_part_are_one_of_the_inertia() {
-        assert!(are_alike(-0.137, -0.137) && are_alike(-0.35, -0.5) && are_alike(0.2, 0.16));
-        assert!(!are_alike(-0.1, -0.5) && !are_alike(-0.3, -0.1) && !are_alike(-0.2, 0.2));
-    }
-
-    #[test]
-    fn a_joint_has_one_name() {
-        let all = [
-            (EffectName::DriveCompliance, 40.0),
-            (EffectName::Backlash, 900.0),
-            (EffectName::Cogging, 5000.0),
-        ];
-        let joint = |of: usize| same_joint(all[of], all.into_iter());
-        assert_eq!(joint(0), Some(EffectName::Backlash));
-        assert_eq!(joint(1), None, "the one that explains most keeps its name");
-        assert_eq!(joint(2), None, "cogging is no joint");
     }
 }

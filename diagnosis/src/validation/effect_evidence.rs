@@ -120,6 +120,7 @@ impl<'a> JudgedModel<'a> {
             at_bound: self.is_at_bound(&effect, i),
             is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
+            material: None,
             effect,
         };
         if found.rejection().is_some() {

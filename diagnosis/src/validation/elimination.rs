@@ -9,6 +9,7 @@ use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
+use crate::validation::shares::material::Material;
 
 /// A hypothesis that was fitted in full and rejected.
 #[derive(Clone)]
@@ -27,30 +28,41 @@ pub(crate) struct StandingModel {
     pub(crate) effects: Vec<EffectEvidence>,
     /// The effects that were removed.
     pub(crate) rejected: Vec<RejectedHypothesis>,
+    /// The effects that shares of the force error name.
+    pub(crate) materials: Vec<Material>,
 }
 
 /// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and
-/// judges that; `noise` is white, `null_noise` is the null's coloured one.
+/// judges that; `noise` is white, `null_noise` is the null's coloured one, `materials` are
+/// the effects that shares name.
 pub(crate) fn eliminate(
     mut model: FittedModel,
     context: &FitContext,
     holdout: &HoldoutSet,
     null_noise: &Noise,
     noise: &Noise,
+    materials: &[Material],
 ) -> StandingModel {
     let mut rejected = Vec::new();
     loop {
         let plain = context.fit(model.model.clone(), noise, Colour::White);
-        let effects = gather_evidence(context, &plain, &model.noise, holdout);
+        let mut effects = gather_evidence(context, &plain, &model.noise, holdout);
+        for one in &mut effects {
+            one.material = Material::find(materials, one.effect.name).cloned();
+        }
         let weakest = effects
             .iter()
             .enumerate()
             .filter_map(|(i, f)| {
-                let why = f.rejection().or_else(|| parameters::absence(context, &plain, i))?;
+                // Where other physics limits, nothing explains everything: no likelihood rejects what shares name.
+                let judged = f.material.is_none().then_some(f)?;
+                let why = judged.rejection().or_else(|| parameters::absence(context, &plain, i))?;
                 Some((i, f.holdout.z, why))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((i, _, why)) = weakest else { return StandingModel { model, effects, rejected } };
+        let Some((i, _, why)) = weakest else {
+            return StandingModel { model, effects, rejected, materials: materials.to_vec() };
+        };
         let (name, gain) = (effects[i].effect.name, effects[i].holdout.sum);
         rejected.push(RejectedHypothesis { name, holdout_gain: Some(gain), why });
         let mut less = model.model.clone();

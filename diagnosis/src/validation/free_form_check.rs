@@ -39,6 +39,9 @@ pub(crate) fn check(
     let model = weighed.shown.patched.model.clone();
     let whole = evaluator.densities(&model);
     for i in named {
+        if weighed.effects[i].found.material.is_some() {
+            continue;
+        }
         let mut less = model.clone();
         less.effects.remove(i);
         let variable = model.effects[i].name.definition().depends_on();

@@ -15,7 +15,7 @@ use crate::validation::rejection::Rather;
 use rayon::prelude::*;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.
-fn like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
+pub(crate) fn unnamed_like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
     let of = |name: &EffectName| name.definition().unnamed(*name, fitted, context.span);
     EffectName::ALL.iter().flat_map(of).collect()
 }
@@ -31,7 +31,7 @@ pub(crate) struct Foreign {
 
 /// Physics without a name that explains most of what a refit leaves where nothing is named, as surely as a name must.
 pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HoldoutSet) -> Option<Foreign> {
-    let all = like(None, context);
+    let all = unnamed_like(None, context);
     let model = |foreign: &Unnamed| Model { effects: vec![foreign.effect.clone()], ..Model::default() };
     let merit = |foreign: &Unnamed| {
         let fit = Fit::new(&model(foreign), context.nominal, context.tracks, &refit.noise);
@@ -55,7 +55,7 @@ pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, 
         let least = (OUTSIDE_PART * gain).max(foreign.freedom * PER_COEFFICIENT);
         fit.log_likelihood - fitted.fit.log_likelihood - least
     };
-    let all = like(Some(&fitted.model.effects[effect]), context);
+    let all = unnamed_like(Some(&fitted.model.effects[effect]), context);
     let tried: Vec<(f64, Unnamed)> = all.into_par_iter().map(|foreign| (more(&foreign), foreign)).collect();
     tried
         .into_iter()

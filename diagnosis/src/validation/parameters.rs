@@ -93,10 +93,20 @@ pub(crate) fn shape_sd(context: &FitContext, candidate: &FittedModel, effect: us
 
 /// True if the interval of at least one size of an effect excludes zero.
 pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> bool {
+    parameters.is_empty() || sizes(name, parameters).any(|p| p.ci95[0] * p.ci95[1] > 0.0)
+}
+
+/// True if at least one size of an effect is not zero. That is enough where its shares on fitted and on held-out recordings say that it is
+/// there: the interval allows for all else that the model leaves.
+pub(crate) fn has_size(name: N, parameters: &BTreeMap<String, Parameter>) -> bool {
+    parameters.is_empty() || sizes(name, parameters).any(|p| p.value != 0.0)
+}
+
+/// The parameters that are sizes, and do not say where or when an effect acts.
+fn sizes(name: N, parameters: &BTreeMap<String, Parameter>) -> impl Iterator<Item = &Parameter> {
     let drifts = name.definition().drifts();
-    let where_or_when = |key: &str| key.starts_with("period") || (drifts && key == "time_constant");
-    parameters.is_empty()
-        || parameters.iter().any(|(key, p)| !where_or_when(key) && p.ci95[0] * p.ci95[1] > 0.0)
+    let is_size = move |key: &str| !(key.starts_with("period") || (drifts && key == "time_constant"));
+    parameters.iter().filter(move |(key, _)| is_size(key)).map(|(_, p)| p)
 }
 
 /// Returns why an effect of a fitted model may not be named although it explains something: its own size may be zero.

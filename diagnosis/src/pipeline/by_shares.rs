@@ -1,0 +1,201 @@
+//! Between search and assessment: where other physics and not noise is most of what a model leaves, shares of the force error select
+//! the effects, and no likelihood rejects them.
+
+use super::prepare::Prepared;
+use super::search::{Found, in_its_own_motion};
+use crate::effects::definition::Shown;
+use crate::effects::{CommandLaw, Effect, EffectName};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::force_residual::Estimator;
+use crate::estimation::input::Total;
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::io::rig::Kind;
+use crate::selection::context::{FittedModel, MOST};
+use crate::selection::excitation::Excitation;
+use crate::thresholds::{LIMITED_BY_PHYSICS, MATERIAL, MOST_IN_CLASS, NAMED_SHARE};
+use crate::validation::effect_evidence::gather_evidence;
+use crate::validation::elimination::{RejectedHypothesis, StandingModel};
+use crate::validation::holdout_likelihood::evaluate_all;
+use crate::validation::out_of_library;
+use crate::validation::parameters;
+use crate::validation::rejection::Rejection;
+use crate::validation::residuals::forces;
+use crate::validation::shares::laws::is_by_command;
+use crate::validation::shares::material::Material;
+use crate::validation::shares::select::{Selected, Selection};
+
+/// What shares of the force error make of what was found.
+pub(crate) enum ByShares {
+    /// Noise limits, or nothing takes enough: what was found stands as it is.
+    Nothing,
+    /// The model found explains nearly all down to the noise, and shares name these of its effects too.
+    Confirmed(Vec<Material>),
+    /// Other physics limits: the effects that shares select, with those found that a regression cannot judge or that take a
+    /// part of their own.
+    Selected(Box<Found>),
+}
+
+/// Selects effects by shares of the force error, except where physics without a name surely explains most: that is known better.
+pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
+    let regime = Regime::of(prepared, found);
+    if regime == Regime::Noise || is_foreign(prepared, found) {
+        return ByShares::Nothing;
+    }
+    let context = prepared.context(&prepared.fit);
+    let Some(selection) = Selection::new(&context, prepared.noise, &prepared.holdout.smoothed) else {
+        return ByShares::Nothing;
+    };
+    let own: &[Effect] = &found.standing.model.model.effects;
+    // The forms of the command, which speak against its laws next to noise, are none that a regression tries.
+    let may_confirm = |effect: &&Effect| !is_by_command(effect);
+    let in_own =
+        |one: &Selected| own.iter().filter(may_confirm).find(|effect| one.class().contains(&effect.name));
+    let is_named = |one: &Selected| one.is_named() && one.class().len() <= MOST_IN_CLASS;
+    let mut selected = selection.select(NAMED_SHARE);
+    selected.retain(|one| is_named(one) && (regime == Regime::Physics || in_own(one).is_some()));
+    let turn = prepared.nominal.rig.turn();
+    let linear = prepared.nominal.rig.kind == Kind::Linear;
+    let excitation = Excitation::of(&found.fit, prepared.span.count, turn).shown();
+    let shown = Shown { linear, count: prepared.span.count, ..excitation };
+    let material = |one: &Selected| {
+        let same = in_own(one).filter(|_| regime == Regime::Explained);
+        let name = same.map_or(one.share.effect.name, |effect| effect.name);
+        let twins = name.definition().twins(&one.share.effect, &shown);
+        Material { name, share: one.share.least(), class: class_of(name, twins, one.class()) }
+    };
+    let materials: Vec<Material> = selected.iter().map(material).collect();
+    match regime {
+        _ if materials.is_empty() => ByShares::Nothing,
+        Regime::Physics => {
+            let (effects, rejected) = beside(found, &materials, &selected, &selection);
+            ByShares::Selected(Box::new(standing(prepared, found, effects, materials, rejected)))
+        }
+        _ => ByShares::Confirmed(materials),
+    }
+}
+
+/// True if physics without a name explains most of what a refit leaves, as surely as a name must.
+fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
+    let context = prepared.context(&found.fit);
+    let refit = context.fit(Model::default(), &found.null.noise, Colour::White);
+    out_of_library::alone(&context, &refit, &found.holdout).is_some()
+}
+
+/// The effects that were selected, with those found that stand beside them; and those found that do not.
+fn beside(
+    found: &Found,
+    materials: &[Material],
+    selected: &[Selected],
+    selection: &Selection,
+) -> (Vec<Effect>, Vec<RejectedHypothesis>) {
+    let is_known = |effect: &Effect| materials.iter().any(|one| one.class.contains(&effect.name));
+    let mut effects: Vec<Effect> = selected.iter().map(|one| one.share.effect.clone()).collect();
+    let mut rejected = Vec::new();
+    for one in found.standing.effects.iter().filter(|one| !is_known(&one.effect)) {
+        match immaterial(&one.effect, selected, selection) {
+            None => effects.push(one.effect.clone()),
+            Some(why) => {
+                let (name, holdout_gain) = (one.effect.name, Some(one.holdout.sum));
+                rejected.push(RejectedHypothesis { name, holdout_gain, why });
+            }
+        }
+    }
+    effects.truncate(MOST);
+    (effects, rejected)
+}
+
+/// A class with a name of it first, and then those that no such recordings tell from it.
+fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> Vec<EffectName> {
+    let mut class = vec![name];
+    for other in twins.into_iter().chain(near) {
+        if class.len() < MOST_IN_CLASS && !class.contains(&other) {
+            class.push(other);
+        }
+    }
+    class
+}
+
+/// What was found, with those of its effects marked that shares name too.
+pub(crate) fn confirmed(mut found: Found, materials: Vec<Material>) -> Found {
+    for one in &mut found.standing.effects {
+        one.material = Material::find(&materials, one.effect.name).cloned();
+    }
+    found.standing.materials = materials;
+    found
+}
+
+/// What limits how well recordings are explained.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Regime {
+    /// Noise, before anything was found.
+    Noise,
+    /// Noise, beside what was found.
+    Explained,
+    /// Other physics.
+    Physics,
+}
+
+impl Regime {
+    fn of(prepared: &Prepared, found: &Found) -> Self {
+        if discrepancy(prepared, found, &found.null) < LIMITED_BY_PHYSICS {
+            Self::Noise
+        } else if discrepancy(prepared, found, &found.standing.model) < LIMITED_BY_PHYSICS {
+            Self::Explained
+        } else {
+            Self::Physics
+        }
+    }
+}
+
+/// Returns why an effect that the search found does not stand beside those selected; none where a regression cannot judge it, or it takes
+/// a material part.
+fn immaterial(effect: &Effect, selected: &[Selected], selection: &Selection) -> Option<Rejection> {
+    let is_clip = matches!(CommandLaw::new(effect), Some(CommandLaw::Clip { .. }));
+    if effect.name.definition().coupling().is_some() || is_clip {
+        return None;
+    }
+    let others: Vec<&Effect> = selected.iter().map(|one| &one.share.effect).collect();
+    let part = selection.beside(effect, &others)?.least();
+    (part < MATERIAL).then_some(Rejection::Immaterial { part })
+}
+
+/// The found recordings with a model of other effects.
+fn standing(
+    prepared: &Prepared,
+    found: &Found,
+    effects: Vec<Effect>,
+    materials: Vec<Material>,
+    mut rejected: Vec<RejectedHypothesis>,
+) -> Found {
+    let context = prepared.context(&prepared.fit);
+    let model = Model { effects, ..Model::default() };
+    let first = context.fit(model, &prepared.noise, Colour::White);
+    let (fit, white) = in_its_own_motion(&prepared.fit, first, &context);
+    let own = prepared.context(&fit);
+    let mut holdout = prepared.holdout.clone();
+    holdout.follow(&white, &prepared.nominal, &prepared.span, prepared.scale);
+    let slow = own.fit_slow(white.model.clone(), &[&found.null.noise, &white.noise]);
+    let null = own.fit_slow(Model::default(), &[&prepared.noise, &white.noise]);
+    let mut evidence = gather_evidence(&own, &white, &slow.noise, &holdout);
+    for one in &mut evidence {
+        one.material = Material::find(&materials, one.effect.name).cloned();
+    }
+    rejected.extend(found.standing.rejected.iter().cloned());
+    let standing = StandingModel { model: slow, effects: evidence, rejected, materials };
+    Found { fit, holdout, null, standing }
+}
+
+/// What a model leaves over what reading whole counts makes of it, on fitted or on held-out recordings, whichever is less.
+fn discrepancy(prepared: &Prepared, found: &Found, model: &FittedModel) -> f64 {
+    let (nominal, noise, holdout) = (&prepared.nominal, &model.noise, &found.holdout.smoothed);
+    let estimator = Estimator::new(&found.fit, noise, prepared.scale);
+    let inertia = parameters::scale(nominal, model).0;
+    let over = |tracks: &[BlockedRecording], totals: &[Total]| {
+        let floor = estimator.counting(tracks, noise, prepared.span.count) * inertia;
+        estimator.rms(&forces(&estimator, tracks, totals, inertia), tracks) / floor.max(1e-300)
+    };
+    let evaluated = evaluate_all(model, nominal, holdout, noise).into_iter();
+    let on_holdout: Vec<Total> = evaluated.map(|one| one.total).collect();
+    over(&found.fit, &model.fit.totals(&found.fit)).min(over(holdout, &on_holdout))
+}

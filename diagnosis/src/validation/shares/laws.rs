@@ -1,0 +1,127 @@
+//! The columns of an effect, as what the drive has to give more.
+
+use super::sight::{Scale, Sight};
+use crate::effects::definition::FREE;
+use crate::effects::{CommandLaw, Effect};
+use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::nominal::Nominal;
+use crate::estimation::regressors::effect_inputs;
+
+/// Part of a dead band over which its inverse passes from one side to the other.
+const RAMP: f64 = 0.3;
+/// Bounds of a law of the command whose shape says all: as it is at one.
+pub(crate) const AS_IT_IS: (f64, f64) = (0.5, 2.0);
+
+/// The columns of an effect on every recording, per term.
+pub(crate) struct Columns {
+    pub(crate) effect: Effect,
+    /// Per recording, per term, at the kept rows.
+    pub(crate) of: Vec<Vec<Vec<f64>>>,
+    /// True if every recording has its own phase: pairs of cosine and sine.
+    pub(crate) own: bool,
+    /// Bounds of each term, as forces.
+    pub(crate) bounds: Vec<(f64, f64)>,
+    /// Standard deviation of each term as a force, where something is known of it.
+    pub(crate) sd: f64,
+}
+
+/// Returns the columns of an effect; none where a regression has no law of it. `asked` is the drive's force that the motion asks
+/// for, per recording and block.
+pub(crate) fn columns(
+    effect: &Effect,
+    sights: &[Sight],
+    nominal: &Nominal,
+    asked: &[Vec<f64>],
+) -> Option<Columns> {
+    let definition = effect.name.definition();
+    if definition.coupling().is_some() {
+        return None;
+    }
+    let scale = Scale::of(nominal);
+    if let Some(law) = CommandLaw::new(effect) {
+        let column =
+            |(sight, asked): (&Sight, &Vec<f64>)| Some(vec![sight.see(&more(&law, sight, asked, scale)?)]);
+        let of: Option<Vec<_>> = sights.iter().zip(asked).map(column).collect();
+        return Some(Columns {
+            effect: effect.clone(),
+            of: of?,
+            own: false,
+            bounds: vec![AS_IT_IS],
+            sd: f64::INFINITY,
+        });
+    }
+    let of: Vec<Vec<Vec<f64>>> =
+        sights.iter().zip(asked).map(|(sight, asked)| seen(effect, sight, asked, scale)).collect();
+    let terms = of.first()?.len();
+    if terms == 0 {
+        return None;
+    }
+    let bounds = (0..terms).map(|term| bounds(effect, term, nominal, scale)).collect();
+    Some(Columns { effect: effect.clone(), of, own: definition.has_own_phase(), bounds, sd: f64::INFINITY })
+}
+
+/// Bounds of a term, as a force. A friction that may have either sign is not held to what the rig says of its friction: shares judge it.
+fn bounds(effect: &Effect, term: usize, nominal: &Nominal, scale: Scale) -> (f64, f64) {
+    let (low, high) = nominal.limits(effect.name, term);
+    if low < 0.0 && high > 0.0 && !effect.name.definition().scales_drive() {
+        return FREE;
+    }
+    (low * scale.inertia, high * scale.inertia)
+}
+
+/// True if the columns of an effect rest on the command.
+pub(crate) fn is_by_command(effect: &Effect) -> bool {
+    let definition = effect.name.definition();
+    definition.scales_drive() || definition.command_law(effect).is_some()
+}
+
+/// The columns of a law on force or reading, with the signs of the drive's side, per unit of force.
+fn seen(effect: &Effect, sight: &Sight, asked: &[f64], scale: Scale) -> Vec<Vec<f64>> {
+    let with_asked = is_by_command(effect).then(|| {
+        let mut track = BlockedRecording::clone(sight.track);
+        let last = track.rows.per_block;
+        let rows = track.rows.hold.len();
+        let command = (0..rows).map(|row| asked[(row / last).min(asked.len() - 1)] / scale.gain).collect();
+        track.set_command(command);
+        track
+    });
+    let track = with_asked.as_ref().unwrap_or(sight.track);
+    let sensor = effect.name.definition().in_sensor() || effect.name.definition().is_of_jumps();
+    let sign = if sensor { 1.0 } else { -1.0 };
+    let inputs = effect_inputs(track, effect, &track.rows.command, track.bias, || track.drive(None));
+    let see = |input| sight.see_input(input).into_iter().map(|x| sign * x).collect();
+    inputs.iter().map(see).collect()
+}
+
+/// What the drive has to give more, block by block, for a law of the command to let pass what the motion asks for.
+fn more(law: &CommandLaw, sight: &Sight, asked: &[f64], scale: Scale) -> Option<Vec<f64>> {
+    let spans = &sight.track.blocks.span;
+    let n = asked.len();
+    match law {
+        CommandLaw::Deadband { half_width, shift: true } => {
+            let width = half_width * scale.gain.abs();
+            let ramp = RAMP * width;
+            Some(asked.iter().map(|force| width * (force / ramp).clamp(-1.0, 1.0)).collect())
+        }
+        CommandLaw::Deadband { .. } | CommandLaw::Clip { .. } => None,
+        CommandLaw::Lag { time_constant, .. } => Some(
+            (0..n)
+                .map(|j| {
+                    let (a, b) = (j.saturating_sub(1), (j + 1).min(n - 1));
+                    let apart: f64 = spans[a..b].iter().sum();
+                    time_constant * (asked[b] - asked[a]) / apart
+                })
+                .collect(),
+        ),
+        CommandLaw::Delay { delay, .. } => Some(
+            (0..n)
+                .map(|j| {
+                    let later = j as f64 + delay / spans[j];
+                    let k = (later as usize).min(n - 1);
+                    let next = (k + 1).min(n - 1);
+                    asked[k] + (asked[next] - asked[k]) * (later - later.floor()) - asked[j]
+                })
+                .collect(),
+        ),
+    }
+}
