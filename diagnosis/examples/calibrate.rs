@@ -1,7 +1,7 @@
 //! `calibrate [EFFECT…]`: the diagnosis on recordings of a small simulator, one line per case. For thresholds and
 //! development; the blinded proof is elsewhere.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/behaviour/common.rs"]
 mod common;
 
 use common::{Random, Setup, record, rig};

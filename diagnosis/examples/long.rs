@@ -1,6 +1,6 @@
 //! A minute at 10 kHz to fit and one to hold out: the time it takes, and how much memory.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/behaviour/common.rs"]
 mod common;
 
 use common::{Setup, record, rig};

@@ -13,7 +13,7 @@ use crate::estimation::noise::Colour;
 use crate::io::rig::Kind;
 use crate::selection::context::{FittedModel, MOST};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{LIMITED_BY_PHYSICS, MATERIAL, MOST_IN_CLASS, NAMED_SHARE};
+use crate::thresholds::{LIMITED_BY_PHYSICS, MATERIAL, MOST_IN_CLASS, TAKEN_SHARE};
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::{RejectedHypothesis, StandingModel};
 use crate::validation::holdout_likelihood::evaluate_all;
@@ -52,7 +52,7 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let in_own =
         |one: &Selected| own.iter().filter(may_confirm).find(|effect| one.class().contains(&effect.name));
     let is_named = |one: &Selected| one.is_named() && one.class().len() <= MOST_IN_CLASS;
-    let mut selected = selection.select(NAMED_SHARE);
+    let mut selected = selection.select(TAKEN_SHARE);
     selected.retain(|one| is_named(one) && (regime == Regime::Physics || in_own(one).is_some()));
     let turn = prepared.nominal.rig.turn();
     let linear = prepared.nominal.rig.kind == Kind::Linear;

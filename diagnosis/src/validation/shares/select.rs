@@ -149,15 +149,20 @@ impl<'a> Selection<'a> {
         (1.0 - best) / (1.0 - share.least()).max(1e-6)
     }
 
-    /// The largest share that physics without a name takes in the place of a law; zero where nothing is like it.
+    /// The largest share that physics without a name takes in the place of a drift: a load that changes at once looks like one. Zero for
+    /// other laws. Friction in proportion to the drive's force takes nearly all that any friction takes, so it says nothing here.
     fn unnamed_in_place_of(&self, taken: &[Columns], i: usize) -> f64 {
         let (nominal, effect) = (self.context.nominal, &taken[i].effect);
+        if !effect.name.definition().drifts() {
+            return 0.0;
+        }
         let others = taken.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| c).collect();
         let state = State::new(self, others);
         let all = unnamed_like(Some(effect), self.context);
+        let same = all.par_iter().filter(|unnamed| unnamed.effect.name == effect.name);
         let share =
             |unnamed: &Unnamed| state.share(&columns(&unnamed.effect, &self.sights, nominal, &state.asked)?);
-        all.par_iter().filter_map(share).map(|share| share.least()).reduce(|| 0.0, f64::max)
+        same.filter_map(share).map(|share| share.least()).reduce(|| 0.0, f64::max)
     }
 
     /// The share of an effect of known shape beside others.

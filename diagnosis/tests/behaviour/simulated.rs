@@ -1,8 +1,6 @@
 //! Verdicts on recordings of a small simulator: nulls, wrong values, disturbance, effects, and input that cannot tell.
 
-mod common;
-
-use common::{Setup, record, rig};
+use crate::common::{self, Setup, record, rig};
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;

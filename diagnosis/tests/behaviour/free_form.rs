@@ -1,8 +1,6 @@
 //! Physics that has no name: what no law of the library makes is told by its inputs, and what has a name keeps it.
 
-mod common;
-
-use common::{Setup, record, rig};
+use crate::common::{Setup, record, rig};
 use diagnosis::effects::{EffectName, Variable};
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};

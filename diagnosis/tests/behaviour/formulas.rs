@@ -1,9 +1,7 @@
 //! An effect of a user's own: hidden in a simulated machine by its formula, searched for with its values unknown, named,
 //! patched and simulated.
 
-mod common;
-
-use common::Random;
+use crate::common::Random;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};
 use diagnosis::{Request, Verdict, diagnose};

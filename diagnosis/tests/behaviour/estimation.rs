@@ -1,10 +1,7 @@
 //! Faults of input and estimation that recordings of real machines showed, each on a small simulated one: starts in motion,
 //! free swings, slow rates, idle stretches, short recordings, plain forces in pairs, machines without inertia to speak of.
 
-#[path = "common/axis.rs"]
-mod axis;
-
-use axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, record, rig};
+use crate::axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, record, rig};
 use diagnosis::Verdict;
 use diagnosis::effects::EffectName as N;
 use diagnosis::recording::Recording;

@@ -1,9 +1,6 @@
 //! Effects beside physics without a name that is far above the noise: shares of the force error decide there.
 
-#[path = "common/axis.rs"]
-mod axis;
-
-use axis::{AXIS, BENCH, Machine, diagnosed, mixed, names, record, rig};
+use crate::axis::{AXIS, BENCH, Machine, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;
 use diagnosis::effects::EffectName as N;
 

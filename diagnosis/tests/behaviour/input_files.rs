@@ -1,8 +1,6 @@
 //! Whatever a file holds is answered with a recording or one clear sentence, never a panic.
 
-mod common;
-
-use common::Random;
+use crate::common::{self, Random};
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 

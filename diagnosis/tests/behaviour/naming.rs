@@ -1,12 +1,8 @@
 //! Faults of naming that recordings of real machines and a second generator showed, each on a small simulated machine: names given
 //! where another cause, wrong values or chance were there, and what was said instead.
 
-#[path = "common/axis.rs"]
-mod axis;
-mod common;
-
-use axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
-use common::{Setup, WARM_SQUARE};
+use crate::axis::{self, AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
+use crate::common::{self, Setup, WARM_SQUARE};
 use diagnosis::effects::EffectName as N;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 
