@@ -63,9 +63,10 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
         let dry = effect.shape_or("dry", 1.0);
+        // Beyond the largest command: what the load's own friction takes a grip carries too. One that holds even then never slips.
+        let friction = span.rig.dry / span.rig.per_command.abs();
         vec![
-            // Beyond the largest command: what the load's own friction takes a grip carries too.
-            ("limit", 0.01 * span.command, 2.0 * span.command),
+            ("limit", 0.01 * span.command, span.command + friction.min(span.command)),
             ("creep", 1e-4 * span.speed, 0.3 * span.speed),
             ("coast", 0.35 * dry, 2.5 * dry),
             ("ratio", RATIOS.0, RATIOS.1),

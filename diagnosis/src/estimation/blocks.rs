@@ -6,6 +6,7 @@
 
 use crate::estimation::input::Input;
 use crate::estimation::reading_lag::LagStep;
+use crate::estimation::skew;
 use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -57,6 +58,10 @@ pub(crate) struct Rows {
     pub(crate) command: Vec<f64>,
     /// The input of the command over each block.
     pub(crate) command_input: Input,
+    /// What the command's input changes by per row that it acts late.
+    pub(crate) lateness_input: Input,
+    /// What it changes by where a command acts in part in the rows before and after its own.
+    pub(crate) spread_input: Input,
     /// Rows taken together for a resonance or a contact, and for a grip.
     pub(crate) of_contact: Slices,
     pub(crate) of_grip: Slices,
@@ -92,15 +97,27 @@ impl Rows {
             Slices::new(&hold, per_block, rows.clamp(1, per_block))
         };
         let (of_contact, of_grip) = (slices(CONTACT_STEP_S), slices(GRIP_STEP_S));
-        let none = Input::Held(Vec::new());
-        Self { per_block, time, hold, command: Vec::new(), command_input: none, of_contact, of_grip }
-            .with_command(command)
+        let none = || Input::Held(Vec::new());
+        Self {
+            per_block,
+            time,
+            hold,
+            command: Vec::new(),
+            command_input: none(),
+            lateness_input: none(),
+            spread_input: none(),
+            of_contact,
+            of_grip,
+        }
+        .with_command(command)
     }
 
     /// The same rows with another command.
     pub(crate) fn with_command(self, command: Vec<f64>) -> Self {
         let command_input = self.input(&command);
-        Self { command, command_input, ..self }
+        let lateness_input = self.input(&skew::per_row_late(&command));
+        let spread_input = self.input(&skew::per_part_spread(&command));
+        Self { command, command_input, lateness_input, spread_input, ..self }
     }
 
     /// Number of whole blocks.

@@ -24,8 +24,8 @@ pub(crate) fn effective_command(track: &BlockedRecording, effects: &[Effect]) ->
 }
 
 /// Mean over each row of commands that arrive late, as [`CommandLaw::Delay`] makes it: differences of the command's
-/// integral, which cost no queue.
-fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
+/// integral, which cost no queue. A negative `delay`, s, is a command that arrives early.
+pub(crate) fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
     // The row that holds what arrives now, when it began, and the integral until then.
     let (mut row, mut began, mut before) = (0, 0.0, 0.0);
     let mut integral = |time: f64| {

@@ -16,5 +16,6 @@ pub(crate) mod quasi_static;
 pub(crate) mod reading_lag;
 pub(crate) mod refit;
 pub(crate) mod regressors;
+pub(crate) mod skew;
 pub(crate) mod slices;
 pub(crate) mod smoother;

@@ -62,6 +62,10 @@ impl Model {
             push(Key::Coulomb, Input::Held(direction.iter().map(|s| -s).collect()), false);
         }
         push(Key::Offset, Input::Held(vec![1.0; track.block_count()]), true);
+        if nominal.skew_rows.is_some() {
+            push(Key::Skew, track.rows.lateness_input.clone(), false);
+            push(Key::Spread, track.rows.spread_input.clone(), false);
+        }
         if let (true, Some(tilt)) = (nominal.has(NominalTerm::Weight), &track.blocks.tilt) {
             push(Key::Weight, Input::Held(tilt.iter().map(|x| x.sin()).collect()), false);
         }

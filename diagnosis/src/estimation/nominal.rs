@@ -4,6 +4,7 @@ use crate::effects::EffectName;
 use crate::effects::definition::{Allowed, NominalTerm};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
+use crate::estimation::skew;
 use crate::io::rig::Rig;
 use crate::numerics::linear::Prior;
 
@@ -15,6 +16,10 @@ pub(crate) enum Key {
     Viscous,
     Coulomb,
     Offset,
+    /// Rows by which the command acts late, beyond those that were found before, times gain over inertia.
+    Skew,
+    /// Part of the command that acts in the row before and as much in the row after, times gain over inertia.
+    Spread,
     Weight,
     /// Gravity on an off-centre mass, of absolute counts.
     Gravity,
@@ -39,6 +44,8 @@ pub(crate) struct Nominal {
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
     pub(crate) virtual_inertia: f64,
+    /// Rows by which commands act after their time stamps and were put off; none where nothing speaks for any.
+    pub(crate) skew_rows: Option<f64>,
 }
 
 /// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command and of the measured load, by
@@ -94,7 +101,7 @@ const IGNORED_UNBALANCED: f64 = 0.2;
 impl Nominal {
     /// The nominal model of a rig, before anything was found of it in recordings.
     pub(crate) fn of(rig: &Rig) -> Self {
-        Self { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false, virtual_inertia: 0.0 }
+        Self { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false, virtual_inertia: 0.0, skew_rows: None }
     }
 
     /// Gain over inertia as the rig states it.
@@ -175,6 +182,8 @@ impl Nominal {
                 };
                 Prior { mean: rig.model.offset.unwrap_or(0.0) / j, sd, ..Prior::FREE }
             }
+            Key::Skew => skew::prior(self.known_gain(), self.skew_rows.unwrap_or(0.0)),
+            Key::Spread => skew::prior_of_spread(self.known_gain()),
             Key::External => Prior { mean: self.external / j, sd: 0.5 / j, ..Prior::FREE },
             Key::Term { .. } => Prior::FREE,
         }

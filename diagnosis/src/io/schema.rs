@@ -229,6 +229,12 @@ pub struct Report {
     pub fit: FitTable,
     /// Refitted nominal values that moved, by key.
     pub refitted: BTreeMap<String, f64>,
+    /// Rows by which commands act after their time stamps, -1 to 1; none where the recordings show no skew.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub command_late_rows: Option<f64>,
+    /// What the refit did that a reader has to know, each a clause.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub notes: Vec<String>,
     /// Bandwidth of the residuals, Hz.
     pub residual_bandwidth_hz: f64,
     /// Residual that the sensor's noise alone causes, root mean square.

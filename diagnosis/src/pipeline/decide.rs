@@ -1,14 +1,19 @@
 //! The fourth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
 
 use super::assess::Assessment;
-use super::diagnosis::{Complete, Diagnosis, FreeForce, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
+use super::diagnosis::{
+    Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
+};
 use super::patched_rig::{patch, place};
 use super::prepare::Prepared;
 use super::run_forward::{follows_worse, pooled, simulated};
 use super::verdict::verdict;
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
+use crate::estimation::nominal::{Key, Nominal};
+use crate::estimation::skew;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch, Verdict};
@@ -56,6 +61,7 @@ pub(crate) fn decide(
         untested: untested::untested(&prepared.span, &prepared.nominal),
         hypotheses: hypotheses(&assessment.weighed),
         errors: shown.table.clone(),
+        moved: moved(&prepared.nominal, &shown.patched.fit),
         bandwidth_hz: estimator.bandwidth_hz,
         noise_floor: assessment.weighed.floor,
         unexplained_fraction: unexplained_fraction(shown, assessment.weighed.floor),
@@ -69,6 +75,17 @@ pub(crate) fn decide(
         rigs,
         rate_hz,
     }))
+}
+
+/// What a fit moved of the rig's values.
+fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
+    let by_gain = fit.value(Key::Gain).map_or(1.0, |ratio| nominal.gain() / ratio);
+    let is_known = nominal.virtual_inertia == 0.0 && by_gain > 0.0;
+    Moved {
+        late_rows: skew::total_rows(nominal, fit),
+        inertia_by_gain: by_gain,
+        deviations: if is_known { by_gain.ln() / nominal.gain_sd() } else { 0.0 },
+    }
 }
 
 /// The data that a decision rests on.

@@ -49,6 +49,16 @@ pub(crate) enum Reason {
     Repeats { correlation: f64 },
 }
 
+/// What a refit moved.
+pub(crate) struct Moved {
+    /// Rows by which commands act after their time stamps; none where the recordings show no skew.
+    pub(crate) late_rows: Option<f64>,
+    /// Inertia over gain, over the rig's own.
+    pub(crate) inertia_by_gain: f64,
+    /// How far that is from 1, in standard deviations of the rig's uncertainty; zero where the rig's inertia hardly matters.
+    pub(crate) deviations: f64,
+}
+
 /// A diagnosis of recordings that could tell.
 pub(crate) struct Complete {
     pub(crate) verdict: Verdict,
@@ -61,6 +71,8 @@ pub(crate) struct Complete {
     pub(crate) untested: Vec<(EffectName, String)>,
     /// Force errors under the three models.
     pub(crate) errors: FitTable,
+    /// What the refit moved.
+    pub(crate) moved: Moved,
     /// Bandwidth of the residuals, Hz.
     pub(crate) bandwidth_hz: f64,
     /// Residual that the sensor's noise alone causes, N·m or N.

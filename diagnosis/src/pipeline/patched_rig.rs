@@ -3,6 +3,7 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::total;
 use crate::estimation::nominal::{Key, Nominal};
+use crate::estimation::skew;
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch};
 use crate::selection::context::FittedModel;
@@ -35,6 +36,11 @@ pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], la
     }
     if let Some(x) = value(Key::Gravity) {
         rig.model.gravity = Some(x);
+    }
+    if let Some(rows) = skew::total_rows(nominal, &last.fit) {
+        // A rig has no key for a command that acts early.
+        let late_s = rows * skew::row_s(&fit[0]) + rig.actuator.delay_s.unwrap_or(0.0);
+        rig.actuator.delay_s = Some(late_s).filter(|late_s| *late_s > 0.0);
     }
     let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
     let theta = last.fit.theta(0);

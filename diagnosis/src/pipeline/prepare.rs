@@ -11,7 +11,7 @@ use crate::estimation::lost_counts::{self, Asked};
 use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::Nominal;
-use crate::estimation::{quasi_static, refit};
+use crate::estimation::{quasi_static, refit, skew};
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
@@ -49,7 +49,14 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
     let mut nominal = Nominal::of(rig);
     quasi_static::add_inertia(&mut nominal, &mut tracks, &mut holdout);
     progress("refitting the nominal model", 0.1);
-    let (noise, refit) = refit::settle(&mut nominal, &mut tracks);
+    let (mut noise, mut refit) = refit::settle(&mut nominal, &mut tracks);
+    if nominal.virtual_inertia == 0.0 {
+        skew::settle(&mut nominal, &mut tracks, &noise);
+    }
+    if let Some(rows) = nominal.skew_rows {
+        skew::put_off(&mut holdout, rows);
+        (noise, refit) = refit::settle(&mut nominal, &mut tracks);
+    }
     let scale = refit::acceleration_scale(&nominal, &tracks);
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = span_of(&tracks, &nominal);

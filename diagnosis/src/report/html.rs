@@ -25,12 +25,13 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         out,
         "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
          <title>Diagnosis: {}</title><style>{STYLE}</style></head><body><main><p class=rig>{}</p><h1>{}.</h1>\
-         <dl class=short><dt>What remains</dt><dd>{}.</dd><dt>Record next</dt><dd>{}.</dd></dl>",
+         <dl class=short><dt>What remains</dt><dd>{}.</dd><dt>Record next</dt><dd>{}.</dd>{}</dl>",
         safe(&outcome.evidence.rig),
         safe(&outcome.evidence.rig),
         safe(&r.sentence),
         safe(&r.remains),
-        safe(&r.record_next)
+        safe(&r.record_next),
+        r.notes.iter().map(|note| format!("<dt>Note</dt><dd>{}.</dd>", safe(note))).collect::<String>()
     );
     motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {

@@ -8,6 +8,7 @@ mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
 pub(crate) mod outcome;
+mod notes;
 mod remains;
 #[cfg(test)]
 mod sentence_snapshots;

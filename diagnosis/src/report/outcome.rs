@@ -6,7 +6,7 @@ use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Untested, Verdict};
 use crate::numerics::digits::{in_sentence, short};
 use crate::pipeline::diagnosis::{Complete, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
-use crate::report::{free_form, next_experiment, remains, text};
+use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
@@ -174,6 +174,8 @@ impl Outcome {
                 holdout_gain_ci95: [0.0, 0.0],
             },
             refitted: BTreeMap::new(),
+            command_late_rows: None,
+            notes: Vec::new(),
             residual_bandwidth_hz: 0.0,
             noise_floor: 0.0,
             unexplained_fraction: 0.0,
@@ -218,6 +220,8 @@ impl Outcome {
             effects: diagnosis.effects.into_iter().map(named).collect(),
             fit: diagnosis.errors,
             refitted: refitted(&patched),
+            command_late_rows: diagnosis.moved.late_rows,
+            notes: notes::notes(&diagnosis.moved),
             residual_bandwidth_hz: diagnosis.bandwidth_hz,
             noise_floor: diagnosis.noise_floor,
             unexplained_fraction: diagnosis.unexplained_fraction,
@@ -252,6 +256,9 @@ impl Outcome {
         let r = &self.report;
         let mut out =
             format!("{}.\n  what remains: {}\n  record next: {}\n", r.sentence, r.remains, r.record_next);
+        for note in &r.notes {
+            out.push_str(&format!("  note: {note}\n"));
+        }
         for effect in &r.effects {
             let values: Vec<String> = effect
                 .parameters

@@ -11,4 +11,5 @@ mod naming;
 mod other_physics;
 mod real_recordings;
 mod simulated;
+mod skew;
 mod user_mistakes;

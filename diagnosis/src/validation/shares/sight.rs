@@ -58,7 +58,7 @@ pub(crate) fn priors(nominal: &Nominal, track: &BlockedRecording, noise: &Noise)
     let first = Prior { mean, sd: sd * inertia, low: a.min(b), high: a.max(b) };
     let others = Model::default().columns(nominal, track, noise).into_iter().filter_map(|column| {
         let p = column.prior;
-        let is_other = !matches!(column.key, Key::Gain | Key::Offset);
+        let is_other = !matches!(column.key, Key::Gain | Key::Offset | Key::Skew | Key::Spread);
         let of = |x: f64| x * inertia;
         is_other.then(|| Prior { mean: of(p.mean), sd: of(p.sd), low: of(p.low), high: of(p.high) })
     });
@@ -100,7 +100,7 @@ impl<'a> Sight<'a> {
                     let force: Vec<f64> = block.iter().map(|u| scale.gain * u).collect();
                     sight.target = sight.see(&force);
                 }
-                Key::Offset => {}
+                Key::Offset | Key::Skew | Key::Spread => {}
                 _ => {
                     let against: Vec<f64> = block.iter().map(|x| -x).collect();
                     sight.nominal.push(sight.see(&against));

@@ -1,0 +1,41 @@
+//! What a refit did that a reader has to know: commands that act early or late, an inertia far from the rig's.
+
+use crate::pipeline::diagnosis::Moved;
+
+/// Standard deviations from which a value far from the rig's is told.
+const FAR: f64 = 2.0;
+
+/// The notes, each a clause.
+pub(crate) fn notes(moved: &Moved) -> Vec<String> {
+    let timing = moved.late_rows.map(timing);
+    let inertia = (moved.deviations.abs() >= FAR).then(|| inertia(moved));
+    timing.into_iter().chain(inertia).collect()
+}
+
+fn timing(rows: f64) -> String {
+    let when = if rows > 0.0 { "after" } else { "before" };
+    format!("commands act {:.2} rows {when} their time stamps, which the models allow for", rows.abs())
+}
+
+fn inertia(moved: &Moved) -> String {
+    format!(
+        "the refit makes the inertia over the drive's gain {:.2} times the rig's, {:.1} of its standard deviations away: check both \
+         values, or the units",
+        moved.inertia_by_gain,
+        moved.deviations.abs()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inertia_is_told_where_it_is_far_and_a_skew_always() {
+        let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6 };
+        assert!(notes(&near).is_empty());
+        let both = notes(&Moved { late_rows: Some(-0.5), inertia_by_gain: 0.1, deviations: 3.5 });
+        assert!(both[0].contains("0.50 rows before"), "{both:?}");
+        assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");
+    }
+}
