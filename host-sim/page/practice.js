@@ -36,6 +36,7 @@ export class Practice {
 
   /** Goes to the practice or back to the events. */
   show(open) {
+    document.body.dataset.list = open ? "practice" : "events";
     byId("practice").hidden = !open;
     byId("events").hidden = open;
     byId("view-events").setAttribute("aria-pressed", String(!open));

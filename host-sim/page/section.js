@@ -3,7 +3,7 @@
 
 import { surface } from "./canvas.js";
 import { drawInset } from "./inset.js";
-import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, wholeLength } from "./needle.js";
+import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, halfHub, wholeLength } from "./needle.js";
 import { displace } from "./tissue.js";
 
 /** On a phone the names are short and the inset is small. */
@@ -31,7 +31,7 @@ export class Section {
     /** While a person drags the needle: what a pixel means stays as it was when it was taken. */
     this.held = false;
     /** The values for tests: the drawn places of layers, tip and the hub's end and the needle's angle, in CSS pixels and rad. */
-    this.drawn = { tops: [], entry: { x: NaN, y: NaN }, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
+    this.drawn = { tops: [], entry: { x: NaN, y: NaN }, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, hubTop: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
   }
 
   /** Millimetres along the needle for a movement of `dx`, `dy` CSS pixels. */
@@ -81,7 +81,7 @@ export class Section {
     const deepest = Math.max(tissue.vessel?.far_mm ?? 0, tissue.layers.at(-1)?.depth_mm ?? 0, 5);
     const outside = wholeLength(needle) - Math.min(depth, WAITING_MM);
     const inside = Math.max(depth, Math.min(needle.length_mm, deepest / Math.max(y, 0.1)));
-    const hub = needle.hub_diameter_mm / 2;
+    const hub = halfHub(needle);
     const left = outside * x + hub * y + MARGIN_MM;
     const right = Math.max(inside * x + MARGIN_MM, AHEAD_MM);
     const up = outside * y + hub * x + MARGIN_MM;
@@ -94,13 +94,15 @@ export class Section {
     };
   }
 
-  /** Held, or quicker than the picture follows: it shifts rather than lose the tip or the hub. */
+  /** Held, or quicker than the picture follows: it shifts rather than lose the tip or a corner of the hub. */
   keepInSight(depth, needle, width, height) {
+    const { x, y } = this.axis;
     const edge = MARGIN_MM * this.scale;
     const shift = (low, high, room) => Math.max(0, edge - low) - Math.max(0, high - (room - edge));
     const end = depth - wholeLength(needle);
-    this.origin.x += shift(this.x(end * this.axis.x), this.x(depth * this.axis.x), width);
-    this.origin.y += shift(this.y(end * this.axis.y), this.y(depth * this.axis.y), height);
+    const hub = halfHub(needle);
+    this.origin.x += shift(this.x(end * x - hub * y), this.x(depth * x), width);
+    this.origin.y += shift(this.y(end * y - hub * x), this.y(depth * y), height);
   }
 
   /** Says what was drawn where. */
@@ -114,6 +116,8 @@ export class Section {
     drawn.entry = place(0);
     drawn.tip = place(view.depth);
     drawn.hub = place(view.depth - wholeLength(tissue.needle));
+    const corner = unit * this.scale * halfHub(tissue.needle);
+    drawn.hubTop = { x: drawn.hub.x + corner * this.axis.y, y: drawn.hub.y - corner * this.axis.x };
   }
 
   x(mm) { return this.origin.x + mm * this.scale; }
