@@ -67,7 +67,7 @@ const receive = {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
     ownForces.follow(linkStatus.compensation);
-    practice.follow(linkStatus.recording);
+    practice.follow(linkStatus);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
       jumps = linkStatus.replay.jumps;

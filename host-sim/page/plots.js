@@ -135,7 +135,8 @@ export class TimePlot {
     g.font = `12px ${this.colours.font}`;
     g.textBaseline = "bottom";
     g.fillStyle = this.colours.muted;
-    for (let ago = 0; ago <= WINDOW_S; ago += 2) {
+    // Labels are about 40 points wide.
+    for (let ago = 0; ago <= WINDOW_S; ago += wide < 280 ? 5 : 2) {
       g.textAlign = ago === 0 ? "right" : ago === WINDOW_S ? "left" : "center";
       g.fillText(ago === 0 ? "now" : `−${ago} s`, left + wide * (1 - ago / WINDOW_S), height - 2);
     }

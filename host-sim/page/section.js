@@ -47,6 +47,7 @@ export class Section {
     g.fillRect(0, 0, width, height);
     this.layers(g, tissue, width, height);
     this.vessel(g, tissue, width);
+    this.beside(g, tissue);
     if (!this.small) this.ruler(g, tissue);
     this.needle(g, view, tissue);
     this.angle(g, view);
@@ -198,6 +199,25 @@ export class Section {
     g.restore();
   }
 
+  /** Structures that the needle is to spare: their place is the patient's, and they do not move. */
+  beside(g, tissue) {
+    for (const { name, along_mm, depth_mm, width_mm, height_mm } of tissue.beside) {
+      const [x, y] = [this.x(along_mm), this.y(depth_mm)];
+      g.beginPath();
+      g.ellipse(x, y, (width_mm / 2) * this.scale, (height_mm / 2) * this.scale, 0, 0, 2 * Math.PI);
+      g.fillStyle = this.colours.lumen;
+      g.fill();
+      g.strokeStyle = this.colours["vessel-wall"];
+      g.lineWidth = 2.5;
+      g.stroke();
+      if (this.small) continue;
+      g.font = `600 12px ${this.colours.font}`;
+      g.textAlign = "left";
+      g.textBaseline = "middle";
+      this.onTissue(g, `${name}, to be spared`, x + (width_mm / 2) * this.scale + 6, y);
+    }
+  }
+
   /** Depth along the needle, where it will go: a tick each mm, a number each five. */
   ruler(g, tissue) {
     const far = tissue.vessel?.far_mm ?? tissue.layers.at(-1)?.depth_mm ?? 5;
@@ -317,8 +337,8 @@ export class Section {
       g.stroke();
     }
     g.font = `600 12px ${this.colours.font}`;
-    g.textAlign = "left";
+    g.textAlign = "right";
     g.textBaseline = "bottom";
-    this.onTissue(g, "5 mm", x + 4, y - 4);
+    this.onTissue(g, "5 mm", width - 12, y - 4);
   }
 }
