@@ -27,7 +27,7 @@ export class Picture {
     this.built = false;
   }
 
-  /** Builds the tissue of a scene at an angle to the skin (rad), or Table 1 of Paper 000 in its place; false where it cannot be drawn. */
+  /** Builds the tissue of a scene at an angle to the skin (rad), or Table 1 of Paper 000 instead; false where it cannot be drawn. */
   build(scene, angle, table1 = false) {
     const numbers = [scene.layers.length];
     for (const layer of scene.layers) {

@@ -13,7 +13,7 @@ const COLUMNS = [
   ["Angle off, °", "angle_rms_error_deg", 1],
   ["Hits", "spared_hits", 0],
 ];
-/** What a short heading means. */
+/** The meanings of short headings. */
 const TITLES = { spared_hits: "Touches of what is to be spared", angle_rms_error_deg: "Angle error along the way, root mean square" };
 /** Columns that are only shown where the goal has a limit for them. */
 const WITH_TARGET_ONLY = new Set(["in_lumen_s"]);

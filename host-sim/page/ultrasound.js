@@ -30,7 +30,7 @@ export class Ultrasound {
     this.seen = null;
     this.sliders = ["along", "across", "azimuth"].map((name) => document.getElementById(`probe-${name}`));
     this.movable(canvas);
-    /** What was last said of the probe, and when. */
+    /** The last report of the probe, and its time. */
     this.said = { text: "", at: -Infinity };
   }
 

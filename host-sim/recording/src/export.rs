@@ -24,7 +24,7 @@ pub struct Stretch {
     pub samples: Vec<Sample>,
     /// The events during these samples.
     pub events: Vec<Event>,
-    /// Where the ultrasound probe was, while the page showed its image.
+    /// The places of the ultrasound probe while the page showed its image.
     pub probes: Vec<Probe>,
     /// The setup before them, if a new one was made; `None` for the recording's own.
     pub setup: Option<Setup>,

@@ -120,7 +120,7 @@ pub struct Pose {
 pub struct Probe {
     /// Tick of the newest samples when it came.
     pub tick: u64,
-    /// Where it is and what it sees.
+    /// Its place, and the needle in its image.
     #[serde(flatten)]
     pub view: ProbeView,
 }

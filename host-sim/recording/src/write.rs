@@ -130,7 +130,7 @@ impl<W: Write + Seek> Recorder<W> {
         self.put(4, event)
     }
 
-    /// Where the ultrasound probe is now.
+    /// The place of the ultrasound probe.
     pub fn probe(&mut self, view: ProbeView) -> Result<(), Failure> {
         self.put(6, &Probe { tick: self.tick, view })
     }

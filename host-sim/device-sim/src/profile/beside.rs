@@ -10,9 +10,9 @@ use serde::Deserialize;
 pub struct Beside {
     /// Its name.
     pub name: String,
-    /// Where it begins along the skin from the point of entry, mm.
+    /// The near end along the skin from the point of entry, mm.
     pub from_mm: f64,
-    /// Where it ends, mm.
+    /// The far end, mm.
     pub to_mm: f64,
     /// Its top below the skin, mm.
     pub top_mm: f64,

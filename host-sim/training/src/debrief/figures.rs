@@ -40,7 +40,7 @@ impl Better {
     }
 }
 
-const FIGURES: [Figure; 23] = [
+const FIGURES: [Figure; 24] = [
     ("time in tissue, s", |i| Some(i.time_s), 2, Better::Less),
     ("time in the lumen, s", |i| Some(i.in_lumen_s), 2, Better::Neither),
     ("time in the target, s", |i| i.target.as_ref().map(|target| target.time_s), 2, Better::Neither),
@@ -63,6 +63,7 @@ const FIGURES: [Figure; 23] = [
     ("turned beyond the largest angle, times", |i| Some(f64::from(i.barriers)), 0, Better::Less),
     ("largest lateral force, N", |i| i.largest_lateral_n, 2, Better::Neither),
     ("tip in the ultrasound image, share of the time", |i| i.tip_seen_share, 2, Better::More),
+    ("needle in the ultrasound plane, share of it", |i| i.in_plane_share, 2, Better::More),
     ("smoothness", |i| i.smoothness, 2, Better::More),
 ];
 
