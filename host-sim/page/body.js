@@ -17,6 +17,8 @@ export class BodyView {
     this.scene = null;
     this.stats = { frames: 0, stepMs: NaN, imageMs: NaN };
     window.__body = this.stats;
+    this.model = byId("tissue-model");
+    this.model.addEventListener("change", () => this.picture && this.build());
     byId("view-section").addEventListener("click", () => this.show(false));
     byId("view-body").addEventListener("click", () => this.show(true));
     if (location.hash === "#body") this.show(true);
@@ -70,7 +72,7 @@ export class BodyView {
     this.limb = null;
     canvas.replaceWith(canvas.cloneNode());
     await this.openLimb("webgl2");
-    if (this.scene && this.picture?.built) this.limb.build(this.picture, this.scene);
+    if (this.scene && this.picture?.built) this.build();
   }
 
   /** Another anatomy. */
@@ -80,18 +82,23 @@ export class BodyView {
     // A real device and a recording have no hand that a slider could move.
     this.depth.disabled = !scene.hand;
     this.depth.closest("figcaption").hidden = !scene.hand;
+    // Table 1 is skin, vessel and skin.
+    this.model.disabled = !scene.vessel;
+    if (!scene.vessel) this.model.value = "limb";
     if (this.picture) this.build();
   }
 
   build() {
     const angle = this.scene.tilt_rad - this.scene.skin_tilt_rad;
-    if (!this.picture.build(this.scene, angle)) {
+    const table1 = this.model.value === "table-1";
+    if (!this.picture.build(this.scene, angle, table1)) {
       byId("body-note").textContent = "This anatomy cannot be drawn";
       return;
     }
     byId("body-note").textContent = "";
-    this.limb?.build(this.picture, this.scene);
+    this.limb?.build(this.picture, table1 ? asSlabs(this.scene) : this.scene);
     this.ultrasound.build(this.picture);
+    this.stats.particles = this.picture.particles;
   }
 
   happen(event) {
@@ -111,10 +118,17 @@ export class BodyView {
     this.limb?.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
     const drawn = performance.now();
     this.ultrasound.draw(this.picture, view.seconds, view.depth);
+    if (this.scene.source.kind !== "recording") this.ultrasound.report(this.hand.link, performance.now());
     this.stats.stepMs = stepped - begin;
     this.stats.drawMs = drawn - stepped;
     this.stats.imageMs = performance.now() - drawn;
     this.stats.share = this.ultrasound.seen?.share ?? NaN;
     this.stats.frames++;
   }
+}
+
+/** The scene of Table 1 of Paper 000: the vessel is a slab between two slabs of skin. */
+function asSlabs(scene) {
+  const layers = scene.layers.map((layer) => ({ ...layer, name: layer.is_vessel ? "lumen" : "skin", is_vessel: false, is_far_wall: false }));
+  return { ...scene, layers, vessel: null };
 }

@@ -71,7 +71,8 @@ export class LearningCurve {
     g.fillStyle = this.colours.muted;
     g.textBaseline = "top";
     g.textAlign = "left";
-    g.fillText(`Learning curve: ${words}`, left, 2);
+    const title = `Learning curve: ${words}`;
+    g.fillText(left + g.measureText(title).width < right ? title : words, left, 2);
     g.textAlign = "right";
     g.textBaseline = "bottom";
     g.fillStyle = this.colours.depth;

@@ -6,12 +6,15 @@ const RETRY_MS = [250, 500, 1000, 2000];
 const SILENT_MS = 4000;
 /** Data of the needle older than this is shown as old. */
 const STALE_MS = 1000;
+/** A page that was just opened is still connecting for so long. */
+const CONNECTING_MS = 2000;
 
 export class Link {
   /** @param {(message: object) => void} onMessage called with every message of the server */
   constructor(onMessage) {
     this.onMessage = onMessage;
     this.open = false;
+    this.bornAt = performance.now();
     this.attempts = 0;
     this.lastMessageAt = -Infinity;
     this.lastPoseAt = performance.now();
@@ -70,8 +73,10 @@ export class Link {
     return performance.now() - this.lastPoseAt;
   }
 
-  /** @returns {"live" | "stale" | "lost"} live data, old data of a running program, or no program */
+  /** @returns {"connecting" | "live" | "stale" | "lost"} just opened, live data, old data of a running program, or no program */
   get condition() {
+    const young = this.lastMessageAt === -Infinity && performance.now() - this.bornAt < CONNECTING_MS;
+    if (young) return "connecting";
     if (!this.open) return "lost";
     return this.dataAge > STALE_MS ? "stale" : "live";
   }

@@ -67,7 +67,7 @@ const receive = {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
     ownForces.follow(linkStatus.compensation);
-    practice.follow(linkStatus.recording);
+    practice.follow(linkStatus);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
       jumps = linkStatus.replay.jumps;
@@ -175,11 +175,13 @@ function largestForce(now) {
 function tellCondition(condition) {
   document.body.dataset.link = condition;
   const seconds = Math.floor(link.dataAge / 1000);
-  const since = `no data since ${seconds} s`;
+  const since = `no data for ${seconds} s`;
   const notice = linkStatus?.notice ?? "";
   const owed = link.stopOwed ? " Your stop could not be sent; to be safe cut the power." : "";
-  if (condition === "lost") panel.banner(`Program unreachable, ${since}. Reconnecting.${owed}`);
-  else if (condition === "stale") panel.banner(`Device silent, ${since}.${notice ? ` ${notice}.` : ""}`);
+  if (condition === "connecting") panel.banner("");
+  else if (condition === "lost") {
+    panel.banner(seconds < 2 ? `Connection to the program lost. Reconnecting.${owed}` : `Program unreachable, ${since}. Reconnecting.${owed}`);
+  } else if (condition === "stale") panel.banner(`Device silent, ${since}.${notice ? ` ${notice}.` : ""}`);
   else panel.banner(notice);
 }
 

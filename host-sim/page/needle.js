@@ -17,6 +17,11 @@ export function wholeLength(needle) {
   return needle.length_mm + needle.hub_length_mm;
 }
 
+/** Distance of the hub's farther corner from the line through the tip, mm: the cannula's axis lies a radius beside that line. */
+export function halfHub(needle) {
+  return (needle.hub_diameter_mm + needle.diameter_mm) / 2;
+}
+
 /** Draws the needle with its tip at the origin, x along it in CSS pixels, `scale` of them a millimetre; bevel up. */
 export function drawNeedle(g, colours, scale, needle, { flashback, inLumen }) {
   const radius = (needle.diameter_mm / 2) * scale;

@@ -55,6 +55,7 @@ const whole = new Intl.NumberFormat("en-GB");
 
 function stateWords(view, condition, played) {
   if (condition === "paused") return ["Recording paused", "off"];
+  if (condition === "connecting") return ["Connecting…", "off"];
   if (condition !== "live" || !view.known) return ["No data", "warn"];
   const [text, tone] = STATES[view.state] ?? STATES.unknown;
   // What a recording shows has been: nothing runs.

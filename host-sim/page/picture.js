@@ -27,14 +27,14 @@ export class Picture {
     this.built = false;
   }
 
-  /** Builds the tissue of a scene at an angle to the skin (rad); false where it cannot be drawn. */
-  build(scene, angle) {
+  /** Builds the tissue of a scene at an angle to the skin (rad), or Table 1 of Paper 000 instead; false where it cannot be drawn. */
+  build(scene, angle, table1 = false) {
     const numbers = [scene.layers.length];
     for (const layer of scene.layers) {
       const tissue = layer.is_vessel ? VESSEL : layer.is_far_wall ? FAR_WALL : Math.max(0, TISSUES.indexOf(layer.name));
       numbers.push(tissue, layer.depth_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
     }
-    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle, scene.needle.diameter_mm);
+    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle, scene.needle.diameter_mm, Number(table1));
     this.floats(this.core.input(), numbers.length).set(numbers);
     this.built = this.core.build(numbers.length) === 1;
     return this.built;
@@ -56,6 +56,8 @@ export class Picture {
   floats(pointer, count) {
     return new Float32Array(this.core.memory.buffer, pointer, count);
   }
+
+  get particles() { return this.core.particles(); }
 
   get points() { return this.floats(this.core.points(), 4 * this.core.particles()); }
 

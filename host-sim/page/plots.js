@@ -48,6 +48,9 @@ function ticks(range, most, draw) {
   for (let value = Math.ceil(range.low / step) * step; value <= range.high + 1e-9; value += step) draw(value);
 }
 
+/** Free space beside the name of a puncture, in points: half before it and half after. */
+const NAME_GAP = 8;
+
 const label = (value, step) => (step < 1 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
 
 export class TimePlot {
@@ -132,7 +135,8 @@ export class TimePlot {
     g.font = `12px ${this.colours.font}`;
     g.textBaseline = "bottom";
     g.fillStyle = this.colours.muted;
-    for (let ago = 0; ago <= WINDOW_S; ago += 2) {
+    // Labels are about 40 points wide.
+    for (let ago = 0; ago <= WINDOW_S; ago += wide < 280 ? 5 : 2) {
       g.textAlign = ago === 0 ? "right" : ago === WINDOW_S ? "left" : "center";
       g.fillText(ago === 0 ? "now" : `−${ago} s`, left + wide * (1 - ago / WINDOW_S), height - 2);
     }
@@ -145,6 +149,7 @@ export class TimePlot {
     g.textBaseline = "middle";
     g.lineWidth = 1;
     const place = (mark) => Math.round(left + wide * (1 - (now - mark.t) / WINDOW_S)) + 0.5;
+    let free = left;
     for (let i = 0; i < this.marks.length; i++) {
       const { text } = this.marks[i];
       const x = place(this.marks[i]);
@@ -156,12 +161,13 @@ export class TimePlot {
       g.lineTo(x, bottom);
       g.stroke();
       g.setLineDash([]);
-      // Names stand to the left of the first line of a close pair and to the right of all others, once there is room.
-      const long = g.measureText(text).width + 8;
-      const crowded = i + 1 < this.marks.length && place(this.marks[i + 1]) < x + long;
+      // A name is to the right of its line, or to the left where the next line is too close; without room it is left out.
+      const long = g.measureText(text).width + NAME_GAP;
+      const next = i + 1 < this.marks.length ? place(this.marks[i + 1]) : left + wide;
       g.fillStyle = this.colours.muted;
-      if (crowded && x - long > left) g.fillText(text, x - long + 4, between);
-      else if (!crowded && x + long < left + wide) g.fillText(text, x + 4, between);
+      if (x + long <= next) g.fillText(text, x + 4, between);
+      else if (x - long >= free) g.fillText(text, x - long + NAME_GAP - 4, between);
+      free = x + long <= next ? x + long : x;
     }
   }
 }

@@ -5,13 +5,18 @@ import { LearningCurve } from "./learning_curve.js";
 import { number } from "./panel.js";
 
 const byId = (id) => document.getElementById(id);
-/** Columns of the list: their heading, the figure, its digits, and whether less is better. */
+/** Columns of the list: their heading, the name of the figure, its digits. */
 const COLUMNS = [
-  ["Time, s", (figures) => figures.time_s, 1],
-  ["Force, N", (figures) => figures.peak_force_n, 2],
-  ["Angle off, °", (figures) => figures.angle_rms_error_deg, 1],
-  ["Spared hits", (figures) => figures.spared_hits, 0],
+  ["Time, s", "time_s", 1],
+  ["Force, N", "peak_force_n", 2],
+  ["In vein, s", "in_lumen_s", 1],
+  ["Angle off, °", "angle_rms_error_deg", 1],
+  ["Hits", "spared_hits", 0],
 ];
+/** The meanings of short headings. */
+const TITLES = { spared_hits: "Touches of what is to be spared", angle_rms_error_deg: "Angle error along the way, root mean square" };
+/** Columns that are only shown where the goal has a limit for them. */
+const WITH_TARGET_ONLY = new Set(["in_lumen_s"]);
 /** A figure that differs from the best one by less than this share is as good. */
 const SAME = 0.05;
 
@@ -31,11 +36,29 @@ export class Practice {
     this.record.addEventListener("click", () => this.askForRecording());
     byId("view-events").addEventListener("click", () => this.show(false));
     byId("view-practice").addEventListener("click", () => this.show(true));
-    byId("attempts-head").append(...["", "Goal", ...COLUMNS.map(([name]) => name)].map((name) => Object.assign(document.createElement("th"), { textContent: name, scope: "col" })));
+    /** The limits of the goal by the names of the figures: `{ at_least }` or `{ at_most }`. */
+    this.targets = {};
+    this.head();
+  }
+
+  get columns() {
+    return COLUMNS.filter(([, key]) => this.targets[key] || !WITH_TARGET_ONLY.has(key));
+  }
+
+  /** The headings; below the name of a figure its limit. */
+  head() {
+    const cell = (name, key) => {
+      const head = Object.assign(document.createElement("th"), { textContent: name, scope: "col", title: TITLES[key] ?? "" });
+      const target = this.targets[key];
+      if (target) head.append(document.createElement("br"), target.at_least === undefined ? `≤ ${target.at_most}` : `≥ ${target.at_least}`);
+      return head;
+    };
+    byId("attempts-head").replaceChildren(cell(""), cell("Goal"), ...this.columns.map(([name, key]) => cell(name, key)));
   }
 
   /** Goes to the practice or back to the events. */
   show(open) {
+    document.body.dataset.list = open ? "practice" : "events";
     byId("practice").hidden = !open;
     byId("events").hidden = open;
     byId("view-events").setAttribute("aria-pressed", String(!open));
@@ -48,6 +71,9 @@ export class Practice {
     byId("events-title").hidden = true;
     this.patient = message.patient;
     byId("goal").textContent = `${message.goal}.`;
+    this.targets = message.targets ?? {};
+    this.head();
+    this.list();
   }
 
   /** An insertion has ended. After a reconnection all are told again. */
@@ -88,10 +114,9 @@ export class Practice {
       };
       cell(`${attempt.number}${attempt.by_person ? "" : " demo"}${attempt === best ? " ★" : ""}`);
       cell(attempt.reached ? "reached" : "missed", attempt.reached ? "good" : "bad");
-      for (const [, figure, digits] of COLUMNS) {
-        const value = figure(attempt.figures);
-        const wanted = best && best !== attempt && best.patient === attempt.patient ? figure(best.figures) : null;
-        cell(...compared(value, wanted, digits));
+      for (const [, key, digits] of this.columns) {
+        const wanted = best && best !== attempt && best.patient === attempt.patient ? best.figures[key] : null;
+        cell(...compared(attempt.figures[key], wanted, digits, this.targets[key]));
       }
       return row;
     });
@@ -114,8 +139,10 @@ export class Practice {
     return t1 > t0 ? d0 + ((d1 - d0) * (since - t0)) / (t1 - t0) : d1;
   }
 
-  /** Follows the server: the recording in progress, or null. */
-  follow(recording) {
+  /** Follows the server: the recording in progress, or null, and the file of the last one that was ended. */
+  follow({ recording, recorded }) {
+    const debrief = byId("debrief");
+    if (debrief.hidden !== !recorded) debrief.hidden = !recorded;
     const text = recording ? "End recording" : "Record";
     if (this.record.textContent !== text) this.record.textContent = text;
     this.name.disabled = Boolean(recording);
@@ -128,10 +155,12 @@ export class Practice {
   }
 }
 
-/** A figure, and whether it is better or worse than the wanted one: less is. */
-function compared(value, wanted, digits) {
-  if (value === null) return ["–"];
+/** A figure, and whether it is beyond its limit, or better or worse than the wanted one: less is, unless the limit is a least one. */
+function compared(value, wanted, digits, target) {
+  if (value === null || value === undefined) return ["–"];
   const text = number(value, digits);
-  if (wanted === null || Math.abs(value - wanted) <= SAME * Math.abs(wanted)) return [text];
-  return value < wanted ? [`${text} better`, "good"] : [`${text} worse`, "bad"];
+  if (target && (value < target.at_least || value > target.at_most)) return [`${text} ✗`, "bad"];
+  if (wanted === null || wanted === undefined || Math.abs(value - wanted) <= SAME * Math.abs(wanted)) return [text];
+  const better = target?.at_least === undefined ? value < wanted : value > wanted;
+  return better ? [`${text} better`, "good"] : [`${text} worse`, "bad"];
 }

@@ -3,7 +3,7 @@
 
 import { surface } from "./canvas.js";
 import { drawInset } from "./inset.js";
-import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, wholeLength } from "./needle.js";
+import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, halfHub, wholeLength } from "./needle.js";
 import { displace } from "./tissue.js";
 
 /** On a phone the names are short and the inset is small. */
@@ -31,7 +31,7 @@ export class Section {
     /** While a person drags the needle: what a pixel means stays as it was when it was taken. */
     this.held = false;
     /** The values for tests: the drawn places of layers, tip and the hub's end and the needle's angle, in CSS pixels and rad. */
-    this.drawn = { tops: [], entry: { x: NaN, y: NaN }, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
+    this.drawn = { tops: [], entry: { x: NaN, y: NaN }, tip: { x: NaN, y: NaN }, hub: { x: NaN, y: NaN }, hubTop: { x: NaN, y: NaN }, scale: NaN, angle: NaN };
   }
 
   /** Millimetres along the needle for a movement of `dx`, `dy` CSS pixels. */
@@ -47,6 +47,7 @@ export class Section {
     g.fillRect(0, 0, width, height);
     this.layers(g, tissue, width, height);
     this.vessel(g, tissue, width);
+    this.beside(g, tissue);
     if (!this.small) this.ruler(g, tissue);
     this.needle(g, view, tissue);
     this.angle(g, view);
@@ -81,7 +82,7 @@ export class Section {
     const deepest = Math.max(tissue.vessel?.far_mm ?? 0, tissue.layers.at(-1)?.depth_mm ?? 0, 5);
     const outside = wholeLength(needle) - Math.min(depth, WAITING_MM);
     const inside = Math.max(depth, Math.min(needle.length_mm, deepest / Math.max(y, 0.1)));
-    const hub = needle.hub_diameter_mm / 2;
+    const hub = halfHub(needle);
     const left = outside * x + hub * y + MARGIN_MM;
     const right = Math.max(inside * x + MARGIN_MM, AHEAD_MM);
     const up = outside * y + hub * x + MARGIN_MM;
@@ -94,13 +95,15 @@ export class Section {
     };
   }
 
-  /** Held, or quicker than the picture follows: it shifts rather than lose the tip or the hub. */
+  /** Held, or quicker than the picture follows: it shifts rather than lose the tip or a corner of the hub. */
   keepInSight(depth, needle, width, height) {
+    const { x, y } = this.axis;
     const edge = MARGIN_MM * this.scale;
     const shift = (low, high, room) => Math.max(0, edge - low) - Math.max(0, high - (room - edge));
     const end = depth - wholeLength(needle);
-    this.origin.x += shift(this.x(end * this.axis.x), this.x(depth * this.axis.x), width);
-    this.origin.y += shift(this.y(end * this.axis.y), this.y(depth * this.axis.y), height);
+    const hub = halfHub(needle);
+    this.origin.x += shift(this.x(end * x - hub * y), this.x(depth * x), width);
+    this.origin.y += shift(this.y(end * y - hub * x), this.y(depth * y), height);
   }
 
   /** Says what was drawn where. */
@@ -114,6 +117,8 @@ export class Section {
     drawn.entry = place(0);
     drawn.tip = place(view.depth);
     drawn.hub = place(view.depth - wholeLength(tissue.needle));
+    const corner = unit * this.scale * halfHub(tissue.needle);
+    drawn.hubTop = { x: drawn.hub.x + corner * this.axis.y, y: drawn.hub.y - corner * this.axis.x };
   }
 
   x(mm) { return this.origin.x + mm * this.scale; }
@@ -192,6 +197,25 @@ export class Section {
       g.stroke();
     }
     g.restore();
+  }
+
+  /** Structures that the needle is to spare: their place is the patient's, and they do not move. */
+  beside(g, tissue) {
+    for (const { name, along_mm, depth_mm, width_mm, height_mm } of tissue.beside) {
+      const [x, y] = [this.x(along_mm), this.y(depth_mm)];
+      g.beginPath();
+      g.ellipse(x, y, (width_mm / 2) * this.scale, (height_mm / 2) * this.scale, 0, 0, 2 * Math.PI);
+      g.fillStyle = this.colours.lumen;
+      g.fill();
+      g.strokeStyle = this.colours["vessel-wall"];
+      g.lineWidth = 2.5;
+      g.stroke();
+      if (this.small) continue;
+      g.font = `600 12px ${this.colours.font}`;
+      g.textAlign = "left";
+      g.textBaseline = "middle";
+      this.onTissue(g, `${name}, to be spared`, x + (width_mm / 2) * this.scale + 6, y);
+    }
   }
 
   /** Depth along the needle, where it will go: a tick each mm, a number each five. */
@@ -313,8 +337,8 @@ export class Section {
       g.stroke();
     }
     g.font = `600 12px ${this.colours.font}`;
-    g.textAlign = "left";
+    g.textAlign = "right";
     g.textBaseline = "bottom";
-    this.onTissue(g, "5 mm", x + 4, y - 4);
+    this.onTissue(g, "5 mm", width - 12, y - 4);
   }
 }

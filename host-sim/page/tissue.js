@@ -21,6 +21,7 @@ export class Tissue {
       ...layer, of_vessel: layer.is_vessel || layer.is_far_wall, touched: false, given: false, dent: 0, along: 0,
     }));
     this.needle = scene.needle;
+    this.beside = scene.beside ?? [];
     const vessel = scene.vessel;
     this.vessel = vessel && {
       ...vessel, near_mm: vessel.axis_mm - vessel.height_mm / 2, far_mm: vessel.axis_mm + vessel.height_mm / 2,

@@ -8,6 +8,9 @@ const REACH = { along: [4, 22], across: [-8, 8], azimuth: [-Math.PI / 2, Math.PI
 const ALONG_VIEW = { along: 13, across: 0, azimuth: 0, lean: 0 };
 /** Between two images: 30 a second look smooth, and leave time for the rest. */
 const EVERY_S = 1 / 31;
+/** Between two reports of the probe to the program, and between two that say the same. */
+const REPORT_MS = 100;
+const AGAIN_MS = 1000;
 
 export class Ultrasound {
   /** @param {HTMLCanvasElement} canvas
@@ -27,6 +30,8 @@ export class Ultrasound {
     this.seen = null;
     this.sliders = ["along", "across", "azimuth"].map((name) => document.getElementById(`probe-${name}`));
     this.movable(canvas);
+    /** The last report of the probe, and its time. */
+    this.said = { text: "", at: -Infinity };
   }
 
   movable(canvas) {
@@ -82,6 +87,19 @@ export class Ultrasound {
       const name = slider.id.slice("probe-".length);
       slider.value = name === "azimuth" ? ((this.probe[name] * 180) / Math.PI).toFixed(0) : this.probe[name].toFixed(1);
     }
+  }
+
+  /** Tells the program, for its recording, where the probe is and whether it sees the tip: at most ten times a second, and again each second. */
+  report(link, now) {
+    if (!this.seen || now - this.said.at < REPORT_MS) return;
+    const { along, across, azimuth, lean } = this.probe;
+    const message = {
+      do: "probe", along_mm: along, across_mm: across, azimuth_rad: azimuth, lean_rad: lean,
+      share_in_plane: Math.min(1, Math.max(0, this.seen.share || 0)), tip_seen: this.seen.tip,
+    };
+    const text = JSON.stringify(message);
+    if (text === this.said.text && now - this.said.at < AGAIN_MS) return;
+    if (link.send(message)) this.said = { text, at: now };
   }
 
   /** One picture, `seconds` after the last, with the tip at `depth` mm along the needle. */

@@ -7,6 +7,7 @@
 //! The names are exported as they stand, which the language counts as unsafe; there is no other unsafe code.
 
 pub mod picture;
+mod table_1;
 
 use picture::{Picture, SurfaceView};
 use std::cell::RefCell;

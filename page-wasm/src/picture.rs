@@ -1,5 +1,6 @@
 //! Tissue, needle, probe and image together, from the anatomy that the page was told of.
 
+use crate::table_1;
 use tissue::body::Part;
 use tissue::needle::WallName;
 use tissue::{Configuration, Layer, Needle, PunctureState, Punctures, Tissue, Vessel};
@@ -65,13 +66,13 @@ pub struct Picture {
 }
 
 /// A layer as the page hands it over.
-struct Given {
-    kind: u32,
-    depth_mm: f32,
+pub(crate) struct Given {
+    pub(crate) kind: u32,
+    pub(crate) depth_mm: f32,
     /// The travel by which its wall is pushed in, mm; negative where it has no wall.
-    travel_mm: f32,
-    is_vessel: bool,
-    is_far: bool,
+    pub(crate) travel_mm: f32,
+    pub(crate) is_vessel: bool,
+    pub(crate) is_far: bool,
 }
 
 /// Deep enough for the innermost layer, focused in the middle.
@@ -85,7 +86,7 @@ impl Picture {
     /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
     /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
-    /// the skin in rad and the needle's diameter in mm.
+    /// the skin in rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 in place of the limb.
     pub fn new(numbers: &[f32]) -> Result<Self, String> {
         let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
         let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();
@@ -107,7 +108,10 @@ impl Picture {
             .collect();
         let angle: f32 = angle;
         let angle = if angle.is_finite() { angle.clamp(0.1, 1.57) } else { 0.5 };
-        let (configuration, walls) = configure(&given, [width, offset], angle);
+        let (configuration, walls) = match rest.get(4) {
+            Some(1.0) => table_1::configure(&given, bottom_mm(&given))?,
+            _ => configure(&given, [width, offset], angle),
+        };
         let mut tissue = Tissue::new(&configuration).map_err(|refusal| refusal.to_string())?;
         tissue.set_punctures(Punctures::Told);
         let surfaces = views(&tissue, &walls);
@@ -267,6 +271,16 @@ impl Picture {
     }
 }
 
+/// Returns the depth of the block that is drawn, mm.
+fn bottom_mm(given: &[Given]) -> f32 {
+    let depth =
+        |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
+    let (near, far) = (depth(|layer| layer.is_vessel), depth(|layer| layer.is_far));
+    let innermost = given.iter().map(|layer| layer.depth_mm).fold(6.0, f32::max);
+    let bottom = far.or(near.map(|near| near + 3.0)).map_or(innermost + 6.0, |far| far + 8.0);
+    if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 }
+}
+
 /// Layers and vessel for the tissue picture, and which of its walls belongs to which layer of the scene.
 fn configure(
     given: &[Given],
@@ -278,9 +292,7 @@ fn configure(
         |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
     let near = depth(|layer| layer.is_vessel);
     let far = depth(|layer| layer.is_far);
-    let innermost = given.iter().map(|layer| layer.depth_mm).fold(6.0, f32::max);
-    let bottom = far.or(near.map(|near| near + 3.0)).map_or(innermost + 6.0, |far| far + 8.0);
-    let bottom = if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 };
+    let bottom = bottom_mm(given);
     let mut layers: Vec<Layer> = vec![];
     let mut walls = vec![None; given.len()];
     let bands: Vec<(usize, &Given)> =
@@ -356,84 +368,4 @@ fn views(tissue: &Tissue, walls: &[Option<WallName>]) -> Vec<SurfaceView> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The adult profile: skin, fat, vein from 4.8 to 7.8 mm.
-    const ADULT: [f32; 21] = [
-        4.0, 0.0, 0.0, 3.0, 0.02, 1.0, 2.0, -1.0, 0.02, 7.0, 4.8, 1.41, 0.02, 8.0, 7.8, 1.41, 0.02, 4.46,
-        0.0, 0.52, 0.82,
-    ];
-
-    #[test]
-    fn the_image_is_as_deep_as_the_anatomy() {
-        let depth_mm = |numbers: &[f32]| Picture::new(numbers).expect("it can be built").image_depth_mm();
-        assert_eq!(depth_mm(&ADULT), 16.0);
-        // Skin, muscle to 20 mm, bursa.
-        let deep =
-            [3.0, 0.0, 0.0, 1.2, 0.0, 2.0, 6.0, -1.0, 0.0, 4.0, 20.0, -1.0, 0.0, f32::NAN, 0.0, 0.8, 0.82];
-        assert_eq!(depth_mm(&deep), 24.0);
-        let sections = |numbers: &[f32]| {
-            let picture = Picture::new(numbers).expect("it can be built");
-            picture.surfaces().iter().filter(|surface| surface.kind == Kind::Section).count()
-        };
-        assert_eq!((sections(&ADULT), sections(&deep)), (2, 3), "every layer is drawn");
-        // Deeper than any that is drawn.
-        let beyond = [1.0, 0.0, 90.0, 1.2, 0.0, f32::NAN, 0.0, 0.8, 0.82];
-        assert!(Picture::new(&beyond).map_or(40.0, |picture| picture.image_depth_mm()) <= 40.0);
-    }
-
-    #[test]
-    fn the_picture_follows_the_devices_punctures_and_needle() {
-        let mut picture = Picture::new(&ADULT).expect("it can be built");
-        let drive = |picture: &mut Picture, from: f32, to: f32| {
-            for step in 0..=60 {
-                picture.step(1.0 / 60.0, from + (to - from) * step as f32 / 60.0, 0.52);
-            }
-        };
-        drive(&mut picture, -2.0, 3.5);
-        assert_eq!(picture.wall_state(0), PunctureState::Touching);
-        picture.tell(0, PunctureState::Inserted);
-        drive(&mut picture, 3.5, 11.0);
-        assert_eq!(picture.wall_state(0), PunctureState::Inserted);
-        assert_eq!(picture.wall_state(2), PunctureState::Touching);
-        picture.tell(2, PunctureState::Inserted);
-        drive(&mut picture, 11.0, 12.0);
-        assert_eq!(picture.wall_state(2), PunctureState::Inserted);
-        assert_eq!(picture.wall_state(3), PunctureState::Away);
-        picture.hold_probe(8.0, 0.0, 0.0, 0.0);
-        picture.image(0.1, 0.0);
-        assert!(picture.seen(0) > 0.9 && picture.seen(1) == 1.0);
-        picture.hold_probe(8.0, 5.0, 0.0, 0.0);
-        picture.image(0.1, 0.0);
-        assert!(picture.seen(0) == 0.0 && (picture.seen(3) - 0.5).abs() < 1e-3);
-    }
-
-    #[test]
-    fn vessel_walls_in_the_needles_plane_match_the_profile() {
-        let picture = Picture::new(&ADULT).expect("it can be built");
-        for [upper, lower] in picture.lumen() {
-            assert!((upper - 4.8).abs() < 0.15 && (lower - 7.8).abs() < 0.15, "{upper} to {lower} mm");
-        }
-    }
-
-    #[test]
-    fn numbers_that_are_none_are_refused_or_drawn_as_something() {
-        assert!(Picture::new(&[]).is_err());
-        assert!(Picture::new(&[f32::NAN, 1.0]).is_err());
-        assert!(Picture::new(&ADULT[..10]).is_err());
-        for slot in 1..ADULT.len() {
-            for wrong in [f32::NAN, f32::INFINITY, -1e9, 1e9] {
-                let mut numbers = ADULT;
-                numbers[slot] = wrong;
-                if let Ok(mut picture) = Picture::new(&numbers) {
-                    picture.step(0.016, 1.0, 0.5);
-                    assert!(
-                        picture.points().iter().flatten().all(|number| number.is_finite()),
-                        "slot {slot}"
-                    );
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -41,7 +41,7 @@ pub(crate) fn build() -> Result<PathBuf, Failure> {
     }
     let site = shell::target().join("site");
     write(&site, "index.html", page.as_bytes())?;
-    for file in ["style.css", "icon.svg"] {
+    for file in ["style.css", "practice.css", "icon.svg"] {
         write(&site, file, &read(&top.join(PAGE).join(file))?)?;
     }
     Ok(site.join("index.html"))

@@ -1,7 +1,7 @@
 //! From a recording to what the diagnosis reads: `rig.toml` and a CSV file for every stretch without a gap. The command is
 //! the converter's code less its mid-scale, so that `gain · command` is the motor's torque.
 
-use super::messages::{Hello, Message, Samples, Setup};
+use super::messages::{Hello, Message, Probe, Samples, Setup};
 use super::read::Recording;
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
@@ -24,6 +24,8 @@ pub struct Stretch {
     pub samples: Vec<Sample>,
     /// The events during these samples.
     pub events: Vec<Event>,
+    /// The places of the ultrasound probe while the page showed its image.
+    pub probes: Vec<Probe>,
     /// The setup before them, if a new one was made; `None` for the recording's own.
     pub setup: Option<Setup>,
 }
@@ -52,6 +54,7 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
             }
             Message::Event(event) => told.push(*event),
             Message::Setup(new) => setup = Some(new),
+            Message::Probe(probe) => all.last_mut().into_iter().for_each(|last| last.probes.push(*probe)),
             Message::Samples(block) => {
                 let Some(hello) = &hello else { continue };
                 extend(&mut all, (hello, setup), block, &mut told);
@@ -78,6 +81,7 @@ fn extend(
             samples: Vec::new(),
             events: Vec::new(),
             setup: setup.cloned(),
+            probes: Vec::new(),
         });
     }
     if let Some(last) = all.last_mut() {

@@ -4,19 +4,21 @@ use control_core::config::DacWidth;
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
+use device_sim::session::ProbeView;
 use fixed::types::{I2F30, I16F16};
 use link::build::Build;
 use link::frames;
 use serde::{Deserialize, Serialize};
 
 /// Topic and JSON schema of every channel.
-pub const CHANNELS: [(&str, &str, &str); 6] = [
+pub const CHANNELS: [(&str, &str, &str); 7] = [
     ("/setup", "Setup", include_str!("schemas/setup.json")),
     ("/hello", "Hello", include_str!("schemas/hello.json")),
     ("/samples", "Samples", include_str!("schemas/samples.json")),
     ("/pose", "Pose", include_str!("schemas/pose.json")),
     ("/event", "Event", include_str!("schemas/event.json")),
     ("/link", "Link", include_str!("schemas/link.json")),
+    ("/probe", "Probe", include_str!("schemas/probe.json")),
 ];
 
 /// The setup before anything moved.
@@ -113,6 +115,16 @@ pub struct Pose {
     pub lateral_n: f64,
 }
 
+/// The ultrasound probe on the skin, and how much of the needle its image shows. Only while the page shows the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Probe {
+    /// Tick of the newest samples when it came.
+    pub tick: u64,
+    /// Its place, and the needle in its image.
+    #[serde(flatten)]
+    pub view: ProbeView,
+}
+
 /// Totals of the link since the session began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
@@ -138,6 +150,7 @@ pub enum Message {
     Pose(Pose),
     Event(frames::Event),
     Link(Link),
+    Probe(Probe),
 }
 
 impl Message {
@@ -147,6 +160,7 @@ impl Message {
             Message::Samples(block) => Some(block.first_tick),
             Message::Pose(pose) => Some(pose.tick),
             Message::Event(event) => Some(event.tick),
+            Message::Probe(probe) => Some(probe.tick),
             Message::Hello(_) | Message::Link(_) | Message::Setup(_) => None,
         }
     }

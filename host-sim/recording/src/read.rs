@@ -20,6 +20,8 @@ pub struct Recording {
     pub messages: Vec<Message>,
     /// The reason why it ends early, if it does.
     pub cut: Option<String>,
+    /// Time of tick 0 in nanoseconds since 1970, by the clock of the computer that recorded; 0 if that had none.
+    pub begun_ns: u64,
 }
 
 /// Adds the extension that a person left out, if that is the file that exists.
@@ -53,7 +55,7 @@ impl Recording {
         }
         let stream = MessageStream::new_with_options(intact(bytes), Options::IgnoreEndMagic.into())
             .map_err(|cause| Failure::input(format_args!("{file}: not a usable MCAP recording ({cause})")))?;
-        let (mut setup, mut messages, mut cut) = (None, Vec::new(), None);
+        let (mut setup, mut messages, mut cut, mut begun_ns) = (None, Vec::new(), None, 0);
         for message in stream {
             let message = match message {
                 Ok(message) => message,
@@ -64,7 +66,9 @@ impl Recording {
             };
             let topic = message.channel.topic.as_str();
             match parse(topic, &message.data) {
-                Ok(Some(Message::Setup(first))) if setup.is_none() => setup = Some(first),
+                Ok(Some(Message::Setup(first))) if setup.is_none() => {
+                    (setup, begun_ns) = (Some(first), message.log_time);
+                }
                 Ok(Some(other)) => messages.push(other),
                 // Somebody else's channel.
                 Ok(None) => {}
@@ -82,7 +86,7 @@ impl Recording {
         let setup = setup.ok_or_else(|| {
             Failure::input(format_args!("{file}: has no /setup message; was it recorded by host-sim?"))
         })?;
-        Ok(Self { file, setup, messages, cut })
+        Ok(Self { file, setup, messages, cut, begun_ns })
     }
 
     /// The profile that it was recorded with at the beginning.
@@ -108,6 +112,7 @@ fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
         "/pose" => serde_json::from_slice(json).map(Message::Pose),
         "/event" => serde_json::from_slice(json).map(Message::Event),
         "/link" => serde_json::from_slice(json).map(Message::Link),
+        "/probe" => serde_json::from_slice(json).map(Message::Probe),
         _ => return Ok(None),
     };
     let message = understood.map_err(|cause| cause.to_string())?;

@@ -1,10 +1,11 @@
 //! Writes a recording while it happens. What is on disk can be read at any moment: a chunk is closed every quarter of a
 //! second, so that a full disk, a kill or a power cut cost no more than that.
 
-use super::messages::{CHANNELS, Hello, Link, Pose, Samples, Setup};
+use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
+use device_sim::session::ProbeView;
 use link::frames;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
@@ -127,6 +128,11 @@ impl<W: Write + Seek> Recorder<W> {
     /// An event.
     pub fn event(&mut self, event: &frames::Event) -> Result<(), Failure> {
         self.put(4, event)
+    }
+
+    /// The place of the ultrasound probe.
+    pub fn probe(&mut self, view: ProbeView) -> Result<(), Failure> {
+        self.put(6, &Probe { tick: self.tick, view })
     }
 
     /// Bytes on their way to the disk so far.

@@ -3,7 +3,7 @@
 use crate::live_gains::LiveGains;
 use device_sim::driver::Driver;
 use device_sim::failure::Failure;
-use device_sim::session::{LinkStatus, Publisher, RecordingStatus};
+use device_sim::session::{LinkStatus, ProbeView, Publisher, RecordingStatus};
 use link::frames::{self, DeviceFrame};
 use recording::messages::{Hello, Setup};
 use recording::tally::Tally;
@@ -25,6 +25,8 @@ pub struct Outlets {
     pub(crate) failure: Option<Failure>,
     /// The device's last hello, for a recording that begins later.
     hello: Option<frames::Hello>,
+    /// The file of the last recording that was ended.
+    recorded: Option<String>,
     /// Why there is no recording, where a person has asked for one in vain.
     complaint: Option<String>,
 }
@@ -39,6 +41,7 @@ impl Outlets {
             gains: LiveGains::default(),
             failure: None,
             hello: None,
+            recorded: None,
             complaint: None,
         }
     }
@@ -103,10 +106,21 @@ impl Outlets {
         self.recorder = begun.ok();
     }
 
+    /// Writes where the probe is, if a recording is going on.
+    pub(crate) fn probe(&mut self, view: ProbeView) {
+        let written = self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.probe(view));
+        if let Err(failure) = written {
+            self.recorder = None;
+            self.failure = Some(failure);
+        }
+    }
+
     /// Closes the recording, which may be read from then on.
     pub(crate) fn end_recording(&mut self, driver: &Driver) {
         if let Some(recorder) = self.recorder.take() {
+            let file = recorder.file().to_owned();
             self.complaint = recorder.finish(driver.counts().into()).err().map(|failure| failure.to_string());
+            self.recorded = self.complaint.is_none().then_some(file);
         }
     }
 
@@ -126,6 +140,7 @@ impl Outlets {
                 lost_samples: counts.lost_samples,
                 garbage: counts.garbage,
                 recording,
+                recorded: self.recorded.clone(),
                 notice,
                 replay: None,
                 compensation: self.gains.share(),

@@ -123,7 +123,11 @@ impl<'a> Replay<'a> {
             match message {
                 Message::Samples(block) => samples.extend(block.rows()),
                 Message::Pose(pose) => poses.push(pose.to_frame()),
-                Message::Event(_) | Message::Link(_) | Message::Setup(_) | Message::Hello(_) => {}
+                Message::Event(_)
+                | Message::Link(_)
+                | Message::Setup(_)
+                | Message::Hello(_)
+                | Message::Probe(_) => {}
             }
         }
         let mut events = Vec::new();
@@ -172,7 +176,7 @@ impl<'a> Replay<'a> {
                 status.lost_samples = link.lost_samples;
                 status.garbage = link.garbage;
             }),
-            Message::Setup(_) => {}
+            Message::Setup(_) | Message::Probe(_) => {}
         }
     }
 }
@@ -242,7 +246,7 @@ mod tests {
             })
         };
         let messages = second(5_000).chain(second(0)).collect();
-        Recording { file: "a.mcap".into(), setup, messages, cut: None }
+        Recording { file: "a.mcap".into(), setup, messages, cut: None, begun_ns: 0 }
     }
 
     #[test]

@@ -259,6 +259,7 @@ impl<'a> Station<'a> {
                 self.outlets.record(&name, setup);
             }
             Control::EndRecording => self.outlets.end_recording(&self.driver),
+            Control::Probe(view) => self.outlets.probe(view),
             Control::Start => self.driver.request(Request::Start),
             Control::Stop => {
                 self.person_starts = true;

@@ -4,6 +4,7 @@ mod characterise;
 mod class;
 mod commission;
 mod compensate;
+mod completions;
 mod confirm;
 mod diagnose;
 mod export;
@@ -54,6 +55,7 @@ enum Command {
     Import(import::Import),
     Simulate(simulate::Simulate),
     FitForce(fit_force::FitForce),
+    Completions(completions::Completions),
 }
 
 impl Cli {
@@ -77,6 +79,7 @@ impl Cli {
             Some(Command::Import(command)) => command.run(),
             Some(Command::Simulate(command)) => command.run(),
             Some(Command::FitForce(command)) => command.run(),
+            Some(Command::Completions(command)) => command.run(),
         }
     }
 }

@@ -4,6 +4,7 @@ use super::class::ClassFlags;
 use super::output;
 use super::progress::Progress;
 use super::streams::StreamFlags;
+use super::training::without_insertion;
 use clap::{Args, ValueEnum};
 use control_core::{Device, TICK_HZ};
 use device_sim::device::part::DevicePart;
@@ -15,6 +16,7 @@ use device_sim::profile::{Model, Profile};
 use device_sim::session::{self, Session, Source};
 use host_sim::serial::SerialPort;
 use recording::messages::Setup;
+use recording::read::Recording;
 use recording::tally::Tally;
 use recording::write::Recorder;
 use server::bedside::Bedside;
@@ -25,6 +27,7 @@ use server::visualizer;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use training::debrief;
 
 /// Run a virtual or real device, show it and record it.
 ///
@@ -128,7 +131,7 @@ impl Run {
         let _streams = self.streams.serve(&session)?;
         let _class = self.class.join(&session, device)?;
         let looks = (!self.headless).then(|| session.subscribe());
-        let _server = if self.headless { None } else { Some(serve(session, self.port)?) };
+        let _server = if self.headless { None } else { Some(serve_for_practice(session, self.port)?) };
         let setup = Setup {
             program: recording::version::program(),
             source: self.device.clone(),
@@ -240,6 +243,17 @@ impl Run {
 /// Serves the page and prints its address.
 pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
     let server = visualizer::serve(session, port).map_err(Failure::failed)?;
+    output::page("visualizer", &server.url());
+    Ok(server)
+}
+
+/// The same with the debrief of what is recorded in the page.
+fn serve_for_practice(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
+    let write: visualizer::Debrief = Arc::new(|file| {
+        let attempts = debrief::attempts(&Recording::read(file)?, None)?;
+        debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
+    });
+    let server = visualizer::serve_with_debrief(session, port, write).map_err(Failure::failed)?;
     output::page("visualizer", &server.url());
     Ok(server)
 }

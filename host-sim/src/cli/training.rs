@@ -9,6 +9,7 @@ use reproduce::{PAPERS, Paper, reproduce};
 use std::path::{Path, PathBuf};
 use training::debrief;
 use training::score::{Insertion, score};
+use training::xapi::statements;
 
 /// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle, smoothness.
 ///
@@ -25,6 +26,12 @@ pub(crate) struct Score {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Print xAPI statements for a learning record store, as a JSON array
+    #[arg(long, conflicts_with = "json", requires = "actor")]
+    xapi: bool,
+    /// The trainee's e-mail address, for --xapi
+    #[arg(long, value_name = "E-MAIL", requires = "xapi")]
+    actor: Option<String>,
 }
 
 /// Write a page to print: the gesture over the anatomy, force against depth, the figures, the first and the last attempt compared.
@@ -37,6 +44,9 @@ pub(crate) struct Debrief {
     /// The patient to judge by, instead of the recorded one
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
+    /// An expert's recording: the last attempt is compared with the best insertion in it
+    #[arg(long, value_name = "FILE.mcap")]
+    expert: Option<PathBuf>,
     /// Folder to write debrief.html to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -68,6 +78,12 @@ impl Score {
         let recording = read(&self.file)?;
         let profile = self.profile.as_deref().map(Profile::find).transpose()?;
         let scored = score(&recording, profile.as_ref())?;
+        if let Some(actor) = self.actor.as_ref().filter(|_| self.xapi) {
+            check(&scored.insertions, &self.file)?;
+            let statements = statements(&recording, profile.as_ref(), actor)?;
+            say!("{}", serde_json::to_string_pretty(&statements).map_err(Failure::failed)?);
+            return Ok(());
+        }
         if self.json {
             let text = serde_json::to_string_pretty(&scored).map_err(Failure::failed)?;
             say!("{text}");
@@ -90,7 +106,7 @@ fn check(insertions: &[Insertion], file: &Path) -> Result<(), Failure> {
     if insertions.is_empty() { Err(without_insertion(file)) } else { Ok(()) }
 }
 
-fn without_insertion(file: &Path) -> Failure {
+pub(super) fn without_insertion(file: &Path) -> Failure {
     Failure::input(format_args!(
         "{}: it has no insertion: the needle never touched the skin; record one first",
         file.display()
@@ -149,7 +165,14 @@ impl Debrief {
         for file in &self.files {
             attempts.extend(debrief::attempts(&read(file)?, given.as_ref())?);
         }
-        let Some(html) = debrief::html(&attempts) else {
+        let expert = match &self.expert {
+            Some(file) => debrief::attempts(&read(file)?, given.as_ref())?,
+            None => Vec::new(),
+        };
+        if let Some(file) = self.expert.as_ref().filter(|_| expert.is_empty()) {
+            return Err(without_insertion(file));
+        }
+        let Some(html) = debrief::html(&attempts, &expert) else {
             return Err(without_insertion(&self.files[0]));
         };
         std::fs::create_dir_all(&self.out).map_err(|cause| {

@@ -157,6 +157,24 @@ fn every_command_has_help_with_an_example() {
 
 /// A limit on the size of files stands in for a full disk: the write fails in the same place.
 #[cfg(unix)]
+/// Completes `host-sim sc` and `host-sim score --x` as bash does.
+#[cfg(unix)]
+#[test]
+fn bash_completes_commands_and_options() {
+    let script = folder("completions").join("host-sim.bash");
+    std::fs::write(&script, run_well(&["completions", "bash"])).expect("the folder can be written");
+    for (words, last, wanted) in [("host-sim sc", "sc", "score"), ("host-sim score --x", "--x", "--xapi")] {
+        let count = words.split(' ').count() - 1;
+        let ask = format!(
+            "source {}; COMP_WORDS=({words}); COMP_CWORD={count}; _host__sim host-sim {last} host-sim; echo \"${{COMPREPLY[@]}}\"",
+            text(&script)
+        );
+        let output = Command::new("bash").args(["-c", &ask]).output().expect("there is bash");
+        assert_eq!(String::from_utf8_lossy(&output.stdout).trim(), wanted, "{words}");
+    }
+    refused(&run(&["completions", "tcsh"]), 2, &["tcsh", "bash"]);
+}
+
 #[test]
 fn after_a_full_disk_the_recording_so_far_can_be_read() {
     let dir = folder("full");

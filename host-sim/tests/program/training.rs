@@ -45,6 +45,61 @@ fn a_venepuncture_is_scored_and_debriefed() {
     refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
 }
 
+/// A needle driven through the far wall and beside the patient's angle, against the scripted venepuncture.
+#[test]
+fn a_trainee_is_compared_with_an_expert() {
+    let (novice, _) = scored("novice", &["--seconds", "6", "--procedure", "insertion-5mms-60deg"]);
+    let (expert, _) = scored("expert", &["--seconds", "12"]);
+    let out = folder("expert-debrief");
+    run_well(&["debrief", text(&novice), "--expert", text(&expert), "--out", text(&out)]);
+    let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
+    let row = |words: &str| {
+        let row = page.split("<tr>").find(|row| row.contains(words));
+        row.unwrap_or_else(|| panic!("no row {words}")).to_owned()
+    };
+    // The expert's column is the first.
+    assert!(page.find("expert/a.mcap").expect("named") < page.find("novice/a.mcap").expect("named"));
+    for words in ["through the far wall<", "angle error along the way"] {
+        assert!(row(words).contains("worse"), "{}", row(words));
+    }
+    assert!(!row("walls that gave way").contains("worse"), "that depends on the goal");
+    refused(
+        &run(&["debrief", text(&novice), "--expert", "/no/such.mcap", "--out", text(&out)]),
+        2,
+        &["/no/such.mcap"],
+    );
+}
+
+#[test]
+fn a_score_is_written_as_xapi_statements() {
+    let (file, insertions) = scored("xapi", &["--seconds", "12"]);
+    let score = ["score", text(&file), "--xapi", "--actor", "trainee@example.org"];
+    let statements: Value = serde_json::from_str(&run_well(&score)).expect("JSON");
+    let statements = statements.as_array().expect("an array");
+    assert_eq!((statements.len(), insertions.len()), (2, 2));
+    for (statement, one) in statements.iter().zip(&insertions) {
+        let mut keys: Vec<&String> = statement.as_object().expect("an object").keys().collect();
+        keys.sort();
+        assert_eq!(keys, ["actor", "context", "object", "result", "timestamp", "verb", "version"]);
+        assert_eq!(statement["actor"]["mbox"], "mailto:trainee@example.org");
+        let result = &statement["result"];
+        assert_eq!((&result["success"], &result["completion"]), (&true.into(), &true.into()), "{statement}");
+        let duration = result["duration"].as_str().expect("a duration");
+        let seconds: f64 = duration
+            .strip_prefix("PT")
+            .and_then(|d| d.strip_suffix('S'))
+            .expect("ISO 8601")
+            .parse()
+            .expect("s");
+        assert!((seconds - one["time_s"].as_f64().expect("a number")).abs() < 0.006, "{duration} {one}");
+        let extensions = result["extensions"].as_object().expect("an object");
+        assert!(extensions.keys().all(|key| key.starts_with("urn:needle-insertion:")));
+        assert_eq!(extensions["urn:needle-insertion:figure:peak_force_n"], one["peak_force_n"]);
+    }
+    refused(&run(&["score", text(&file), "--xapi", "--actor", "nobody"]), 2, &["--actor", "nobody"]);
+    refused(&run(&["score", text(&file), "--xapi"]), 2, &["--actor"]);
+}
+
 #[test]
 fn a_needle_that_goes_through_and_one_that_is_turned_are_told() {
     // 10 mm under the skin: beyond the far wall at 7.8 mm.
@@ -145,9 +200,12 @@ fn the_first_injection_misses_the_bursa_and_then_reaches_it() {
     assert!(target["time_s"].as_f64().is_some_and(|time_s| (0.5..3.0).contains(&time_s)), "{first}");
     assert_eq!(
         (&first["hit"], &first["spared"]),
-        (&serde_json::json!(["tendon", "cartilage"]), &serde_json::json!([]))
+        (&serde_json::json!(["tendon", "cartilage"]), &serde_json::json!(["vein"]))
     );
     assert!(page.contains("The needle passed beside it once."));
+    let flat = ["--profile", "shoulder", "--procedure", "insertion-5mms-25deg", "--seconds", "10"];
+    let (_, flat) = scored("shoulder-flat", &flat);
+    assert!(flat[0]["hit"].as_array().is_some_and(|hit| hit.contains(&"vein".into())), "{}", flat[0]);
     let (second, _) = injection("shoulder-straight");
     assert_eq!(
         (&second["target"]["passed_beside"], &second["target"]["outcome"]),

@@ -4,3 +4,4 @@ pub mod debrief;
 pub mod live_score;
 pub mod practice;
 pub mod score;
+pub mod xapi;

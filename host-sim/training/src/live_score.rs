@@ -46,7 +46,8 @@ impl LiveScore {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
             let (samples, events) = (Vec::new(), Vec::new());
-            self.stretch = Some(Stretch { hello, first_tick: 0, samples, events, setup: None });
+            let probes = Vec::new();
+            self.stretch = Some(Stretch { hello, first_tick: 0, samples, events, probes, setup: None });
         }
         let Some(stretch) = &mut self.stretch else { return };
         for (tick, sample) in &batch.samples {

@@ -19,7 +19,7 @@ const PATH_HZ: f64 = 25.0;
 
 /// What an insertion into a patient is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Goal {
+pub(crate) enum Goal {
     /// Into the vein and not through it.
     Vein,
     /// Into this structure, which the patient names as the target, and not through it.
@@ -29,7 +29,8 @@ enum Goal {
 }
 
 impl Goal {
-    fn of(profile: &Profile) -> Self {
+    /// Returns the goal of insertions into this patient.
+    pub(crate) fn of(profile: &Profile) -> Self {
         let layers = &profile.config.patient.layers;
         if layers.iter().any(|layer| layer.tissue == Tissue::Vessel) {
             return Goal::Vein;
@@ -38,7 +39,8 @@ impl Goal {
         target.map_or(Goal::Skin, |layer| Goal::Structure(layer.tissue))
     }
 
-    fn in_words(self) -> String {
+    /// Returns the goal as a sentence without its full stop.
+    pub(crate) fn in_words(self) -> String {
         match self {
             Goal::Vein => format!("Enter the vein, rest in it for {IN_LUMEN_S} s, and do not go through it"),
             Goal::Structure(tissue) => {
@@ -51,8 +53,20 @@ impl Goal {
         }
     }
 
+    /// Returns the numeric limits of an attempt that reaches the goal, by the names of the figures.
+    fn targets(self) -> serde_json::Value {
+        let mut targets = serde_json::json!({
+            "angle_rms_error_deg": { "at_most": ANGLE_WITHIN_DEG },
+            "spared_hits": { "at_most": 0 },
+        });
+        if self == Goal::Vein {
+            targets["in_lumen_s"] = serde_json::json!({ "at_least": IN_LUMEN_S });
+        }
+        targets
+    }
+
     /// Returns what an insertion lacks, in words; nothing where it has reached the goal.
-    fn missing(self, figures: &Insertion) -> Vec<String> {
+    pub(crate) fn missing(self, figures: &Insertion) -> Vec<String> {
         let mut missing = Vec::new();
         match self {
             Goal::Vein if figures.through_far_wall => missing.push("it went through the far wall".into()),
@@ -133,7 +147,11 @@ impl Practice {
         self.patient = profile.name.clone();
         self.goal = Goal::of(profile);
         self.skin_tilt_rad = profile.skin_tilt_rad();
-        publisher.practice(&serde_json::json!({ "goal": self.goal.in_words(), "patient": self.patient }));
+        publisher.practice(&serde_json::json!({
+            "goal": self.goal.in_words(),
+            "patient": self.patient,
+            "targets": self.goal.targets(),
+        }));
     }
 
     /// Notes who holds the needle.

@@ -340,7 +340,7 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
     page.wait(
         "a word about the missing program",
         SOON,
-        "document.body.dataset.link === 'lost' && /no data since [2-9] s/.test(document.getElementById('banner').textContent)",
+        "document.body.dataset.link === 'lost' && /no data for [2-9] s/.test(document.getElementById('banner').textContent)",
     )?;
     *program = Program::start(path, program.port()?, None)?;
     page.wait(

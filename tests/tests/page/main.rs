@@ -4,6 +4,7 @@ mod access;
 mod browser;
 mod graphics;
 mod guide;
+mod layout;
 mod needle;
 mod patient;
 mod practice;

@@ -194,12 +194,12 @@ fn needle_is_at(page: &mut Page, depth: f64, size: Size, grab: &Grab) -> Result<
     came.map_err(|failure| format!("{size:?}: hand, needle, unbent: {seen}; {failure}"))
 }
 
-/// Fails unless tip and hub are drawn within the canvas.
+/// Fails unless tip, hub and the hub's upper corner are drawn within the canvas.
 fn in_sight(page: &mut Page, size: Size, when: &str) -> Result<(), Failure> {
     let seen = page.evaluate(
-        "(() => { const c = document.getElementById('section'), { tip, hub, angle } = __stats.drawn; \
+        "(() => { const c = document.getElementById('section'), { tip, hub, hubTop, angle } = __stats.drawn; \
          const inside = p => p.x >= 0 && p.y >= 0 && p.x <= c.clientWidth && p.y <= c.clientHeight; \
-         return { ok: inside(tip) && inside(hub), tip, hub, angle, width: c.clientWidth, height: c.clientHeight }; })()",
+         return { ok: inside(tip) && inside(hub) && inside(hubTop), tip, hub, hubTop, angle, width: c.clientWidth, height: c.clientHeight }; })()",
     )?;
     check(&format!("tip and hub in sight, {when}"), seen["ok"] == json!(true), (size, &seen))
 }

@@ -34,6 +34,12 @@ fn visit() -> Result<(), Failure> {
     let mut page = open(&browser, &program.url, SIZES[0])?;
     page.click("view-practice")?;
     page.wait("the goal", SOON, "document.getElementById('goal').textContent.includes('Enter the vein')")?;
+    let heads = page.text("document.getElementById('attempts-head').textContent")?;
+    check(
+        "figures have limits",
+        heads.contains("In vein, s≥ 0.5") && heads.contains("Angle off, °≤ 5"),
+        heads,
+    )?;
     page.wait(
         "the scripted hand's attempt",
         A_FEW_INSERTIONS,
@@ -59,6 +65,7 @@ fn visit() -> Result<(), Failure> {
     )?;
     page.photograph(&scratch.join("practice.png"))?;
     end_recording(&mut page)?;
+    debriefed(&mut page)?;
     record(&mut page, "monday")?;
     page.wait(
         "a second file",
@@ -102,6 +109,14 @@ fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Failure> {
     }
     page.wait("the needle outside", SOON, "__stats.depthMm < -3")?;
     grab.let_go(page, grab.begin_mm)
+}
+
+/// The link appears when a recording has ended, and leads to the debrief of its insertions.
+fn debriefed(page: &mut Page) -> Result<(), Failure> {
+    page.wait("the link to the debrief", SOON, "!document.getElementById('debrief').hidden")?;
+    let html = page.text("fetch(document.getElementById('debrief').href).then(answer => answer.text())")?;
+    let is_whole = html.contains("<h1>Debrief</h1>") && html.contains("monday.mcap, insertion 2");
+    check("the debrief of both insertions", is_whole, html.chars().take(300).collect::<String>())
 }
 
 /// The first file has both insertions, the second none.

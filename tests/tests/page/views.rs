@@ -1,7 +1,9 @@
 //! The second view of the page (limb and ultrasound) from the program, and the whole simulator from a folder without a
 //! server, as `cargo xtask site` writes it.
 
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 use tests::browser::{Chromium, Failure, Page, Places, Program};
 
@@ -21,10 +23,23 @@ fn visit() -> Result<(), Failure> {
     let places = Places::find()?;
     let scratch = places.scratch("page-views")?;
     let browser = Chromium::start(&scratch)?;
-    let program = Program::start(&places.program, 0, None)?;
+    let file = scratch.join("probe.mcap");
+    let program = Program::start(&places.program, 0, Some(&file))?;
     look(&browser, &program.url, &scratch.join("program.png"))?;
     drop(program);
+    probe_is_recorded(&places.program, &file)?;
     look(&browser, &site(&places.target)?, &scratch.join("site.png"))
+}
+
+/// The recording says where the probe was: the tip was seen in one insertion for some of the time and in another less.
+fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Failure> {
+    let output = Command::new(program).arg("score").arg(file).arg("--json").output();
+    let output = output.map_err(|cause| format!("score does not start: {cause}"))?;
+    let score: Value = serde_json::from_slice(&output.stdout).map_err(|cause| format!("score: {cause}"))?;
+    let shares = score["insertions"].as_array().into_iter().flatten();
+    let shares: Vec<f64> = shares.filter_map(|one| one["tip_seen_share"].as_f64()).collect();
+    let (least, most) = shares.iter().fold((1.0_f64, 0.0_f64), |(low, high), s| (low.min(*s), high.max(*s)));
+    if most > 0.2 && least < most { Ok(()) } else { Err(format!("shares of the tip seen: {shares:?}")) }
 }
 
 /// The folder's page: in the target directory, or where `cargo xtask site` put it for this one.
@@ -54,6 +69,30 @@ fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Failure>
     if share > 0.01 {
         return Err(format!("with the probe 6 mm beside it {share} of the needle is in its plane"));
     }
+    table_1(&mut page)?;
     page.click("view-section")?;
     page.wait("the section", SOME_TIME, "document.getElementById('section').clientHeight > 100")
+}
+
+/// Table 1 of Paper 000 replaces the limb, is drawn and imaged, and gives way to the limb again.
+fn table_1(page: &mut Page) -> Result<(), Failure> {
+    let choose = |page: &mut Page, value: &str| {
+        page.evaluate(&format!(
+            "{{ const s = document.getElementById('tissue-model'); s.value = '{value}'; s.dispatchEvent(new Event('change')); }}"
+        ))?;
+        page.evaluate("__body.frames = 0")?;
+        page.wait("a picture", SOME_TIME, DRAWN)?;
+        page.number("__body.particles")
+    };
+    let limb = page.number("__body.particles")?;
+    let table = choose(page, "table-1")?;
+    page.wait("the needle deep in Table 1", SOME_TIME, "__stats.depthMm > 6 && __body.frames > 20")?;
+    let note = page.text("document.getElementById('body-note').textContent")?;
+    let again = choose(page, "limb")?;
+    if table > 10.0 && table != limb && again == limb && note.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "particles of the limb {limb}, of Table 1 {table}, of the limb again {again}; the page says: {note}"
+    ))
 }

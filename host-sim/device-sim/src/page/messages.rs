@@ -4,7 +4,7 @@
 //! every 8 ms, every 250 ms while nothing arrives from the device, less often where the page is slow. The page sends a [`FromPage`] when a
 //! person does something. Times are seconds of the device's own clock, lengths are along the needle.
 
-use crate::session::{Control, LinkStatus, PatientStatus, PatientWish, Scene};
+use crate::session::{Control, LinkStatus, PatientStatus, PatientWish, ProbeView, Scene};
 use serde::{Deserialize, Serialize};
 
 /// Server to page; `type` names the variant.
@@ -209,6 +209,8 @@ pub enum FromPage {
     },
     /// End the recording.
     EndRecording,
+    /// The probe has been moved, or its image shows another part of the needle; at most ten times a second.
+    Probe(ProbeView),
     /// A recording is to go on from here.
     Seek {
         /// Time into the recording in s, 0 or more.
@@ -231,6 +233,7 @@ impl From<FromPage> for Control {
             FromPage::Compensate { share } => Self::Compensate { share },
             FromPage::Record { name } => Self::Record { name },
             FromPage::EndRecording => Self::EndRecording,
+            FromPage::Probe(view) => Self::Probe(view),
             FromPage::Seek { at_s } => Self::Seek { at_s },
         }
     }
@@ -263,6 +266,7 @@ impl FromPage {
                 "a recording's name has 1 to 60 letters, digits, blanks or ._- and begins with a letter or a digit"
                     .into(),
             ),
+            Self::Probe(view) if !view.is_plausible() => Err("the probe is not on the limb".into()),
             Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
                 Err(format!("time {at_s} s is not within 0 to 1e9 s"))
             }
@@ -302,6 +306,8 @@ mod tests {
             r#"{"do":"record","name":"../monday"}"#,
             r#"{"do":"record","name":""}"#,
             r#"{"do":"compensate","share":1.01}"#,
+            r#"{"do":"probe","along_mm":13}"#,
+            r#"{"do":"probe","along_mm":13,"across_mm":0,"azimuth_rad":9,"lean_rad":0,"share_in_plane":1,"tip_seen":true}"#,
         ] {
             let error = FromPage::parse(bad).unwrap_err();
             assert!(!error.contains('\n'), "{error}");

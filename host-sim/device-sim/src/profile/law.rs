@@ -136,8 +136,8 @@ pub(super) enum Friction {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Cut {
-    inwards_n: f64,
-    outwards_n: f64,
+    pub(super) inwards_n: f64,
+    pub(super) outwards_n: f64,
 }
 
 /// The law that a file's parts make, or in a sentence which key is missing or too many. Without a `[friction]`, the jog law

@@ -2,24 +2,29 @@
 //! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
 //! refuses is refused here too.
 
+mod beside;
+mod condition;
 mod goal;
 mod law;
 mod person;
 mod rupture;
+mod tissues;
 
 use crate::failure::Failure;
 use crate::library::{self, Text};
-use crate::session::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
+use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan, plan};
 use fixed::types::I16F16;
 use serde::Deserialize;
 
+pub use beside::Beside;
 pub use goal::Goal;
 pub use law::Model;
 use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
+pub(crate) use tissues::TissueName;
 
 /// The profiles that come with the program.
 pub const BUILT_IN: [(&str, &str); 7] = [
@@ -49,6 +54,8 @@ pub struct Profile {
     pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
+    /// Structures beside the way that the needle is to spare.
+    pub beside: Vec<Beside>,
     /// The needle's target.
     goal: Option<goal::Written>,
     /// The text that it came from, for recordings.
@@ -73,13 +80,15 @@ impl Profile {
 
     /// Checks the text of a profile for `device`.
     pub fn parse_for(source: Text, device: &Device) -> Result<Self, Failure> {
-        let file: File = library::parse(&source)?;
+        let mut file: File = library::parse(&source)?;
         let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
         check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
         file.patient.check().map_err(refuse)?;
+        file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
+        condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
         let config = Config { device: *device, patient: file.config().map_err(refuse)? };
         let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
@@ -88,6 +97,7 @@ impl Profile {
         Ok(Self {
             spared: spared.collect(),
             goal: file.target,
+            beside: file.beside,
             procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
             person: file.patient,
             name: file.name,
@@ -137,6 +147,7 @@ impl Profile {
             tilt_rad: self.tilt_rad(),
             skin_tilt_rad: self.skin_tilt_rad(),
             vessel: self.vessel(),
+            beside: self.beside.iter().map(SceneBeside::from).collect(),
             needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
         }
     }
@@ -244,6 +255,8 @@ struct File {
     layer: Vec<Layer>,
     vessel: Option<Vessel>,
     target: Option<goal::Written>,
+    #[serde(default)]
+    beside: Vec<Beside>,
 }
 
 #[derive(Deserialize)]
@@ -270,20 +283,6 @@ struct Layer {
     cutting: Option<law::Cut>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum TissueName {
-    Skin,
-    Fat,
-    Muscle,
-    Vessel,
-    Other,
-    Bursa,
-    Tendon,
-    Cartilage,
-    FarWall,
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Wall {
@@ -301,22 +300,6 @@ struct Parabola {
     vertex_mm: f64,
     compliance_mm2_per_n: f64,
     base_n: f64,
-}
-
-impl From<TissueName> for Tissue {
-    fn from(name: TissueName) -> Self {
-        match name {
-            TissueName::Skin => Tissue::Skin,
-            TissueName::Fat => Tissue::Fat,
-            TissueName::Muscle => Tissue::Muscle,
-            TissueName::Vessel => Tissue::Vessel,
-            TissueName::Other => Tissue::Other,
-            TissueName::Bursa => Tissue::Bursa,
-            TissueName::Tendon => Tissue::Tendon,
-            TissueName::Cartilage => Tissue::Cartilage,
-            TissueName::FarWall => Tissue::FarWall,
-        }
-    }
 }
 
 /// A decimal number as the control law holds it; one that it cannot hold is refused by name.

@@ -1,4 +1,4 @@
-//! The `[patient]` of a profile: whom it stands for. The control law knows none of it; people, `profiles` and recordings do.
+//! The `[patient]` of a profile: the person. The control law knows none of it: thicknesses follow from it here, forces in `condition`.
 
 use super::Layer;
 use serde::Deserialize;
@@ -15,7 +15,7 @@ pub struct Person {
     pub height_cm: Option<f64>,
     /// Sex, where the anatomy depends on it.
     pub sex: Option<Sex>,
-    /// The patient's illness, in words of at most 80 characters.
+    /// The patient's illness, one of those of `condition`.
     pub pathology: Option<String>,
     /// The site of the insertion.
     pub site: Option<Site>,
@@ -117,12 +117,7 @@ impl Person {
                 return Err(format!("{key} is {value}; it must be from {low} to {high}"));
             }
         }
-        match &self.pathology {
-            Some(words) if words.chars().count() > 80 || words.contains('\n') => {
-                Err("patient.pathology is too long; it must be one line of at most 80 characters".into())
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }
 

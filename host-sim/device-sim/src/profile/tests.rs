@@ -100,7 +100,7 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (shoulder.replace("sliding_n = 0.3", "sliding_n = nan"), "sliding_n is NaN"),
         (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190"),
         (shoulder.replace("site = \"shoulder\"", "site = \"elbow\""), "elbow"),
-        (shoulder.replace("age_years = 52", "age_years = 130"), "patient.age_years is 130"),
+        (shoulder.replace("age_years = 50", "age_years = 130"), "patient.age_years is 130"),
         (shoulder.replace("height_cm = 176.0", "height_cm = nan"), "patient.height_cm is NaN"),
         (format!("{shoulder}friction_n_per_mm = 0.02\n"), "friction_n_per_mm is the law jog's"),
         (shoulder.replace("sex = \"male\"\n", ""), "thickness by-body-mass needs patient.sex"),

@@ -4,10 +4,12 @@
 mod scene;
 mod told;
 
-pub use scene::{Scene, SceneLayer, SceneNeedle, SceneVessel, Source, state_name, tissue_name, vessel_name};
+pub use scene::{
+    Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, state_name, tissue_name, vessel_name,
+};
 pub use told::{
-    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, RecordingStatus,
-    ReplayStatus,
+    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
+    RecordingStatus, ReplayStatus,
 };
 
 use control_core::controller::Sample;
@@ -305,6 +307,7 @@ mod tests {
             tilt_rad: 0.0,
             skin_tilt_rad: 0.0,
             vessel: None,
+            beside: Vec::new(),
             needle: SceneNeedle::reaching(15.6),
             hand: true,
         }

@@ -29,6 +29,8 @@ pub struct Scene {
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
+    /// Structures beside the way that the needle is to spare.
+    pub beside: Vec<SceneBeside>,
     /// The needle, the same for every picture.
     pub needle: SceneNeedle,
     /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] have an effect: only with the virtual device.
@@ -64,6 +66,21 @@ pub struct SceneVessel {
     pub width_mm: f64,
     /// The distance of the needle's plane from the axis in mm.
     pub offset_mm: f64,
+}
+
+/// A structure to be spared, drawn as an ellipse in the needle's plane.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneBeside {
+    /// Its name.
+    pub name: String,
+    /// Its middle along the skin from the point of entry in mm.
+    pub along_mm: f64,
+    /// Its middle below the skin in mm.
+    pub depth_mm: f64,
+    /// Its extent along the skin in mm.
+    pub width_mm: f64,
+    /// Its extent perpendicular to the skin in mm.
+    pub height_mm: f64,
 }
 
 /// A hypodermic needle of 21 gauge. Its hub sits at the end of the cannula, so that the needle goes in until the hub meets the skin.

@@ -3,7 +3,7 @@
 use super::Scene;
 use control_core::controller::Sample;
 use link::frames::{Event, Hello, Pose, Timing};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// An older pose says nothing of where the needle was at an event: 100 ms.
 const NEAR_TICKS: u64 = control_core::TICK_HZ as u64 / 10;
@@ -64,6 +64,8 @@ pub struct LinkStatus {
     pub garbage: u64,
     /// The recording in progress.
     pub recording: Option<RecordingStatus>,
+    /// The file of the last recording that was ended in the page.
+    pub recorded: Option<String>,
     /// A notice for a person: why there is no connection, why a command was refused, why recording ended.
     pub notice: Option<String>,
     /// The position in a recording that is played.
@@ -130,6 +132,33 @@ pub enum PatientWish {
     Edited(serde_json::Value),
 }
 
+/// The ultrasound probe on the skin and what its image shows of the needle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ProbeView {
+    /// Its middle along the skin from the point of entry, mm.
+    pub along_mm: f64,
+    /// Its middle across the needle's plane, mm.
+    pub across_mm: f64,
+    /// Its turn from the needle's plane, rad.
+    pub azimuth_rad: f64,
+    /// Its lean from the perpendicular, rad.
+    pub lean_rad: f64,
+    /// Share of the needle in tissue that lies in the image's plane, 0 to 1.
+    pub share_in_plane: f64,
+    /// True if the image shows the tip.
+    pub tip_seen: bool,
+}
+
+impl ProbeView {
+    /// True if every number is one that a page sends.
+    pub fn is_plausible(&self) -> bool {
+        let Self { along_mm, across_mm, azimuth_rad, lean_rad, share_in_plane, .. } = self;
+        [along_mm, across_mm].iter().all(|mm| (-200.0..=200.0).contains(*mm))
+            && [azimuth_rad, lean_rad].iter().all(|rad| (-4.0..=4.0).contains(*rad))
+            && (0.0..=1.0).contains(share_in_plane)
+    }
+}
+
 /// The requests of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Control {
@@ -167,6 +196,8 @@ pub enum Control {
     },
     /// The recording ends.
     EndRecording,
+    /// The ultrasound probe is here now, and its image shows this.
+    Probe(ProbeView),
     /// A recording goes on from here, or stays here where it is paused.
     Seek {
         /// Time into the recording, s.

@@ -30,6 +30,7 @@ pub(super) const GUIDE_PAGE: Asset = asset!("/", "guide.html", PAGE);
 /// The files of the pages.
 pub(super) const ASSETS: &[Asset] = &[
     asset!("/style.css", "style.css", "text/css; charset=utf-8"),
+    asset!("/practice.css", "practice.css", "text/css; charset=utf-8"),
     asset!("/class.css", "class.css", "text/css; charset=utf-8"),
     asset!("/class.js", "class.js", SCRIPT),
     asset!("/guide.css", "guide.css", "text/css; charset=utf-8"),

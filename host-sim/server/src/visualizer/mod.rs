@@ -2,17 +2,19 @@
 //!
 //! [`device_sim::page::messages`] is what is said between server and page, [`device_sim::page::condense`] turns 10 kHz into what a
 //! picture needs, `server` and `connection` carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide),
-//! `assets` holds the files of `host-sim/page`.
+//! `debrief` serves what it is given for the last recording, `assets` holds the files of `host-sim/page`.
 //!
 //! This module may not touch the device, the link or a recording: it knows a [`device_sim::session::Session`] and nothing
 //! behind it. A page that is slow, asleep or gone costs the session nothing but its own bounded queue.
 
 mod assets;
 mod connection;
+mod debrief;
 mod server;
 mod watched;
 
-pub use server::{ServeError, Server, serve, serve_guide, serve_watched};
+pub use debrief::Debrief;
+pub use server::{ServeError, Server, serve, serve_guide, serve_watched, serve_with_debrief};
 pub use watched::{Said, Watch, Watches};
 
 #[cfg(test)]
@@ -29,6 +31,7 @@ pub(crate) fn test_scene() -> device_sim::session::Scene {
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,
+        beside: Vec::new(),
         needle: device_sim::session::SceneNeedle::reaching(15.6),
         hand: true,
     }

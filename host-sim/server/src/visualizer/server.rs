@@ -2,13 +2,14 @@
 
 use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
 use super::connection;
+use super::debrief::{self, Debrief};
 use super::watched::{self, Said, Watched, Watches};
 use crate::bounded_listener::BoundedListener;
 use axum::Router;
 use axum::extract::{State, WebSocketUpgrade};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{MethodRouter, get};
+use axum::routing::get;
 use device_sim::session::Session;
 use std::fmt;
 use std::io;
@@ -106,20 +107,29 @@ impl Drop for Server {
 /// Serves the page of `session` at `port` of 127.0.0.1 (0: any free one) on a thread of its own.
 pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
     let shared = Shared { session, person: Arc::default() };
-    start(port, &DEVICE_PAGE, get(live).with_state(shared))
+    start(port, &DEVICE_PAGE, Router::new().route("/live", get(live).with_state(shared)))
+}
+
+/// The same with a debrief of the last recording, which `write` makes of its file, at `/debrief`.
+pub fn serve_with_debrief(session: Session, port: u16, write: Debrief) -> Result<Server, ServeError> {
+    let router = debrief::router(session.clone(), write);
+    let shared = Shared { session, person: Arc::default() };
+    start(port, &DEVICE_PAGE, router.route("/live", get(live).with_state(shared)))
 }
 
 /// Serves a page of a class, which only looks at what `watches` give, as [`serve`] does.
 pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> {
-    start(port, &CLASS_PAGE, get(watched::live).with_state(Watched { watches, said: None }))
+    let live = get(watched::live).with_state(Watched { watches, said: None });
+    start(port, &CLASS_PAGE, Router::new().route("/live", live))
 }
 
 /// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes, as [`serve`] does.
 pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
-    start(port, &GUIDE_PAGE, get(watched::live).with_state(Watched { watches, said: Some(said) }))
+    let live = get(watched::live).with_state(Watched { watches, said: Some(said) });
+    start(port, &GUIDE_PAGE, Router::new().route("/live", live))
 }
 
-fn start(port: u16, page: &'static Asset, live: MethodRouter) -> Result<Server, ServeError> {
+fn start(port: u16, page: &'static Asset, router: Router) -> Result<Server, ServeError> {
     let failed = |error: io::Error| match error.kind() {
         io::ErrorKind::AddrInUse => ServeError::PortInUse { port },
         _ => ServeError::Io { port, error },
@@ -132,7 +142,7 @@ fn start(port: u16, page: &'static Asset, live: MethodRouter) -> Result<Server, 
     let run = move || {
         runtime.block_on(async {
             tokio::select! {
-                () = listen(listener, page, live) => {}
+                () = listen(listener, page, router) => {}
                 _ = stopped => {}
             }
         });
@@ -143,9 +153,8 @@ fn start(port: u16, page: &'static Asset, live: MethodRouter) -> Result<Server, 
     Ok(Server { address, stop: Some(stop), thread: Some(thread) })
 }
 
-async fn listen(listener: TcpListener, page: &'static Asset, live: MethodRouter) {
+async fn listen(listener: TcpListener, page: &'static Asset, mut router: Router) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-    let mut router = Router::new().route("/live", live);
     for asset in std::iter::once(page).chain(ASSETS) {
         router = router.route(asset.path, get(move || async move { file(asset) }));
     }

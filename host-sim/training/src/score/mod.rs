@@ -2,6 +2,7 @@
 //! [`vessel`] what it did to the vessel, [`smoothness`] a measure of any movement; here they are put together.
 
 pub mod gesture;
+mod probe;
 pub mod smoothness;
 pub mod target;
 pub mod track;
@@ -11,7 +12,7 @@ use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
-use device_sim::profile::{Goal, Profile};
+use device_sim::profile::{Beside, Goal, Profile};
 use gesture::{Gesture, Place};
 use link::frames::{Event, EventKind};
 use recording::export::{Stretch, stretches};
@@ -84,6 +85,10 @@ pub struct Insertion {
     pub angle_rms_error_deg: Option<f64>,
     /// Largest of it, with its sign, °.
     pub angle_largest_error_deg: Option<f64>,
+    /// Share of the time at which the ultrasound image showed the tip; none where no image was shown.
+    pub tip_seen_share: Option<f64>,
+    /// Share of the needle in tissue that lay in the image's plane, its mean over that time.
+    pub in_plane_share: Option<f64>,
     /// Spectral arc length of the tip's speed on the way in: about −1.4 where it is one smooth movement.
     pub smoothness: Option<f64>,
 }
@@ -182,6 +187,7 @@ pub struct Judge {
     goal: Option<Goal>,
     /// Number and name of each layer to be spared.
     spared: Vec<(u8, String)>,
+    beside: Vec<Beside>,
     fixture: Option<Fixture>,
     zero_tick: u64,
 }
@@ -201,6 +207,7 @@ impl Judge {
             },
             goal: profile.goal(),
             spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
+            beside: profile.beside.clone(),
             fixture: match &profile.config.patient.law {
                 Law::Sparte(law) => Some(law.fixture),
                 Law::Jog(_) | Law::Xr(_) => None,
@@ -217,6 +224,13 @@ impl Judge {
         Some(f64::from(most) * fixture.per_mrad.0.to_num::<f64>())
     }
 
+    /// Returns where the tip was along the skin at `tick`, mm.
+    fn along_mm(&self, span: Span<'_>, tick: u64) -> Option<f64> {
+        let sample = span.stretch.samples.get(span.at(tick))?;
+        let angle_rad = f64::from(sample.tilt_mrad) * 1e-3 - self.skin_tilt_rad;
+        Some(f64::from(sample.count) * span.stretch.hello.mm_per_count * angle_rad.cos())
+    }
+
     /// The figures of one insertion.
     pub fn insertion(&self, span: Span<'_>) -> Insertion {
         let (begin, end) = (span.begin, span.end);
@@ -227,15 +241,13 @@ impl Judge {
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
         let passage = vessel::passage(&span.stretch.events, (begin, end), &self.targets);
-        let along_mm = |tick: u64| {
-            let sample = span.stretch.samples.get(span.at(tick))?;
-            let angle_rad = f64::from(sample.tilt_mrad) * 1e-3 - self.skin_tilt_rad;
-            Some(f64::from(sample.count) * hello.mm_per_count * angle_rad.cos())
-        };
         let target = self.goal.as_ref().map(|goal| {
+            let along_mm = |tick| self.along_mm(span, tick);
             target::reached(&span.stretch.events, (begin, end), goal, along_mm, 1.0 / f64::from(TICK_HZ))
         });
-        let (hit, spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
+        let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
+        let beside_hits = target::beside_hits(&gesture.places, &self.beside, &mut hit, &mut spared);
+        let seen = probe::seen(&span.stretch.probes, (begin, end));
         let again = track::met_again(&span.stretch.events, (begin, end));
         let inside = given().next().map_or(&[][..], |e| &span.stretch.samples[span.at(e.tick)..span.at(end)]);
         let first = inside.first();
@@ -260,7 +272,7 @@ impl Judge {
             met_in_track: again.in_track,
             pierced_again: again.whole,
             through_far_wall: passage.through_far_wall,
-            spared_hits: passage.spared_hits,
+            spared_hits: passage.spared_hits + beside_hits,
             target,
             hit,
             spared,
@@ -272,6 +284,8 @@ impl Judge {
             angle_error_deg: angle_rad.map(|rad| (rad - wanted_rad).to_degrees()),
             angle_rms_error_deg: along.map(|error| error.rms_deg),
             angle_largest_error_deg: along.map(|error| error.largest_deg),
+            tip_seen_share: seen.map(|seen| seen.tip_share),
+            in_plane_share: seen.map(|seen| seen.in_plane_share),
             smoothness: smoothness::spectral_arc_length(
                 &gesture.speed_mm_s(gesture.way_in()),
                 gesture::RATE_HZ,

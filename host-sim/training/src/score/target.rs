@@ -3,7 +3,8 @@
 //! A target is a layer, or a part of it that ends to either side: layers of the device go on for ever, so that a bursa is missed here only
 //! where its patient says how far it reaches. What the hand feels there is the layer all the same.
 
-use device_sim::profile::Goal;
+use super::gesture::Place;
+use device_sim::profile::{Beside, Goal};
 use link::frames::{Event, EventKind};
 use serde::{Deserialize, Serialize};
 
@@ -101,6 +102,24 @@ pub fn hit_and_spared(
     (names(hit), names(left))
 }
 
+/// Counts how often the tip came into a structure beside the way, and adds each structure's name to what was hit or spared.
+pub(super) fn beside_hits(
+    places: &[Place],
+    beside: &[Beside],
+    hit: &mut Vec<String>,
+    spared: &mut Vec<String>,
+) -> u32 {
+    let mut hits = 0;
+    for structure in beside {
+        let inside: Vec<bool> = places.iter().map(|place| structure.contains(place.in_section())).collect();
+        let entries = inside.iter().take(1).filter(|is_in| **is_in).count()
+            + inside.windows(2).filter(|pair| pair[1] && !pair[0]).count();
+        if entries > 0 { &mut *hit } else { &mut *spared }.push(structure.name.clone());
+        hits += entries as u32;
+    }
+    hits
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -181,5 +200,21 @@ mod tests {
         let spared = [(4, "tendon".to_owned()), (5, "cartilage".to_owned())];
         let (hit, left) = hit_and_spared(&at(&[(10, Contact { layer: 4 })]), (0, 100), &spared);
         assert_eq!((hit, left), (vec!["tendon".to_owned()], vec!["cartilage".to_owned()]));
+    }
+
+    #[test]
+    fn a_vein_beside_the_way_is_hit_by_a_flat_needle() {
+        let vein = Beside { name: "vein".into(), from_mm: 9.0, to_mm: 13.0, top_mm: 3.5, bottom_mm: 6.5 };
+        let judge = |degrees: f64, depths_mm: &[f64]| {
+            let angle_rad = degrees.to_radians();
+            let places: Vec<Place> = depths_mm.iter().map(|mm| Place { depth_mm: *mm, angle_rad }).collect();
+            let (mut hit, mut spared) = (vec!["tendon".to_owned()], Vec::new());
+            let hits = beside_hits(&places, std::slice::from_ref(&vein), &mut hit, &mut spared);
+            (hits, hit.len(), spared.len())
+        };
+        let way: Vec<f64> = (0..40).map(f64::from).collect();
+        assert_eq!(judge(45.0, &way), (0, 1, 1));
+        assert_eq!(judge(25.0, &way), (1, 2, 0));
+        assert_eq!(judge(25.0, &[5.0, 12.0, 5.0, 12.0]), (2, 2, 0), "each time counts");
     }
 }

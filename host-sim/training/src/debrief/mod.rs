@@ -1,6 +1,8 @@
 //! A trainee's insertions on a page to print: the gesture over the anatomy, force against depth, the figures, two attempts compared,
 //! and what they say in words. It takes its figures from [`crate::score`] and computes none of its own.
 
+mod figures;
+
 use crate::score::gesture::{Gesture, RATE_HZ};
 use crate::score::target::{Outcome, Reached};
 use crate::score::{Insertion, Judge, Span, each};
@@ -10,7 +12,7 @@ use device_sim::profile::Profile;
 use device_sim::session::{Scene, SceneNeedle, SceneVessel, Source};
 use html_report::chart::{Chart, Curve};
 use html_report::section::{Band, Needle, Section, Tube, Way};
-use html_report::{Cell, Sheet, decimal};
+use html_report::{Sheet, decimal};
 use link::frames::EventKind;
 use recording::read::Recording;
 use std::rc::Rc;
@@ -74,21 +76,28 @@ fn attempt(
     }
 }
 
-/// The page; none of no attempt. The first and the last are compared, over the anatomy of the last one's patient.
-pub fn html(attempts: &[Attempt]) -> Option<String> {
+/// The page; none of no attempt. The first and the last are compared, or an expert's best and the last, over the anatomy of the last
+/// one's patient.
+pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     let patient = &attempts.last()?.patient;
     let scene = patient.scene(Source::Virtual, None);
-    let compared: Vec<&Attempt> = match attempts {
-        [] => Vec::new(),
-        [only] => vec![only],
-        [first, .., last] => vec![first, last],
+    let model = best(expert).map(|one| Attempt { name: format!("expert: {}", one.name), ..one.clone() });
+    let compared: Vec<&Attempt> = match (&model, attempts) {
+        (_, []) => Vec::new(),
+        (Some(model), [.., last]) => vec![model, last],
+        (None, [only]) => vec![only],
+        (None, [first, .., last]) => vec![first, last],
     };
     let lead = format!(
         "Patient {}. {} insertion{}{}",
         patient.name,
         attempts.len(),
         if attempts.len() == 1 { "" } else { "s" },
-        if compared.len() > 1 { "; the first and the last are compared." } else { "." }
+        match (compared.len(), expert.is_empty()) {
+            (2, true) => "; the first and the last are compared.",
+            (2, false) => "; the last is compared with the expert's best.",
+            _ => ".",
+        }
     );
     let mut sheet = Sheet::new("Debrief", &lead);
     for one in &compared {
@@ -98,16 +107,31 @@ pub fn html(attempts: &[Attempt]) -> Option<String> {
     sheet.heading("The gesture and what was felt");
     sheet.figures(&pictures(&compared, &scene));
     sheet.heading("Figures");
-    compare(&mut sheet, &compared);
+    figures::compare(&mut sheet, &compared);
     if attempts.len() > 2 {
         sheet.heading("All insertions");
-        list(&mut sheet, attempts);
+        figures::list(&mut sheet, attempts);
     }
     sheet.note(
         "Angles are to the skin. Smoothness is the spectral arc length of the tip's speed on the way in: about −1.4 for one smooth \
          movement, more negative for one that stops and starts. Path counts the way in, out and sideways.",
     );
     Some(sheet.finish())
+}
+
+/// Returns the quickest attempt that reached its goal without touching what was to be spared, else the quickest.
+fn best(attempts: &[Attempt]) -> Option<&Attempt> {
+    let failed = |one: &Insertion| {
+        let reached = match &one.target {
+            Some(target) => target.outcome == Outcome::Reached,
+            None => one.punctures > 0,
+        };
+        !reached || one.spared_hits > 0 || one.through_far_wall
+    };
+    attempts.iter().min_by(|a, b| {
+        let (a, b) = (&a.figures, &b.figures);
+        failed(a).cmp(&failed(b)).then(a.time_s.total_cmp(&b.time_s))
+    })
 }
 
 /// Layers and vessel of a scene as they are drawn on paper.
@@ -252,83 +276,6 @@ fn times(count: u32) -> String {
         2 => "twice".into(),
         n => format!("{n} times"),
     }
-}
-
-/// A figure of the table: its words, its value, its decimals.
-type Figure = (&'static str, fn(&Insertion) -> Option<f64>, usize);
-
-const FIGURES: [Figure; 22] = [
-    ("time in tissue, s", |i| Some(i.time_s), 2),
-    ("time in the lumen, s", |i| Some(i.in_lumen_s), 2),
-    ("time in the target, s", |i| i.target.as_ref().map(|target| target.time_s), 2),
-    ("path of the tip, mm", |i| Some(i.path_mm), 1),
-    ("deepest, along the needle, mm", |i| Some(i.depth_mm), 1),
-    ("vessel first touched at, mm", |i| i.vessel_contact_path_mm, 2),
-    ("went on in the vessel by, mm", |i| i.overshoot_mm, 1),
-    ("walls that gave way", |i| Some(f64::from(i.punctures)), 0),
-    ("layers met again in the needle's track", |i| Some(f64::from(i.met_in_track)), 0),
-    ("layers pierced once more", |i| Some(f64::from(i.pierced_again)), 0),
-    ("blood in the hub, times", |i| Some(f64::from(i.flashbacks)), 0),
-    ("through the far wall", |i| Some(f64::from(u8::from(i.through_far_wall))), 0),
-    ("touches of what was to be spared", |i| Some(f64::from(i.spared_hits)), 0),
-    ("passes", |i| Some(f64::from(i.passes)), 0),
-    ("redirections", |i| Some(f64::from(i.redirections)), 0),
-    ("largest force, N", |i| Some(i.peak_force_n), 2),
-    ("angle at the first puncture, °", |i| i.angle_deg, 1),
-    ("angle error along the way, ° rms", |i| i.angle_rms_error_deg, 1),
-    ("largest angle error, °", |i| i.angle_largest_error_deg, 1),
-    ("turned beyond the largest angle, times", |i| Some(f64::from(i.barriers)), 0),
-    ("largest lateral force, N", |i| i.largest_lateral_n, 2),
-    ("smoothness", |i| i.smoothness, 2),
-];
-
-fn compare(sheet: &mut Sheet, compared: &[&Attempt]) {
-    let mut head = vec![""];
-    head.extend(compared.iter().map(|one| one.name.as_str()));
-    if compared.len() == 2 {
-        head.push("change");
-    }
-    let rows = FIGURES.iter().map(|(words, value, decimals)| {
-        let values: Vec<Option<f64>> = compared.iter().map(|one| value(&one.figures)).collect();
-        let mut row = vec![Cell::text(*words)];
-        row.extend(values.iter().map(|v| Cell::number(*v, *decimals)));
-        if let [Some(first), Some(last)] = values[..] {
-            row.push(Cell::number(Some(last - first), *decimals));
-        } else if values.len() == 2 {
-            row.push(Cell::number(None, 0));
-        }
-        row
-    });
-    sheet.table(&head, &rows.collect::<Vec<_>>());
-}
-
-fn list(sheet: &mut Sheet, attempts: &[Attempt]) {
-    let head = [
-        "",
-        "time, s",
-        "lumen, s",
-        "path, mm",
-        "force, N",
-        "angle, ° rms",
-        "smoothness",
-        "far wall",
-        "redirections",
-    ];
-    let rows = attempts.iter().map(|one| {
-        let figures = &one.figures;
-        vec![
-            Cell::text(one.name.clone()),
-            Cell::number(Some(figures.time_s), 1),
-            Cell::number(Some(figures.in_lumen_s), 1),
-            Cell::number(Some(figures.path_mm), 1),
-            Cell::number(Some(figures.peak_force_n), 2),
-            Cell::number(figures.angle_rms_error_deg, 1),
-            Cell::number(figures.smoothness, 2),
-            Cell::text(if figures.through_far_wall { "through" } else { "" }),
-            Cell::number(Some(f64::from(figures.redirections)), 0),
-        ]
-    });
-    sheet.table(&head, &rows.collect::<Vec<_>>());
 }
 
 #[cfg(test)]

@@ -1,0 +1,40 @@
+//! The debrief of the last recording at `/debrief`. It is made of the file in a thread of its own, because a long recording takes seconds.
+
+use super::server::is_own_page;
+use axum::Router;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{Html, IntoResponse, Response};
+use axum::routing::get;
+use device_sim::failure::Failure;
+use device_sim::session::Session;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Makes the page of a recording's file.
+pub type Debrief = Arc<dyn Fn(&Path) -> Result<String, Failure> + Send + Sync>;
+
+/// Serves what `write` makes of the file that the session names as recorded last.
+pub(super) fn router(session: Session, write: Debrief) -> Router {
+    Router::new().route("/debrief", get(page).with_state((session, write)))
+}
+
+async fn page(State((session, write)): State<(Session, Debrief)>, headers: HeaderMap) -> Response {
+    if !is_own_page(&headers) {
+        return (StatusCode::FORBIDDEN, "only this computer may read the debrief").into_response();
+    }
+    let Some(file) = session.subscribe().drain().link.recorded else {
+        let what = "nothing has been recorded in the page yet; record an insertion first";
+        return (StatusCode::NOT_FOUND, what).into_response();
+    };
+    match tokio::task::spawn_blocking(move || write(Path::new(&file))).await {
+        Ok(Ok(html)) => {
+            // A report has its style and its figures in itself.
+            let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
+            let headers = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
+            (headers, Html(html)).into_response()
+        }
+        Ok(Err(failure)) => (StatusCode::UNPROCESSABLE_ENTITY, failure.to_string()).into_response(),
+        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "the debrief could not be made").into_response(),
+    }
+}
