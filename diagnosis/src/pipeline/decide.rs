@@ -1,6 +1,7 @@
 //! The fourth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
 
 use super::assess::Assessment;
+use super::contenders::contenders;
 use super::diagnosis::{Complete, Diagnosis, FreeForce, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
 use super::patched_rig::{patch, place};
 use super::prepare::Prepared;
@@ -55,6 +56,7 @@ pub(crate) fn decide(
         effects: decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse)),
         untested: untested::untested(&prepared.span, &prepared.nominal),
         hypotheses: hypotheses(&assessment.weighed),
+        contenders: contenders(prepared, assessment),
         errors: shown.table.clone(),
         bandwidth_hz: estimator.bandwidth_hz,
         noise_floor: assessment.weighed.floor,

@@ -5,6 +5,7 @@
 //! one before it returns, and changes none of it. What comes out is a [`diagnosis::Diagnosis`].
 
 mod assess;
+mod contenders;
 mod decide;
 pub(crate) mod diagnosis;
 mod patched_rig;

@@ -16,6 +16,6 @@ pub(crate) mod text;
 mod write;
 
 pub use crate::io::schema::{
-    Both, ByModel, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report, Simulation,
-    Stretch, Untested, Verdict, WindowsOff,
+    Both, ByModel, Contending, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report,
+    Simulation, Stretch, Untested, Verdict, WindowsOff,
 };
