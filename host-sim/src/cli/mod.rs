@@ -6,6 +6,7 @@ mod commission;
 mod compensate;
 mod confirm;
 mod diagnose;
+mod experiment;
 mod export;
 mod fit_force;
 mod import;
@@ -13,6 +14,7 @@ pub(crate) mod output;
 mod progress;
 mod recordings;
 mod run;
+mod settle;
 mod simulate;
 mod streams;
 mod training;
@@ -51,6 +53,8 @@ enum Command {
     Compensate(compensate::Compensate),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
+    Experiment(experiment::Experiment),
+    Settle(settle::Settle),
     Import(import::Import),
     Simulate(simulate::Simulate),
     FitForce(fit_force::FitForce),
@@ -74,6 +78,8 @@ impl Cli {
             Some(Command::Compensate(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
+            Some(Command::Experiment(command)) => command.run(),
+            Some(Command::Settle(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),
             Some(Command::Simulate(command)) => command.run(),
             Some(Command::FitForce(command)) => command.run(),
