@@ -129,9 +129,14 @@ impl Bench<'_> {
         let value = |sums: &Sums| criterion(&self.case.rivals, &sums.nats());
         let (mut parts, mut sums) = (vec![first], all[first].1.clone());
         let (mut now, mut seconds) = (value(&sums), all[first].0.seconds);
+        let travelling = all.iter().filter(|(segment, _)| segment.signal.travels());
+        let shortest_travel_s =
+            travelling.map(|(segment, _)| segment.seconds).fold(f64::INFINITY, f64::min).min(most_s);
         while parts.len() < MOST_SEGMENTS {
             let with = |(k, (segment, own)): (usize, &(Segment, Sums))| {
-                let fits = seconds + segment.seconds <= most_s && !parts.contains(&k);
+                let travels = segment.signal.travels() || parts.iter().any(|k| all[*k].0.signal.travels());
+                let reserve_s = if travels { 0.0 } else { shortest_travel_s };
+                let fits = seconds + segment.seconds + reserve_s <= most_s && !parts.contains(&k);
                 fits.then(|| (k, value(&sums.plus(own)), segment.seconds))
             };
             let Some((k, next, more_s)) = best(all.iter().enumerate().filter_map(with)) else { break };

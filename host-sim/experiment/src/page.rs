@@ -31,8 +31,9 @@ pub(crate) fn html(design: &Design) -> String {
     }
     rivals(&mut sheet, design);
     inputs(&mut sheet, design);
-    sheet.heading("What each rival would do");
+    sheet.heading("Evidence, and what each rival would do");
     sheet.figures(&[
+        evidence(design),
         motion(design, &format!("position, {}", kind.length()), |p| &p.position),
         motion(design, &format!("command, {}", design.case.rivals[0].rig.actuator.command_unit), |p| {
             &p.command
@@ -69,31 +70,48 @@ fn inputs(sheet: &mut Sheet, design: &Design) {
     let kind = design.case.rivals[0].rig.kind;
     sheet.heading("Why this input");
     let all = || std::iter::once(&design.chosen).chain(&design.runners_up);
+    let label = |place: usize| match place {
+        0 => "chosen".to_owned(),
+        place => format!("runner-up {place}"),
+    };
     let row = |(place, one): (usize, &Alternative)| {
         let nearest = one.nearest();
         vec![
-            Cell::text(if place == 0 { "chosen".to_owned() } else { format!("runner-up {place}") }),
-            Cell::text(one.input.in_words(kind.length(), kind.force())),
+            Cell::text(label(place)),
             Cell::number(Some(one.input.seconds()), 1),
             Cell::number(Some(one.criterion), 1),
             Cell::number(nearest.map(|pair| pair.nats), 1),
+            Cell::text(nearest.map_or("–".into(), |pair| format!("{}, {}", pair.truth, pair.rival))),
         ]
     };
     let rows: Vec<Vec<Cell>> = all().enumerate().map(row).collect();
-    sheet.table(&["", "input", "seconds", "expected nats, up to 50 each", "nats of the nearest pair"], &rows);
+    sheet.table(
+        &["", "seconds", "expected nats, up to 50 each", "nats of the nearest pair", "nearest pair"],
+        &rows,
+    );
+    for (place, one) in all().enumerate() {
+        sheet.note(&format!("{}: {}.", label(place), one.input.in_words(kind.length(), kind.force())));
+    }
+    let (tried, out) = design.tried;
+    sheet.note(&format!(
+        "{tried} segments were simulated with every rival; {out} left 80 % of the limits and were not considered. Among inputs within 3 % \
+         of the best, the shortest is chosen."
+    ));
+}
+
+/// The nats that the chosen input and the runners-up gather over time.
+fn evidence(design: &Design) -> (String, String) {
+    let all = std::iter::once(&design.chosen).chain(&design.runners_up);
     let curve = |(place, one): (usize, &Alternative)| Curve {
-        name: match place {
-            0 => format!("chosen: {}", one.gathered.0),
-            _ => format!("runner-up {place}: {}", one.gathered.0),
-        },
+        name: if place == 0 { "chosen".to_owned() } else { format!("runner-up {place}") },
         colour: place as u8,
         dashed: place > 0,
         points: one.gathered.1.clone(),
     };
-    let mut curves: Vec<Curve> = all().enumerate().map(curve).collect();
+    let mut curves: Vec<Curve> = all.enumerate().map(curve).collect();
     curves.reverse();
     let chart = Chart {
-        title: "Evidence for the truth, nearest pair".into(),
+        title: "Evidence for the truth, nearest pair of each".into(),
         x_label: "time, s".into(),
         y_label: "nats".into(),
         curves,
@@ -101,12 +119,7 @@ fn inputs(sheet: &mut Sheet, design: &Design) {
     };
     let caption =
         "Expected log-odds gathered after the rival was refitted; 3 nats are 20 to 1, 14 a million to 1.";
-    sheet.figures(&[(chart.svg(), caption.to_owned())]);
-    let (tried, out) = design.tried;
-    sheet.note(&format!(
-        "{tried} segments were simulated with every rival; {out} left 80 % of the limits and were not considered. Among inputs within 3 % \
-         of the best, the shortest is chosen."
-    ));
+    (chart.svg(), caption.to_owned())
 }
 
 fn motion<'a>(

@@ -35,17 +35,20 @@ fn delay_or_lag() -> Case {
 }
 
 #[test]
-fn fast_sines_tell_a_delay_from_a_lag() {
+fn fast_forces_tell_a_delay_from_a_lag() {
     let design = design(&delay_or_lag(), 12.0, 1).expect("the limits are wide");
-    let fastest = design.chosen.input.segments.iter().find_map(|segment| match &segment.signal {
-        Signal::Multisine { frequencies, .. } => frequencies.last().copied(),
-        _ => None,
-    });
-    let input = design.chosen.input.in_words("rad", "N·m");
-    assert!(fastest.is_some_and(|hertz| hertz >= 50), "{input}");
+    // Ramps end at once, which is as fast as sines of some hundred hertz.
+    let is_fast = |signal: &Signal| match signal {
+        Signal::Multisine { frequencies, .. } => frequencies.last().is_some_and(|hertz| *hertz >= 50),
+        Signal::Ramps { .. } => true,
+        _ => false,
+    };
+    let input = &design.chosen.input;
+    assert!(input.segments.iter().any(|segment| is_fast(&segment.signal)), "{input:?}");
+    assert!(input.segments.iter().any(|segment| segment.signal.travels()), "{input:?}");
     assert!(design.chosen.nearest().expect("two rivals").nats > 10.0, "{:?}", design.chosen.pairs);
     assert!(design.inseparable.is_empty());
-    assert!(design.runners_up.iter().all(|other| other.criterion <= 1.03 * design.chosen.criterion + 0.5));
+    assert!(design.runners_up.iter().all(|other| other.criterion <= 1.04 * design.chosen.criterion));
 }
 
 #[test]

@@ -186,7 +186,7 @@ fn following(
         return Ok(Err(conclusion));
     }
     if rounds >= settings.rounds {
-        return Ok(Err(format!("{rounds} rounds were played, which is the most")));
+        return Ok(Err(format!("the limit of rounds, {rounds}, was reached")));
     }
     if left_s < LEAST_ROUND_S {
         return Ok(Err(format!(

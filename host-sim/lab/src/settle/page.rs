@@ -62,8 +62,8 @@ fn html(settled: &Settled) -> String {
         format!("Named: {}", names.join(" and "))
     };
     let lead = format!(
-        "{named}, after {} rounds and {:.0} s of motion: {}.",
-        settled.rounds.len(),
+        "{named}, after {} and {:.0} s of motion: {}.",
+        rounds(settled.rounds.len()),
         settled.motion_s(),
         settled.conclusion
     );
@@ -85,6 +85,10 @@ fn html(settled: &Settled) -> String {
     }
     sheet.note("Each round's folder holds its recordings, its experiment (why this input) and its report.");
     sheet.finish()
+}
+
+fn rounds(count: usize) -> String {
+    if count == 1 { "1 round".to_owned() } else { format!("{count} rounds") }
 }
 
 /// Probabilities of the contenders over the rounds.
