@@ -8,8 +8,10 @@ use crate::library::library;
 use crate::predict::Prediction;
 use rayon::prelude::*;
 
-/// Nats beyond which more decides nothing: odds of 5e21.
+/// Nats beyond which only the logarithm of more counts: odds of 5e21, if the noise is as white as it is taken to be.
 const ENOUGH_NATS: f64 = 50.0;
+/// Relative growth of the criterion for which a segment is added.
+const PAYS: f64 = 0.1;
 /// Nats below which a pair is not told apart: odds of 20 to 1.
 const LEAST_NATS: f64 = 3.0;
 /// Relative differences of the criterion that do not count against a shorter input.
@@ -35,7 +37,7 @@ pub struct Pair {
 pub struct Alternative {
     /// The input.
     pub input: Input,
-    /// Expected nats between the truth and its nearest rival, each counted up to 50.
+    /// Expected worth of the nats between the truth and its nearest rival: nats up to 50, then their logarithm.
     pub criterion: f64,
     /// Every ordered pair.
     pub pairs: Vec<Pair>,
@@ -87,9 +89,14 @@ impl Sums {
     }
 }
 
-/// Expected nats between the truth and its nearest rival.
+/// The worth of so many nats: themselves, and beyond enough of them as much again for each factor of e.
+fn worth(nats: f64) -> f64 {
+    if nats <= ENOUGH_NATS { nats } else { ENOUGH_NATS * (1.0 + (nats / ENOUGH_NATS).ln()) }
+}
+
+/// Expected worth of the nats between the truth and its nearest rival.
 fn criterion(rivals: &[Rival], nats: &[Vec<f64>]) -> f64 {
-    let nearest = |row: &Vec<f64>| row.iter().copied().fold(ENOUGH_NATS, f64::min);
+    let nearest = |row: &Vec<f64>| worth(row.iter().copied().fold(f64::INFINITY, f64::min));
     rivals.iter().zip(nats).map(|(rival, row)| rival.probability * nearest(row)).sum()
 }
 
@@ -140,7 +147,7 @@ impl Bench<'_> {
                 fits.then(|| (k, value(&sums.plus(own)), segment.seconds))
             };
             let Some((k, next, more_s)) = best(all.iter().enumerate().filter_map(with)) else { break };
-            if next < now * (1.0 + NEARLY) + 0.1 {
+            if next < now * (1.0 + PAYS) + 0.1 {
                 break;
             }
             sums = sums.plus(&all[k].1);

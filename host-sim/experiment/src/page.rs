@@ -85,17 +85,14 @@ fn inputs(sheet: &mut Sheet, design: &Design) {
         ]
     };
     let rows: Vec<Vec<Cell>> = all().enumerate().map(row).collect();
-    sheet.table(
-        &["", "seconds", "expected nats, up to 50 each", "nats of the nearest pair", "nearest pair"],
-        &rows,
-    );
+    sheet.table(&["", "seconds", "expected worth, nats", "nats of the nearest pair", "nearest pair"], &rows);
     for (place, one) in all().enumerate() {
         sheet.note(&format!("{}: {}.", label(place), one.input.in_words(kind.length(), kind.force())));
     }
     let (tried, out) = design.tried;
     sheet.note(&format!(
         "{tried} segments were simulated with every rival; {out} left 80 % of the limits and were not considered. Among inputs within 3 % \
-         of the best, the shortest is chosen."
+         of the best, the shortest is chosen. Nats beyond 50 count by their logarithm."
     ));
 }
 

@@ -65,6 +65,7 @@ fn words_and_figures(text: &str) -> (Vec<&str>, Vec<f64>) {
     (words, figures.iter().filter_map(|figure| figure.parse().ok()).collect())
 }
 
+/// Takes 7 s: a diagnosis of 24 s at 10 kHz, and a design with three rivals.
 #[cfg(unix)]
 #[test]
 fn the_example_of_settle_prints_as_quoted() {
@@ -74,8 +75,9 @@ fn the_example_of_settle_prints_as_quoted() {
     let printed = run_in(&dir, commands);
     let here = format!("{}/", text(&dir));
     let printed: Vec<String> = printed.lines().map(|line| line.replace(&here, "/tmp/")).collect();
-    assert!(quoted.lines().count() > 4);
-    for line in quoted.lines() {
+    let quoted: Vec<&str> = quoted.lines().filter(|line| !line.is_empty()).collect();
+    assert!(quoted.len() > 4);
+    for line in quoted {
         assert!(printed.iter().any(|other| other.trim() == line.trim()), "{line}\n{printed:#?}");
     }
 }
