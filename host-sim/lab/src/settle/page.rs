@@ -1,4 +1,4 @@
-//! What was asked in each round and why, as `settle.json` and a page.
+//! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
 use super::{Round, Settled};
 use device_sim::failure::Failure;
