@@ -23,6 +23,7 @@ mod report;
 mod report_residuals;
 mod rng;
 mod scratch;
+mod settle;
 mod signal;
 mod stats;
 mod tool;
@@ -48,6 +49,9 @@ pub fn run(options: &Options) -> Result<(), String> {
     if !options.calibrate.is_empty() {
         print!("{}", calibrate::calibrate(&options.calibrate)?);
         return Ok(());
+    }
+    if options.settle {
+        return settle::run(options);
     }
     let tool: Box<dyn Tool> = match &options.tool {
         Some(line) => Box::new(tool::Program { line: line.clone(), patience: PATIENCE }),

@@ -11,6 +11,8 @@ pub struct Options {
     pub cases: Option<usize>,
     /// The small fixed run.
     pub quick: bool,
+    /// Conceal plants in the virtual device and let `host-sim settle` name them.
+    pub settle: bool,
     /// Cases that run at the same time.
     pub jobs: usize,
     /// No case begins after this many minutes; the report says how many were left.
@@ -43,6 +45,7 @@ impl Default for Options {
             seed: 1,
             cases: None,
             quick: false,
+            settle: false,
             jobs: 2,
             minutes: None,
             write: None,
@@ -86,6 +89,9 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --seed N      seed of every draw (1)
   --cases K     draws of every effect at every strength (2); pairs, nulls and the rest in proportion
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
+  --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines
+                and the set of characterise in the same time of motion; settle.json and settle.md in the folder of --out.
+                --keep DIR leaves the recordings
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
   --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
@@ -129,6 +135,10 @@ impl Options {
             }
             if flag == "--quick" {
                 options.quick = true;
+                continue;
+            }
+            if flag == "--settle" {
+                options.settle = true;
                 continue;
             }
             if !FLAGS.contains(&flag.as_str()) {

@@ -101,7 +101,14 @@ const IGNORED_UNBALANCED: f64 = 0.2;
 impl Nominal {
     /// The nominal model of a rig, before anything was found of it in recordings.
     pub(crate) fn of(rig: &Rig) -> Self {
-        Self { rig: rig.clone(), external: 0.0, anchor: None, is_balanced: false, virtual_inertia: 0.0, skew_rows: None }
+        Self {
+            rig: rig.clone(),
+            external: 0.0,
+            anchor: None,
+            is_balanced: false,
+            virtual_inertia: 0.0,
+            skew_rows: None,
+        }
     }
 
     /// Gain over inertia as the rig states it.

@@ -181,6 +181,17 @@ pub struct Hypothesis {
     pub rejected_because: Option<String>,
 }
 
+/// A model that still contends for a name: a rig in the folder `contenders` of the report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Contending {
+    /// The effect; none for the model without it.
+    pub name: Option<EffectName>,
+    /// Probability as far as these recordings tell, 0 to 1.
+    pub probability: f64,
+    /// The rig's file, from the report's folder.
+    pub rig: String,
+}
+
 /// An effect that these recordings could not show.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Untested {
@@ -246,6 +257,9 @@ pub struct Report {
     /// Effects that these recordings could not show.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub untested: Vec<Untested>,
+    /// The models that contend for the least decided name, the most probable first; empty where every name is single.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub contenders: Vec<Contending>,
     /// The gain of a force of any form in addition to the named effects.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub free_form: Option<FreeForm>,

@@ -1,6 +1,7 @@
 //! The fourth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
 
 use super::assess::Assessment;
+use super::contenders::contenders;
 use super::diagnosis::{
     Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
 };
@@ -60,6 +61,7 @@ pub(crate) fn decide(
         effects: decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse)),
         untested: untested::untested(&prepared.span, &prepared.nominal),
         hypotheses: hypotheses(&assessment.weighed),
+        contenders: contenders(prepared, assessment),
         errors: shown.table.clone(),
         moved: moved(&prepared.nominal, &shown.patched.fit),
         bandwidth_hz: estimator.bandwidth_hz,

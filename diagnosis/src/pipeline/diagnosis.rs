@@ -67,6 +67,8 @@ pub(crate) struct Complete {
     pub(crate) effects: Vec<NamedEffect>,
     /// Every hypothesis that was looked at closely, each effect once.
     pub(crate) hypotheses: Vec<JudgedHypothesis>,
+    /// The models that contend for the least decided name; none where every name is single.
+    pub(crate) contenders: Vec<Contender>,
     /// Effects that these recordings could not show, with the reason as a clause.
     pub(crate) untested: Vec<(EffectName, String)>,
     /// Force errors under the three models.
@@ -127,6 +129,16 @@ pub(crate) struct JudgedHypothesis {
     pub(crate) class: Vec<EffectName>,
     /// Why it is not named; none if it is.
     pub(crate) rejection: Option<Rejection>,
+}
+
+/// A model that still contends for a name.
+pub(crate) struct Contender {
+    /// The effect; none for the model without it.
+    pub(crate) name: Option<EffectName>,
+    /// Probability as far as these recordings tell.
+    pub(crate) probability: f64,
+    /// The whole machine with it, fitted.
+    pub(crate) rig: Rig,
 }
 
 /// The gain of a force of any form.

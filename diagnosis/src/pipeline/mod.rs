@@ -6,6 +6,7 @@
 
 mod assess;
 mod by_shares;
+mod contenders;
 mod decide;
 pub(crate) mod diagnosis;
 mod patched_rig;

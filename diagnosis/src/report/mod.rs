@@ -7,8 +7,8 @@ pub(crate) mod free_form;
 mod html;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
-pub(crate) mod outcome;
 mod notes;
+pub(crate) mod outcome;
 mod remains;
 #[cfg(test)]
 mod sentence_snapshots;
@@ -17,6 +17,6 @@ pub(crate) mod text;
 mod write;
 
 pub use crate::io::schema::{
-    Both, ByModel, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report, Simulation,
-    Stretch, Untested, Verdict, WindowsOff,
+    Both, ByModel, Contending, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report,
+    Simulation, Stretch, Untested, Verdict, WindowsOff,
 };

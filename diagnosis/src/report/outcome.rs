@@ -3,9 +3,11 @@
 use crate::effects::EffectName;
 use crate::io::recording::shown_at;
 use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, ByModel, FitTable, Hypothesis, Named, Report, Untested, Verdict};
+use crate::io::schema::{Both, ByModel, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
 use crate::numerics::digits::{in_sentence, short};
-use crate::pipeline::diagnosis::{Complete, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series};
+use crate::pipeline::diagnosis::{
+    Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
+};
 use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
@@ -58,6 +60,8 @@ pub struct Outcome {
     pub refit_rig: Rig,
     /// The rig with refitted values and the effects found.
     pub patched_rig: Rig,
+    /// The rigs of the report's contenders, in their order.
+    pub contending_rigs: Vec<Rig>,
 }
 
 /// The verdict in one sentence that a technician understands.
@@ -181,6 +185,7 @@ impl Outcome {
             unexplained_fraction: 0.0,
             hypotheses: Vec::new(),
             untested: Vec::new(),
+            contenders: Vec::new(),
             free_form: None,
             place: None,
             simulation: None,
@@ -199,11 +204,19 @@ impl Outcome {
             rate_hz,
         };
         let [nominal_rig, refit_rig, patched_rig] = [rig.clone(), rig.clone(), rig.clone()];
-        Self { report, evidence, nominal_rig, refit_rig, patched_rig, made: None }
+        let contending_rigs = Vec::new();
+        Self { report, evidence, nominal_rig, refit_rig, patched_rig, contending_rigs, made: None }
     }
 
     fn complete(diagnosis: Complete) -> Self {
         let Rigs { nominal, refit, patched } = diagnosis.rigs;
+        let contending = |(place, one): (usize, &Contender)| Contending {
+            name: one.name,
+            probability: one.probability,
+            rig: contender_file(place, one.name),
+        };
+        let contenders = diagnosis.contenders.iter().enumerate().map(contending).collect();
+        let contending_rigs = diagnosis.contenders.into_iter().map(|one| one.rig).collect();
         let kind = nominal.kind;
         let form = diagnosis.free_form.as_ref().and_then(|force| force.shape.as_ref());
         let form = form.map(|shape| free_form::sentence(shape, kind.length()));
@@ -231,6 +244,7 @@ impl Outcome {
                 .into_iter()
                 .map(|(name, because)| Untested { name, because })
                 .collect(),
+            contenders,
             reason: diagnosis.reason.map(|reason| text::reason(&reason, form.as_deref())),
             free_form: diagnosis.free_form.as_ref().map(|force| free_form::entry(force, form)),
             place: diagnosis.place,
@@ -248,7 +262,8 @@ impl Outcome {
             rig: nominal.name.clone(),
             rate_hz: diagnosis.rate_hz,
         };
-        Self { report, evidence, nominal_rig: nominal, refit_rig: refit, patched_rig: patched, made: None }
+        let [nominal_rig, refit_rig, patched_rig] = [nominal, refit, patched];
+        Self { report, evidence, nominal_rig, refit_rig, patched_rig, contending_rigs, made: None }
     }
 
     /// Ten lines for the terminal.
@@ -346,6 +361,11 @@ impl Outcome {
             }
         }
     }
+}
+
+/// The file of a contender's rig, from the report's folder.
+fn contender_file(place: usize, name: Option<EffectName>) -> String {
+    format!("contenders/{}-{}.toml", place + 1, name.map_or("none", EffectName::as_str))
 }
 
 /// A named effect as the report has it.

@@ -7,7 +7,8 @@ use std::io;
 use std::path::Path;
 
 impl Outcome {
-    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and `residuals.csv`, each whole or not at all.
+    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and `residuals.csv`, each whole or not at
+    /// all, and the rigs of the contenders in a folder `contenders`.
     pub fn write(&self, dir: &Path) -> io::Result<()> {
         std::fs::create_dir_all(dir)?;
         let json = serde_json::to_string_pretty(&self.report).map_err(io::Error::other)?;
@@ -19,6 +20,17 @@ impl Outcome {
             ("report.html", html::page(self)),
             ("diagnosis.json", json + "\n"),
         ];
+        let contenders = dir.join("contenders");
+        if contenders.exists() {
+            // Those of an earlier report in the same folder do not contend any more.
+            std::fs::remove_dir_all(&contenders)?;
+        }
+        if !self.contending_rigs.is_empty() {
+            std::fs::create_dir_all(&contenders)?;
+        }
+        for (contender, rig) in self.report.contenders.iter().zip(&self.contending_rigs) {
+            std::fs::write(dir.join(&contender.rig), rig.to_toml())?;
+        }
         for (name, text) in files {
             let half = dir.join(format!(".{name}.part"));
             std::fs::write(&half, text)?;

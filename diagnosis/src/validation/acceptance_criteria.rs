@@ -183,6 +183,8 @@ impl EffectEvidence {
 #[derive(Clone, Debug)]
 pub(crate) struct Rival {
     pub(crate) name: EffectName,
+    /// The effect with the shape that fits best.
+    pub(crate) effect: Effect,
     /// Mean lead of the winner over its standard error, over all segments.
     pub(crate) z: f64,
     /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.

@@ -114,7 +114,8 @@ impl Contest<'_> {
         }
         let last = rival.model.effects.len() - 1;
         let absence = (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
-        Rival { name: effect.name, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
+        let effect = rival.model.effects[last].clone();
+        Rival { name: effect.name, effect, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
     }
 
     /// Puts those near rivals behind that only a white noise takes for as good as the winner.

@@ -7,6 +7,7 @@ mod compensate;
 mod completions;
 mod confirm;
 mod diagnose;
+mod experiment;
 mod export;
 mod fit_force;
 mod import;
@@ -14,6 +15,7 @@ pub(crate) mod output;
 mod progress;
 mod recordings;
 mod run;
+mod settle;
 mod simulate;
 mod streams;
 mod training;
@@ -52,6 +54,8 @@ enum Command {
     Compensate(compensate::Compensate),
     Characterise(characterise::Characterise),
     Diagnose(diagnose::Diagnose),
+    Experiment(experiment::Experiment),
+    Settle(settle::Settle),
     Import(import::Import),
     Simulate(simulate::Simulate),
     FitForce(fit_force::FitForce),
@@ -76,6 +80,8 @@ impl Cli {
             Some(Command::Compensate(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
+            Some(Command::Experiment(command)) => command.run(),
+            Some(Command::Settle(command)) => command.run(),
             Some(Command::Import(command)) => command.run(),
             Some(Command::Simulate(command)) => command.run(),
             Some(Command::FitForce(command)) => command.run(),

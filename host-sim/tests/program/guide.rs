@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 const TRAINING: &str = include_str!("../../../docs/training.md");
+const SETTLE: &str = include_str!("../../../docs/settle.md");
 const GUIDE: &str = include_str!("../../../docs/diagnosis.md");
 /// The largest difference between a figure of the guide and the printed one, as a ratio.
 const FIGURES_WITHIN: f64 = 0.2;
@@ -62,6 +63,23 @@ fn words_and_figures(text: &str) -> (Vec<&str>, Vec<f64>) {
     let parts = text.split(marks).map(|part| part.trim_end_matches('.')).filter(|part| !part.is_empty());
     let (figures, words): (Vec<&str>, Vec<&str>) = parts.partition(|part| part.parse::<f64>().is_ok());
     (words, figures.iter().filter_map(|figure| figure.parse().ok()).collect())
+}
+
+/// Takes 7 s: a diagnosis of 24 s at 10 kHz, and a design with three rivals.
+#[cfg(unix)]
+#[test]
+fn the_example_of_settle_prints_as_quoted() {
+    let dir = folder("guide-settle");
+    let blocks = blocks(SETTLE, "## Example");
+    let [commands, quoted] = &blocks[..] else { panic!("{} blocks", blocks.len()) };
+    let printed = run_in(&dir, commands);
+    let here = format!("{}/", text(&dir));
+    let printed: Vec<String> = printed.lines().map(|line| line.replace(&here, "/tmp/")).collect();
+    let quoted: Vec<&str> = quoted.lines().filter(|line| !line.is_empty()).collect();
+    assert!(quoted.len() > 4);
+    for line in quoted {
+        assert!(printed.iter().any(|other| other.trim() == line.trim()), "{line}\n{printed:#?}");
+    }
 }
 
 #[cfg(unix)]

@@ -1,0 +1,171 @@
+//! A diagnosis report as the design reads it: contenders, noise, and the limits.
+
+use diagnosis::report::Report;
+use diagnosis::rig::Rig;
+use serde::Serialize;
+use std::path::Path;
+
+/// Part of each limit that an input may use.
+const MARGIN: f64 = 0.8;
+/// Contenders below this probability are left out.
+const LEAST_PROBABILITY: f64 = 0.01;
+/// The most contenders that are compared.
+const MOST_RIVALS: usize = 5;
+
+/// The limits of a machine, in the coordinate of its rig.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limits {
+    /// Largest distance from where an input begins, rad or m.
+    pub travel: f64,
+    /// rad/s or m/s.
+    pub speed: f64,
+    /// N·m or N.
+    pub force: f64,
+}
+
+impl Limits {
+    /// Returns the part of the limits that an input may use.
+    pub(crate) fn usable(self) -> Self {
+        let Self { travel, speed, force } = self;
+        Self { travel: MARGIN * travel, speed: MARGIN * speed, force: MARGIN * force }
+    }
+}
+
+/// A model that may be the truth.
+#[derive(Clone, Debug)]
+pub struct Rival {
+    /// The effect's name; `none` for the model without it.
+    pub name: String,
+    /// The effect in words.
+    pub words: String,
+    /// Probability; those of a case sum to one.
+    pub probability: f64,
+    /// The whole machine with it.
+    pub rig: Rig,
+}
+
+/// The start of a design.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// At least two, the most probable first.
+    pub rivals: Vec<Rival>,
+    /// Random force that the model leaves beyond the sensor's noise, root mean square, N·m or N.
+    pub disturbance: f64,
+    /// Bandwidth over which it was measured, Hz.
+    pub bandwidth_hz: f64,
+    /// The machine's limits.
+    pub limits: Limits,
+}
+
+impl Case {
+    /// Reads the folder that `diagnose` wrote. A limit that is not given is the most that the report's recordings did (speed,
+    /// travel) or the rig allows (force).
+    ///
+    /// # Errors
+    /// One sentence: the file, what is wrong with it, what to do.
+    pub fn read(
+        folder: &Path,
+        travel: Option<f64>,
+        speed: Option<f64>,
+        force: Option<f64>,
+    ) -> Result<Self, String> {
+        let report = report(folder)?;
+        let rivals = rivals(folder, &report)?;
+        let rig = &rivals[0].rig;
+        let shown = Shown::read(&folder.join("residuals.csv"))?;
+        let of_drive = rig.actuator.limit.map(|limit| (limit * rig.actuator.gain).abs());
+        let force = force.or(of_drive).ok_or_else(|| {
+            format!(
+                "{}: the rig declares no limit of the command; give the largest force with --force",
+                folder.display()
+            )
+        })?;
+        let limits =
+            Limits { travel: travel.unwrap_or(shown.travel), speed: speed.unwrap_or(shown.speed), force };
+        for (name, value) in [("travel", limits.travel), ("speed", limits.speed), ("force", limits.force)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("--{name} must be a number above zero; correct it"));
+            }
+        }
+        let (left, floor) = (report.fit.patched.holdout, report.noise_floor);
+        // Counting is simulated by itself; what is left beside it disturbs.
+        let disturbance = (left * left - floor * floor).max(0.01 * floor * floor).sqrt();
+        let bandwidth_hz = report.residual_bandwidth_hz.max(1.0);
+        Ok(Self { rivals, disturbance, bandwidth_hz, limits })
+    }
+
+    /// Sets the probabilities so that they sum to one.
+    pub(crate) fn normalise(rivals: &mut Vec<Rival>) {
+        rivals.retain(|rival| rival.probability >= LEAST_PROBABILITY);
+        rivals.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        rivals.truncate(MOST_RIVALS);
+        let whole: f64 = rivals.iter().map(|rival| rival.probability).sum();
+        rivals.iter_mut().for_each(|rival| rival.probability /= whole);
+    }
+}
+
+fn report(folder: &Path) -> Result<Report, String> {
+    let path = folder.join("diagnosis.json");
+    let text = std::fs::read_to_string(&path).map_err(|cause| {
+        format!(
+            "{}: the report cannot be read ({cause}); give the folder that `host-sim diagnose` wrote",
+            path.display()
+        )
+    })?;
+    serde_json::from_str(&text)
+        .map_err(|cause| format!("{}: this is no report ({cause}); diagnose again", path.display()))
+}
+
+fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
+    let one = |contender: &diagnosis::report::Contending| {
+        let rig = Rig::read(&folder.join(&contender.rig)).map_err(|error| error.to_string())?;
+        let (name, words) = match contender.name {
+            Some(name) => (name.as_str().to_owned(), name.in_words().to_owned()),
+            None => ("none".to_owned(), "none of them".to_owned()),
+        };
+        Ok(Rival { name, words, probability: contender.probability, rig })
+    };
+    let mut rivals = report.contenders.iter().map(one).collect::<Result<Vec<_>, String>>()?;
+    Case::normalise(&mut rivals);
+    if rivals.len() < 2 {
+        return Err(format!(
+            "{}: no two models contend for a name, so there is nothing to tell apart; the report's own sentence stands",
+            folder.join("diagnosis.json").display()
+        ));
+    }
+    Ok(rivals)
+}
+
+/// The motion that the report's recordings showed.
+struct Shown {
+    travel: f64,
+    speed: f64,
+}
+
+impl Shown {
+    /// Reads the residuals of a report, of which each recording has a speed at each time.
+    fn read(path: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).map_err(|cause| {
+            format!("{}: the residuals cannot be read ({cause}); diagnose again", path.display())
+        })?;
+        let mut shown = Self { travel: 0.0, speed: 0.0 };
+        let (mut file, mut before, mut place, mut low, mut high) =
+            (String::new(), 0.0, 0.0, 0.0_f64, 0.0_f64);
+        for line in text.lines().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let [name, time, velocity, ..] = cells[..] else { continue };
+            let (Ok(time), Ok(velocity)) = (time.parse::<f64>(), velocity.parse::<f64>()) else { continue };
+            if name != file {
+                (place, low, high) = (0.0, 0.0, 0.0);
+                name.clone_into(&mut file);
+            } else {
+                place += velocity * (time - before);
+            }
+            before = time;
+            (low, high) = (low.min(place), high.max(place));
+            shown.travel = shown.travel.max(high - low);
+            shown.speed = shown.speed.max(velocity.abs());
+        }
+        Ok(shown)
+    }
+}

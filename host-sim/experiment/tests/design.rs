@@ -1,0 +1,92 @@
+//! Designs for small cases whose answer is known.
+
+use diagnosis::effects::{Effect, EffectName};
+use diagnosis::rig::Rig;
+use experiment::{Case, Limits, Rival, Signal, design};
+
+/// A bare roller of a small motor.
+fn rig(effects: Vec<Effect>) -> Rig {
+    let text = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 1.2e-6\nviscous = 1e-6\ncoulomb = 4e-4\n[actuator]\ngain = 1e-5\n\
+                command_unit = \"dac\"\n[encoder]\ncounts_per_unit = 636.6\nturn = 6.283185307179586\n";
+    let mut rig = Rig::parse(text, "a test").expect("the rig is right");
+    rig.effects = effects;
+    rig
+}
+
+fn effect(name: EffectName, shape: &[(&str, f64)], coefficients: &[(&str, f64)]) -> Effect {
+    let mut effect = Effect::shaped(name, shape);
+    effect.coefficients.extend(coefficients.iter().map(|(key, value)| ((*key).to_owned(), *value)));
+    effect
+}
+
+fn rival(name: &str, probability: f64, effects: Vec<Effect>) -> Rival {
+    Rival { name: name.into(), words: name.into(), probability, rig: rig(effects) }
+}
+
+fn case(rivals: Vec<Rival>) -> Case {
+    let limits = Limits { travel: 60.0, speed: 65.0, force: 0.02 };
+    Case { rivals, disturbance: 2e-5, bandwidth_hz: 40.0, limits }
+}
+
+fn delay_or_lag() -> Case {
+    let delay = effect(EffectName::CommandDelay, &[("delay", 2e-3)], &[]);
+    let lag = effect(EffectName::ElectricalLag, &[("time_constant", 2e-3)], &[]);
+    case(vec![rival("command_delay", 0.5, vec![delay]), rival("electrical_lag", 0.5, vec![lag])])
+}
+
+#[test]
+fn fast_forces_tell_a_delay_from_a_lag() {
+    let design = design(&delay_or_lag(), 12.0, 1).expect("the limits are wide");
+    // Ramps end at once, which is as fast as sines of some hundred hertz.
+    let is_fast = |signal: &Signal| match signal {
+        Signal::Multisine { frequencies, .. } => frequencies.last().is_some_and(|hertz| *hertz >= 50),
+        Signal::Ramps { .. } => true,
+        _ => false,
+    };
+    let input = &design.chosen.input;
+    assert!(input.segments.iter().any(|segment| is_fast(&segment.signal)), "{input:?}");
+    assert!(input.segments.iter().any(|segment| segment.signal.travels()), "{input:?}");
+    assert!(design.chosen.nearest().expect("two rivals").nats > 10.0, "{:?}", design.chosen.pairs);
+    assert!(design.inseparable.is_empty());
+    assert!(design.runners_up.iter().all(|other| other.criterion <= 1.04 * design.chosen.criterion));
+}
+
+#[test]
+fn rivals_that_are_the_same_are_told_apart_by_nothing() {
+    let lag = || effect(EffectName::ElectricalLag, &[("time_constant", 2e-3)], &[]);
+    let case = case(vec![rival("one", 0.5, vec![lag()]), rival("other", 0.5, vec![lag()])]);
+    let design = design(&case, 6.0, 1).expect("the limits are wide");
+    assert!(!design.decides());
+    let sentence = design.limits_in_words().expect("a pair is inseparable");
+    assert!(sentence.contains("one from other"), "{sentence}");
+}
+
+#[test]
+fn a_rival_that_can_imitate_by_other_values_is_not_told_apart() {
+    // The same friction as a value of the rig and as an effect: unequal as they are, equal once refitted.
+    let mut less = rival("less", 0.5, Vec::new());
+    less.rig.model.coulomb = Some(3.6e-4);
+    let case = case(vec![rival("more", 0.5, Vec::new()), less]);
+    let design = design(&case, 6.0, 1).expect("the limits are wide");
+    assert!(design.chosen.nearest().expect("two rivals").nats < 3.0, "{:?}", design.chosen.pairs);
+}
+
+#[test]
+fn no_rival_leaves_the_limits_less_a_fifth() {
+    let mut case = delay_or_lag();
+    case.limits = Limits { travel: 2.0, speed: 5.0, force: 0.004 };
+    let design = design(&case, 12.0, 3).expect("some inputs are within the limits");
+    for (prediction, rival) in design.predictions.iter().zip(&design.case.rivals) {
+        let most = |column: &[f64]| column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        assert!(most(&prediction.position) <= 1.6 && most(&prediction.velocity) <= 4.0);
+        assert!(most(&prediction.command) * rival.rig.actuator.gain <= 0.0032);
+    }
+}
+
+#[test]
+fn what_may_not_move_decides_nothing() {
+    let mut case = delay_or_lag();
+    case.limits.travel = 1e-6;
+    let design = design(&case, 12.0, 1).expect("holding still is within every limit");
+    assert!(!design.decides() && design.tried.1 > 0);
+}

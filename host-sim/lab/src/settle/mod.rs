@@ -1,0 +1,347 @@
+//! `settle`: a device records, diagnoses, designs the experiment that tells the remaining rivals apart, and records again, until one
+//! name is left or nothing tells the rest apart.
+
+mod page;
+mod play;
+
+use crate::characterise::News;
+use crate::characterise::mechanism::BareDevice;
+use crate::characterise::programme::{Programme, programmes};
+use crate::characterise::{self, written};
+use device_sim::failure::Failure;
+use diagnosis::report::{Report, Verdict};
+use diagnosis::rig::Rig;
+use diagnosis::{Outcome, Request};
+use experiment::{Case, Design, Input, design};
+use play::Limited;
+use std::path::{Path, PathBuf};
+
+/// The most rounds, and the most motion of all rounds together, s.
+pub const MOST_ROUNDS: usize = 5;
+/// See [`MOST_ROUNDS`].
+pub const MOST_MOTION_S: f64 = 180.0;
+/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers, to judge.
+const INPUT_S: f64 = 16.0;
+/// The same of the first round, of which the input is general.
+const GENERAL_S: f64 = 12.0;
+/// A round that is shorter than this, s, shows nothing new.
+const LEAST_ROUND_S: f64 = 10.0;
+
+/// The source of each round's input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inputs {
+    /// Designed against the rivals of the round before.
+    Designed,
+    /// Random multisines, for comparison.
+    Multisines,
+    /// The excitations of `characterise`, shortened to the motion that is allowed, in one round, for comparison.
+    Characterise,
+}
+
+/// The mechanism that is concealed in the virtual device.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// Its rig.
+    pub rig: Rig,
+    /// The rig's file, for errors.
+    pub file: String,
+}
+
+/// The settings of a run.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The source of the inputs.
+    pub inputs: Inputs,
+    /// The most rounds.
+    pub rounds: usize,
+    /// The most motion of all rounds together, s.
+    pub motion_s: f64,
+    /// Seed of the inputs.
+    pub seed: u64,
+    /// Folder for all files.
+    pub out: PathBuf,
+}
+
+/// One round.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// The input in words.
+    pub asked: String,
+    /// Why it was asked.
+    pub why: String,
+    /// Motion of this round, s.
+    pub seconds: f64,
+    /// The sentence of the diagnosis of all recordings so far.
+    pub sentence: String,
+    /// Names that contend afterwards, with their probabilities; `none` for none of them.
+    pub contenders: Vec<(String, f64)>,
+}
+
+/// A named effect at the end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Name {
+    /// Its name.
+    pub name: String,
+    /// Names that the recordings cannot tell from it, itself included.
+    pub class: Vec<String>,
+    /// Probability that the class holds the truth.
+    pub confidence: f64,
+}
+
+/// The outcome.
+#[derive(Clone, Debug)]
+pub struct Settled {
+    /// The rounds, in order.
+    pub rounds: Vec<Round>,
+    /// The names of the last diagnosis.
+    pub names: Vec<Name>,
+    /// Why no further round follows, a sentence without its full stop.
+    pub conclusion: String,
+}
+
+impl Settled {
+    /// Motion of all rounds, s.
+    pub fn motion_s(&self) -> f64 {
+        self.rounds.iter().map(|round| round.seconds).sum()
+    }
+}
+
+/// News of a run.
+#[derive(Clone, Debug)]
+pub enum Progress<'a> {
+    /// A round begins: its number, its input and why.
+    Asked(usize, &'a str, &'a str),
+    /// Seconds played of one of its recordings.
+    Played(f64),
+    /// The diagnosis says this.
+    Said(&'a str),
+}
+
+/// A round that is to be played.
+struct Asked {
+    programmes: Vec<Programme>,
+    words: String,
+    why: String,
+    design: Option<Box<Design>>,
+}
+
+/// Settles the diagnosis of a virtual device whose mechanism is `plant` and whose simulation is `rig`. Before each recording the device
+/// rests until it is cold.
+///
+/// # Errors
+/// A sentence if an input is refused before it starts, a fault ends a recording, or files cannot be read or written.
+pub fn settle(
+    plant: &Plant,
+    rig: &Rig,
+    settings: &Settings,
+    mut progress: impl FnMut(Progress),
+) -> Result<Settled, Failure> {
+    let limited = Limited::new(rig)?;
+    let mut request = Request::default();
+    let mut settled = Settled { rounds: Vec::new(), names: Vec::new(), conclusion: String::new() };
+    let mut asked = first(&limited, rig, settings)?;
+    loop {
+        let number = settled.rounds.len() + 1;
+        let folder = settings.out.join(format!("round-{number}"));
+        progress(Progress::Asked(number, &asked.words, &asked.why));
+        if let Some(design) = &asked.design {
+            design.write(&folder.join("experiment")).map_err(Failure::failed)?;
+        }
+        record(plant, rig, &asked.programmes, &folder, &mut request, &mut progress)?;
+        let report = match diagnosed(&request, &folder.join("report")) {
+            Ok(outcome) => outcome.report,
+            Err(failure) if number == 1 => return Err(failure),
+            Err(failure) => {
+                // The names of the round before stand.
+                settled.conclusion = format!("the recordings of round {number} cannot be used: {failure}");
+                page::write(&settled, &settings.out)?;
+                return Ok(settled);
+            }
+        };
+        progress(Progress::Said(&report.sentence));
+        settled.rounds.push(round(asked, &report));
+        settled.names = names(&report);
+        match following(&limited, &report, &folder.join("report"), settings, &settled)? {
+            Ok(next) => asked = next,
+            Err(conclusion) => {
+                settled.conclusion = conclusion;
+                page::write(&settled, &settings.out)?;
+                return Ok(settled);
+            }
+        }
+    }
+}
+
+/// The round that follows, or the conclusion if none does.
+fn following(
+    limited: &Limited,
+    report: &Report,
+    folder: &Path,
+    settings: &Settings,
+    settled: &Settled,
+) -> Result<Result<Asked, String>, Failure> {
+    let (played, rounds) = (settled.motion_s(), settled.rounds.len());
+    let left_s = settings.motion_s - played;
+    if let Some(conclusion) = is_settled(report, rounds) {
+        return Ok(Err(conclusion));
+    }
+    if rounds >= settings.rounds {
+        return Ok(Err(format!("the limit of rounds, {rounds}, was reached")));
+    }
+    if left_s < LEAST_ROUND_S {
+        return Ok(Err(format!(
+            "{played:.0} s of motion were played, and {:.0} s are allowed",
+            settings.motion_s
+        )));
+    }
+    next(limited, report, folder, settings, (rounds as u64 + settings.seed, left_s))
+}
+
+/// The conclusion if each name is single, or nothing is there to be named; `rounds` were played.
+fn is_settled(report: &Report, rounds: usize) -> Option<String> {
+    let explained = matches!(report.verdict, Verdict::NoMismatch | Verdict::ParametersOnly);
+    if explained && rounds >= 2 {
+        return Some("two rounds or more leave nothing that an effect would explain".to_owned());
+    }
+    let rivals = report.contenders.iter().filter(|one| one.name.is_some()).count();
+    if rivals > 0 || matches!(report.verdict, Verdict::InsufficientExcitation) {
+        return None;
+    }
+    let names: Vec<&str> = report.effects.iter().map(|effect| effect.name.as_str()).collect();
+    Some(match names[..] {
+        [] => "no effect contends: the simulation leaves out nothing that these inputs show".to_owned(),
+        _ => format!("{} is left, and no rival", names.join(" and ")),
+    })
+}
+
+/// The next round, or why there is none; `number` seeds it and `left_s` is the motion that is left.
+fn next(
+    limited: &Limited,
+    report: &Report,
+    folder: &Path,
+    settings: &Settings,
+    (seed, left_s): (u64, f64),
+) -> Result<Result<Asked, String>, Failure> {
+    let most_s = INPUT_S.min(0.5 * left_s);
+    match settings.inputs {
+        Inputs::Characterise => {
+            Ok(Err("the set of characterise was played, shortened to the motion allowed".into()))
+        }
+        Inputs::Multisines => limited.multisine(seed, most_s).map(Ok),
+        Inputs::Designed if report.verdict == Verdict::InsufficientExcitation => {
+            limited.general("the recordings so far could not tell", most_s).map(Ok)
+        }
+        Inputs::Designed => {
+            let (travel, speed, force) = limited.limits();
+            let case = match Case::read(folder, Some(travel), Some(speed), Some(force)) {
+                Ok(case) => case,
+                Err(sentence) => return Ok(Err(sentence)),
+            };
+            let design = match design(&case, most_s, seed) {
+                Ok(design) => design,
+                Err(sentence) => return Ok(Err(sentence)),
+            };
+            if !design.decides() {
+                let sentence = design.limits_in_words().unwrap_or_default();
+                return Ok(Err(sentence));
+            }
+            limited.designed(design).map(Ok)
+        }
+    }
+}
+
+fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Failure> {
+    match settings.inputs {
+        Inputs::Designed => {
+            limited.general("no recording yet: speeds, reversals and frequencies of every kind", GENERAL_S)
+        }
+        Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.motion_s)),
+        Inputs::Characterise => limited.checked(Asked {
+            programmes: shortened(programmes(rig, limited.radius_mm()), settings.motion_s),
+            words: "the excitations of characterise".into(),
+            why: "the set that characterise plays".into(),
+            design: None,
+        }),
+    }
+}
+
+/// Programmes with each step shortened so that all last `most_s` together.
+fn shortened(mut all: Vec<Programme>, most_s: f64) -> Vec<Programme> {
+    let whole: f64 = all.iter().map(Programme::seconds).sum();
+    let part = (most_s / whole).min(1.0);
+    for step in all.iter_mut().flat_map(|programme| &mut programme.steps) {
+        step.excitation.duration_ms = (f64::from(step.excitation.duration_ms) * part) as u32;
+    }
+    all
+}
+
+/// Plays programmes and writes the recordings, which the next diagnosis reads together with those before.
+fn record(
+    plant: &Plant,
+    rig: &Rig,
+    programmes: &[Programme],
+    folder: &Path,
+    request: &mut Request,
+    progress: &mut impl FnMut(Progress),
+) -> Result<(), Failure> {
+    let mut tracks = Vec::new();
+    for programme in programmes {
+        let mut device = BareDevice::new(&plant.rig, &plant.file)?;
+        let one = std::slice::from_ref(programme);
+        tracks.extend(characterise::on_virtual(&mut device, one, |news| {
+            if let News::Played(seconds) = news {
+                progress(Progress::Played(seconds));
+            }
+        })?);
+    }
+    let paths = written::write_all(folder, &tracks)?;
+    for path in &paths[1..] {
+        let is_holdout = path.file_name().is_some_and(|name| name == "holdout.csv");
+        let to = if is_holdout { &mut request.holdout } else { &mut request.fit };
+        to.push(path.clone());
+    }
+    // Not the rig of the data sheets but the simulation as its author believes it.
+    request.rig = paths[0].clone();
+    std::fs::write(&request.rig, rig.to_toml()).map_err(|cause| {
+        Failure::failed(format_args!(
+            "{}: the rig cannot be written ({cause}); free some space or choose another --out",
+            request.rig.display()
+        ))
+    })
+}
+
+fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Failure> {
+    let outcome = diagnosis::diagnose(request, &|_, _| {}).map_err(Failure::failed)?;
+    outcome.write(folder).map_err(|cause| {
+        Failure::failed(format_args!(
+            "{}: the report cannot be written ({cause}); free some space or choose another --out",
+            folder.display()
+        ))
+    })?;
+    Ok(outcome)
+}
+
+fn round(asked: Asked, report: &Report) -> Round {
+    let name = |name: Option<diagnosis::effects::EffectName>| name.map_or("none", |name| name.as_str());
+    Round {
+        seconds: asked.programmes.iter().map(Programme::seconds).sum(),
+        asked: asked.words,
+        why: asked.why,
+        sentence: report.sentence.clone(),
+        contenders: report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect(),
+    }
+}
+
+fn names(report: &Report) -> Vec<Name> {
+    let one = |effect: &diagnosis::report::Named| Name {
+        name: effect.name.to_string(),
+        class: effect.class.iter().map(ToString::to_string).collect(),
+        confidence: effect.confidence,
+    };
+    report.effects.iter().map(one).collect()
+}
+
+/// An input in words, for a rotary rig.
+fn in_words(input: &Input) -> String {
+    input.in_words("rad", "N·m")
+}

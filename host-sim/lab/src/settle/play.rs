@@ -1,0 +1,183 @@
+//! Inputs of the design as excitations of the device, within its limits.
+
+use super::{Asked, in_words};
+use crate::characterise::programme::{Programme, Step, servo};
+use crate::characterise::{self, configuration};
+use control_core::Config;
+use control_core::excitation::{self, Excitation, Servo};
+use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use device_sim::failure::Failure;
+use diagnosis::rig::Rig;
+use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
+use fixed::types::I16F16;
+
+/// Largest distance from where an input begins, and largest speed, along the roller: those of `characterise`.
+const TRAVEL_MM: f64 = 600.0;
+const SPEED_MM_PER_S: f64 = 650.0;
+
+/// Strokes before random multisines, s.
+const STROKES_S: f64 = 3.0;
+
+/// A device's limits, and what turns an input into excitations within them.
+pub(super) struct Limited {
+    config: Config,
+    radius_mm: f64,
+    torque: f64,
+    servo: Servo,
+    dry: f64,
+}
+
+impl Limited {
+    pub(super) fn new(rig: &Rig) -> Result<Self, Failure> {
+        let config = configuration();
+        let hello = characterise::scale(&config)?;
+        let radius_mm = hello.roller_radius_mm;
+        Ok(Self {
+            radius_mm,
+            torque: config.device.limits.torque.0.to_num::<f64>() * 1e-3,
+            servo: servo(rig.model.inertia, radius_mm),
+            dry: rig.model.coulomb.unwrap_or(4.0e-4),
+            config,
+        })
+    }
+
+    pub(super) fn radius_mm(&self) -> f64 {
+        self.radius_mm
+    }
+
+    /// Travel in rad, speed in rad/s and torque in N·m.
+    pub(super) fn limits(&self) -> (f64, f64, f64) {
+        (TRAVEL_MM / self.radius_mm, SPEED_MM_PER_S / self.radius_mm, self.torque)
+    }
+
+    /// A round of some of everything.
+    pub(super) fn general(&self, why: &str, most_s: f64) -> Result<Asked, Failure> {
+        let rad = |mm: f64| mm / self.radius_mm;
+        let part = most_s / 12.0;
+        let segment = |signal, seconds: f64| Segment { signal, seconds: seconds * part };
+        let frequencies = vec![3, 5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281];
+        let input = Input {
+            segments: vec![
+                segment(Signal::Staircase { slowest: rad(5.0), ratio: 2.2, steps: 6, dwell_s: 0.4 }, 4.8),
+                segment(Signal::Ladder { smallest: rad(0.06), ratio: 2.0, steps: 8, speed: rad(12.0) }, 4.2),
+                segment(Signal::Multisine { force: self.dry, frequencies }, 3.0),
+            ],
+        };
+        self.of_input(&input, why.to_owned(), None)
+    }
+
+    /// A round of a random multisine.
+    pub(super) fn multisine(&self, seed: u64, most_s: f64) -> Result<Asked, Failure> {
+        let (travel, speed, force) = self.limits();
+        // A recording that travels nowhere is refused, so strokes precede the sines.
+        let stroke = Signal::Triangle { stroke: 0.1 * travel, speed: 0.1 * speed };
+        let strokes = Segment { signal: stroke, seconds: STROKES_S };
+        let limits = Limits { travel, speed, force };
+        let sines = random_multisine(&limits, self.dry, seed, most_s - STROKES_S);
+        self.of_input(&Input { segments: vec![strokes, sines] }, "a random multisine".into(), None)
+    }
+
+    /// A round of a designed input.
+    pub(super) fn designed(&self, design: Design) -> Result<Asked, Failure> {
+        let why = design.chosen.nearest().map_or(String::new(), |pair| {
+            format!(
+                "of {} inputs it best tells {} rivals apart; the nearest pair, {} and {}, by {:.0} nats",
+                design.tried.0,
+                design.case.rivals.len(),
+                pair.truth,
+                pair.rival,
+                pair.nats
+            )
+        });
+        let input = design.chosen.input.clone();
+        self.of_input(&input, why, Some(Box::new(design)))
+    }
+
+    /// An input twice: once to fit, once with other numbers to judge.
+    fn of_input(&self, input: &Input, why: String, design: Option<Box<Design>>) -> Result<Asked, Failure> {
+        let programme = |file, input: &Input| {
+            let steps = input.segments.iter().map(|segment| self.step(segment)).collect();
+            Programme { file, steps }
+        };
+        let programmes = vec![programme("fit.csv", input), programme("holdout.csv", &input.varied())];
+        self.checked(Asked { programmes, words: in_words(input), why, design })
+    }
+
+    /// The same, if the device may play it: it is refused here, before anything moves.
+    pub(super) fn checked(&self, asked: Asked) -> Result<Asked, Failure> {
+        characterise::check(&self.config, &asked.programmes)?;
+        Ok(asked)
+    }
+
+    fn step(&self, segment: &Segment) -> Step {
+        let mm = |rad: f64| I16F16::saturating_from_num(rad * self.radius_mm);
+        let torque = |newton_metres: f64| MillinewtonMetres(I16F16::saturating_from_num(newton_metres * 1e3));
+        let ms = |seconds: f64| (seconds * 1e3).round().clamp(0.0, 65_535.0) as u16;
+        let signal = match &segment.signal {
+            Signal::Staircase { slowest, ratio, steps, dwell_s } => excitation::Signal::SpeedStaircase {
+                slowest: MillimetresPerSecond(mm(*slowest)),
+                ratio: I16F16::saturating_from_num(*ratio),
+                steps: *steps,
+                dwell_ms: ms(*dwell_s),
+            },
+            Signal::Triangle { stroke, speed } => excitation::Signal::Triangle {
+                stroke: Millimetres(mm(*stroke)),
+                speed: MillimetresPerSecond(mm(*speed)),
+            },
+            Signal::Ladder { smallest, ratio, steps, speed } => excitation::Signal::ReversalLadder {
+                smallest: Millimetres(mm(*smallest)),
+                ratio: I16F16::saturating_from_num(*ratio),
+                steps: *steps,
+                speed: MillimetresPerSecond(mm(*speed)),
+            },
+            Signal::Multisine { force, frequencies } => excitation::Signal::Multisine {
+                torque: torque(*force),
+                frequencies: frequencies.iter().copied().take(excitation::MAX_LINES).collect(),
+            },
+            Signal::Ramps { force, ramp_s } => {
+                excitation::Signal::BreakawayRamps { torque: torque(*force), ramp_ms: ms(*ramp_s) }
+            }
+            Signal::Hold => excitation::Signal::Hold,
+        };
+        let excitation = Excitation {
+            signal,
+            duration_ms: (segment.seconds * 1e3).round() as u32,
+            servo: self.servo,
+            travel: Millimetres(I16F16::from_num(TRAVEL_MM)),
+            compensated: false,
+        };
+        Step { excitation, prompt: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::characterise::written::nominal_rig;
+
+    fn limited() -> Limited {
+        let hello = characterise::scale(&configuration()).expect("the configuration is sound");
+        Limited::new(&nominal_rig(&hello)).expect("the configuration is sound")
+    }
+
+    #[test]
+    fn an_input_beyond_the_torque_ceiling_is_refused() {
+        let limited = limited();
+        let signal = Signal::Ramps { force: 1.1 * limited.torque, ramp_s: 0.5 };
+        let input = Input { segments: vec![Segment { signal, seconds: 2.0 }] };
+        let refused = limited.of_input(&input, String::new(), None).err().expect("it is refused");
+        assert!(refused.to_string().starts_with("this excitation is refused: "), "{refused}");
+    }
+
+    #[test]
+    fn an_input_beyond_the_travel_is_refused() {
+        let limited = limited();
+        let (travel, speed, _) = limited.limits();
+        let signal = Signal::Triangle { stroke: 1.2 * travel, speed };
+        let input = Input { segments: vec![Segment { signal, seconds: 2.0 }] };
+        assert!(limited.of_input(&input, String::new(), None).is_err());
+        let general = limited.general("", 12.0).expect("the first round is within the limits");
+        let seconds: f64 = general.programmes.iter().map(Programme::seconds).sum();
+        assert!((seconds - 24.0).abs() < 0.01, "{seconds} s");
+    }
+}

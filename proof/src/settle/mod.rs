@@ -1,0 +1,253 @@
+//! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside it, in the same time of motion, random
+//! multisines and the set of `characterise`.
+
+mod plants;
+mod table;
+
+use crate::options::Options;
+use crate::pool;
+use crate::stats::Rate;
+use plants::{Base, Kind, Plant};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Plants that are drawn where nobody says how many.
+const PLANTS: usize = 20;
+/// A confidence from which a name is sure.
+const SURE: f64 = 0.9;
+/// The least motion that the others get, s: `host-sim settle` takes no less.
+const LEAST_MOTION_S: f64 = 20.0;
+
+/// The sources of inputs, the judged one first.
+const ARMS: [&str; 3] = ["designed", "multisines", "characterise"];
+
+/// The answer of one run of `host-sim settle`.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Answer {
+    /// Names with their class and confidence.
+    names: Vec<(Vec<String>, f64)>,
+    rounds: usize,
+    motion_s: f64,
+    /// Why there is no answer.
+    error: Option<String>,
+}
+
+/// A plant with the answer of each arm.
+struct Judged {
+    kind: Kind,
+    name: &'static str,
+    answers: Vec<Answer>,
+}
+
+impl Answer {
+    /// Reads `settle.json`.
+    fn parse(text: &str) -> Option<Self> {
+        let value: Value = serde_json::from_str(text).ok()?;
+        let one = |name: &Value| {
+            let class = name["class"].as_array()?.iter().filter_map(|n| Some(n.as_str()?.to_owned()));
+            Some((class.collect(), name["confidence"].as_f64()?))
+        };
+        Some(Self {
+            names: value["names"].as_array()?.iter().map(one).collect::<Option<_>>()?,
+            rounds: value["rounds"].as_array()?.len(),
+            motion_s: value["motion_s"].as_f64()?,
+            error: None,
+        })
+    }
+
+    /// True if the one name that is given is the true one, alone in its class.
+    fn is_right(&self, truth: &str) -> bool {
+        self.error.is_none() && self.names.len() == 1 && self.names[0].0 == [truth.to_owned()]
+    }
+
+    /// True if a class without the true name is given as sure.
+    fn is_surely_wrong(&self, truth: &str) -> bool {
+        self.names.iter().any(|(class, sure)| *sure >= SURE && !class.iter().any(|name| name == truth))
+    }
+}
+
+/// Figures of one arm.
+#[derive(Clone, Debug, Default)]
+struct Figures {
+    twins: Rate,
+    singles: Rate,
+    /// The true name is in the class of a name.
+    in_class: Rate,
+    wrong: Rate,
+    nulls_named: Rate,
+    outside_named: Rate,
+    rounds: Vec<f64>,
+    motion_s: Vec<f64>,
+    errors: usize,
+}
+
+impl Figures {
+    fn add(&mut self, plant: &Judged, answer: &Answer) {
+        match plant.kind {
+            Kind::Twin => self.twins.add(answer.is_right(plant.name)),
+            Kind::Single => self.singles.add(answer.is_right(plant.name)),
+            Kind::Null => self.nulls_named.add(!answer.names.is_empty()),
+            Kind::Outside => self.outside_named.add(!answer.names.is_empty()),
+        }
+        if !plant.name.is_empty() {
+            let holds = |(class, _): &(Vec<String>, f64)| class.iter().any(|name| name == plant.name);
+            self.in_class.add(answer.names.iter().any(holds));
+        }
+        self.wrong.add(answer.is_surely_wrong(plant.name));
+        self.errors += usize::from(answer.error.is_some());
+        if answer.error.is_none() {
+            self.rounds.push(answer.rounds as f64);
+            self.motion_s.push(answer.motion_s);
+        }
+    }
+}
+
+/// Draws the plants, lets each be settled, and writes `settle.json` and `settle.md`.
+pub(crate) fn run(options: &Options) -> Result<(), String> {
+    let program = program()?;
+    let out = options.out.join("settle");
+    std::fs::create_dir_all(&out).map_err(|e| format!("cannot create {}: {e}", out.display()))?;
+    let base = base(&program, &out)?;
+    let count = options.cases.unwrap_or(PLANTS);
+    let plants: Vec<(usize, Plant)> =
+        (0..count).map(|index| (index, plants::draw(&base, options.seed, index))).collect();
+    let judged = pool::map(options.jobs, options.budget(), "settled", &plants, |(index, plant)| {
+        let folder = out.join(format!("plant-{index}"));
+        let answers = settle(&program, plant, options.seed + *index as u64, &folder);
+        if options.keep.is_none() {
+            // Recordings of a plant take 100 MB.
+            let _ = std::fs::remove_dir_all(&folder);
+        }
+        Judged { kind: plant.kind, name: plant.name, answers }
+    });
+    let judged: Vec<Judged> = judged.into_iter().flatten().collect();
+    let text = table::markdown(&judged, options.seed, count);
+    print!("{text}");
+    let all: Vec<Value> = judged.iter().map(json_of).collect();
+    let json = json!({ "seed": options.seed, "drawn": count, "plants": all });
+    for (name, text) in [("settle.md", text), ("settle.json", format!("{json:#}\n"))] {
+        let path = options.out.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn json_of(plant: &Judged) -> Value {
+    let answer = |(arm, answer): (&&str, &Answer)| {
+        let names: Vec<Value> =
+            answer.names.iter().map(|(class, sure)| json!({ "class": class, "confidence": sure })).collect();
+        json!({
+            "arm": arm,
+            "names": names,
+            "rounds": answer.rounds,
+            "motion_s": answer.motion_s,
+            "error": answer.error,
+        })
+    };
+    let answers: Vec<Value> = ARMS.iter().zip(&plant.answers).map(answer).collect();
+    json!({ "kind": plant.kind.words(), "truth": plant.name, "answers": answers })
+}
+
+/// `host-sim`, beside this program.
+fn program() -> Result<PathBuf, String> {
+    let own = std::env::current_exe().map_err(|e| format!("the program's own folder is unknown: {e}"))?;
+    let path = own.with_file_name(format!("host-sim{}", std::env::consts::EXE_SUFFIX));
+    if path.exists() {
+        return Ok(path);
+    }
+    Err(format!("{} is missing: build it first, with `cargo build --release --workspace`", path.display()))
+}
+
+/// The rig of the device without anything concealed.
+fn base(program: &Path, out: &Path) -> Result<Base, String> {
+    let folder = out.join("base");
+    let run = Command::new(program).args(["--quiet", "characterise", "--out"]).arg(&folder).output();
+    let run = run.map_err(|e| format!("{} cannot be started: {e}", program.display()))?;
+    if !run.status.success() {
+        return Err(format!("characterise: {}", String::from_utf8_lossy(&run.stderr).trim()));
+    }
+    let path = folder.join("rig.toml");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
+    Base::parse(&text)
+}
+
+/// The answer of each arm on one plant; the others move as long as the judged one did.
+fn settle(program: &Path, plant: &Plant, seed: u64, folder: &Path) -> Vec<Answer> {
+    let mut motion_s = f64::INFINITY;
+    let mut answers = Vec::new();
+    for arm in ARMS {
+        let answer = answer(program, plant, seed, &folder.join(arm), arm, motion_s)
+            .unwrap_or_else(|error| Answer { error: Some(error), ..Answer::default() });
+        if answers.is_empty() && answer.error.is_none() {
+            motion_s = answer.motion_s;
+        }
+        answers.push(answer);
+    }
+    answers
+}
+
+fn answer(
+    program: &Path,
+    plant: &Plant,
+    seed: u64,
+    folder: &Path,
+    arm: &str,
+    motion_s: f64,
+) -> Result<Answer, String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))?;
+    let concealed = folder.with_file_name("concealed.toml");
+    std::fs::write(&concealed, &plant.toml)
+        .map_err(|e| format!("cannot write {}: {e}", concealed.display()))?;
+    let mut command = Command::new(program);
+    command.args(["--quiet", "settle", "--inputs", arm, "--seed"]).arg(seed.to_string());
+    command.arg("--plant").arg(&concealed).arg("--out").arg(folder);
+    if motion_s.is_finite() {
+        command.arg("--motion").arg(motion_s.max(LEAST_MOTION_S).to_string());
+    }
+    let run = command.output().map_err(|e| format!("{} cannot be started: {e}", program.display()))?;
+    if !run.status.success() {
+        return Err(String::from_utf8_lossy(&run.stderr).trim().to_owned());
+    }
+    let text =
+        std::fs::read_to_string(folder.join("settle.json")).map_err(|e| format!("no settle.json: {e}"))?;
+    Answer::parse(&text).ok_or_else(|| "settle.json is not of the form expected".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(classes: &[&[&str]], confidence: f64) -> Answer {
+        let class = |class: &&[&str]| (class.iter().map(|name| (*name).to_owned()).collect(), confidence);
+        Answer { names: classes.iter().map(class).collect(), rounds: 2, motion_s: 48.0, error: None }
+    }
+
+    #[test]
+    fn only_the_true_name_alone_is_right() {
+        assert!(answer(&[&["cogging"]], 0.95).is_right("cogging"));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_right("cogging"));
+        assert!(!answer(&[&["cogging"], &["command_delay"]], 0.95).is_right("cogging"));
+        assert!(!answer(&[], 0.0).is_right("cogging"));
+    }
+
+    #[test]
+    fn a_name_is_surely_wrong_if_its_class_lacks_the_truth() {
+        assert!(answer(&[&["cogging"]], 0.95).is_surely_wrong("torque_ripple"));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_surely_wrong("torque_ripple"));
+        assert!(!answer(&[&["cogging"]], 0.85).is_surely_wrong("torque_ripple"));
+        assert!(
+            answer(&[&["cogging"]], 0.95).is_surely_wrong(""),
+            "any sure name is wrong where nothing is concealed"
+        );
+    }
+
+    #[test]
+    fn an_answer_is_read_as_settle_writes_it() {
+        let text = r#"{ "names": [{ "name": "cogging", "class": ["cogging"], "confidence": 0.97 }],
+                        "rounds": [{}, {}], "motion_s": 48.0, "conclusion": "" }"#;
+        let read = Answer::parse(text).expect("it is whole");
+        assert_eq!(read, answer(&[&["cogging"]], 0.97));
+        assert_eq!(Answer::parse("{}"), None);
+    }
+}
