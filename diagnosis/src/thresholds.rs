@@ -120,7 +120,7 @@ pub(crate) const AT_END: f64 = 0.05;
 /// Part of what the refit leaves that swings at a frequency of its own and that effects have taken on, from which they count as mistaken for it.
 pub(crate) const MISTAKEN: f64 = 0.2;
 
-/// What a model leaves over what reading whole counts makes of it, from which other physics and not noise limits and shares decide: it
+/// Residual of a model, over that of a motion read in whole counts, from which other physics limits, not noise, and shares decide: it
 /// is 1.9 in the median on generated nulls and 22 on axes of real machines (`docs/diagnosis-design.md`).
 pub(crate) const LIMITED_BY_PHYSICS: f64 = 3.0;
 /// Part of the force error, root mean square, on stretches left out of the fit and on held-out recordings, from which an effect joins
@@ -131,7 +131,7 @@ pub(crate) const TAKEN_SHARE: f64 = 0.2;
 pub(crate) const NAMED_SHARE: f64 = 0.29;
 /// Factors between its sizes on held-out and on fitted recordings: in the same cases, two of the ten wrong names were outside.
 pub(crate) const SAME_SIZE_OF_SHARE: Range<f64> = 0.6..1.67;
-/// Part of what an effect leaves that a force of any form over the motion must leave in its place: where the form leaves less, the law is
+/// Part of what an effect leaves that a force of any form over the motion must leave if it replaces the effect: if the form leaves less, the law is
 /// another one. Of 30 right names in cases as above the least was 0.82, but for a lag with 0.6.
 pub(crate) const FORM_LEAVES: f64 = 0.8;
 /// Part of what an effect leaves by which a rival may leave more and still join its class.

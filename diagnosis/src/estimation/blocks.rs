@@ -6,7 +6,7 @@
 
 use crate::estimation::input::Input;
 use crate::estimation::reading_lag::LagStep;
-use crate::estimation::skew;
+use crate::estimation::skew_columns;
 use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -58,9 +58,9 @@ pub(crate) struct Rows {
     pub(crate) command: Vec<f64>,
     /// The input of the command over each block.
     pub(crate) command_input: Input,
-    /// What the command's input changes by per row that it acts late.
+    /// Change of the command's input per row that it acts late.
     pub(crate) lateness_input: Input,
-    /// What it changes by where a command acts in part in the rows before and after its own.
+    /// Change of the command's input per part of it that acts in the row before and as much in the row after.
     pub(crate) spread_input: Input,
     /// Rows taken together for a resonance or a contact, and for a grip.
     pub(crate) of_contact: Slices,
@@ -115,8 +115,8 @@ impl Rows {
     /// The same rows with another command.
     pub(crate) fn with_command(self, command: Vec<f64>) -> Self {
         let command_input = self.input(&command);
-        let lateness_input = self.input(&skew::per_row_late(&command));
-        let spread_input = self.input(&skew::per_part_spread(&command));
+        let lateness_input = self.input(&skew_columns::per_row_late(&command));
+        let spread_input = self.input(&skew_columns::per_part_spread(&command));
         Self { command, command_input, lateness_input, spread_input, ..self }
     }
 

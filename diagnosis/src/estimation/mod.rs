@@ -17,5 +17,6 @@ pub(crate) mod reading_lag;
 pub(crate) mod refit;
 pub(crate) mod regressors;
 pub(crate) mod skew;
+pub(crate) mod skew_columns;
 pub(crate) mod slices;
 pub(crate) mod smoother;

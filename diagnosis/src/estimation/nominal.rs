@@ -4,7 +4,7 @@ use crate::effects::EffectName;
 use crate::effects::definition::{Allowed, NominalTerm};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
-use crate::estimation::skew;
+use crate::estimation::skew_columns;
 use crate::io::rig::Rig;
 use crate::numerics::linear::Prior;
 
@@ -189,8 +189,8 @@ impl Nominal {
                 };
                 Prior { mean: rig.model.offset.unwrap_or(0.0) / j, sd, ..Prior::FREE }
             }
-            Key::Skew => skew::prior(self.known_gain(), self.skew_rows.unwrap_or(0.0)),
-            Key::Spread => skew::prior_of_spread(self.known_gain()),
+            Key::Skew => skew_columns::prior(self.known_gain(), self.skew_rows.unwrap_or(0.0)),
+            Key::Spread => skew_columns::prior_of_spread(self.known_gain()),
             Key::External => Prior { mean: self.external / j, sd: 0.5 / j, ..Prior::FREE },
             Key::Term { .. } => Prior::FREE,
         }

@@ -1,5 +1,6 @@
 //! The skew between command and reading: a log may store a command up to a row before or after the time at which it acts, and a
-//! simulation that integrates by Euler's method is half a row early or late. Every model has it, so that no effect has to explain it.
+//! simulation that integrates by Euler's method is half a row early or late. If that is most of what the nominal model leaves, every model
+//! allows for it, so that no effect has to explain it.
 //!
 //! Large skews shift the commands themselves; what is left is a column of the linear fit, and so is what happens within a row: a
 //! command may change there, or act all at once.
@@ -8,51 +9,22 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::effective_command::delayed;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
+use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::{Key, Nominal};
-use crate::numerics::linear::Prior;
+use crate::estimation::skew_columns::MOST_ROWS;
 
-/// Largest skew, rows: a command that is farther off is late for another reason.
-const MOST_ROWS: f64 = 1.0;
-/// Largest part that acts in the row before or after.
-const MOST_SPREAD: f64 = 0.25;
-/// Standard deviation of a skew before anything is known, rows.
-const SD_ROWS: f64 = 0.5;
 /// Gain in log-likelihood from which there is a skew, nats.
 const SEEN: f64 = 6.0;
 /// Part of the largest skew from which it is at its limit.
 const AT_LIMIT: f64 = 0.98;
+/// Part of the mean square above the noise of the sensor that a skew may leave. Other physics, and commands that a loop makes of noise,
+/// show false skews, which leave most of it.
+const MOST_LEFT: f64 = 0.5;
 /// Rounds of shifting the commands and fitting what is left.
 const ROUNDS: usize = 3;
 /// A skew that changes by less is found, rows.
 const FOUND: f64 = 0.01;
-
-/// Change of a command, held row by row, per row that it acts late.
-pub(crate) fn per_row_late(command: &[f64]) -> Vec<f64> {
-    let last = command.len().saturating_sub(1);
-    (0..command.len()).map(|k| 0.5 * (command[k.saturating_sub(1)] - command[(k + 1).min(last)])).collect()
-}
-
-/// Change of a command, held row by row, per part of it that acts in the row before and as much in the row after.
-pub(crate) fn per_part_spread(command: &[f64]) -> Vec<f64> {
-    let last = command.len().saturating_sub(1);
-    (0..command.len())
-        .map(|k| command[k.saturating_sub(1)] - 2.0 * command[k] + command[(k + 1).min(last)])
-        .collect()
-}
-
-/// The prior of a spread. A command that is put off by half a row as the mean over each row is spread by 1/4, where it changes
-/// within the row by 1/8, and where it acts at once, as Euler's method has it, by none.
-pub(crate) fn prior_of_spread(gain: f64) -> Prior {
-    let most = MOST_SPREAD * gain.abs();
-    Prior { mean: 0.0, sd: 0.5 * most, low: -most, high: most }
-}
-
-/// The prior of the column's coefficient where commands were put off by `rows` already: all together is about zero.
-pub(crate) fn prior(gain: f64, rows: f64) -> Prior {
-    let (a, b) = ((-MOST_ROWS - rows) * gain, (MOST_ROWS - rows) * gain);
-    Prior { mean: -rows * gain, sd: SD_ROWS * gain.abs(), low: a.min(b), high: a.max(b) }
-}
 
 /// Puts the commands of recordings off by a number of their rows.
 pub(crate) fn put_off(tracks: &mut [BlockedRecording], rows: f64) {
@@ -75,25 +47,38 @@ pub(crate) fn row_s(track: &BlockedRecording) -> f64 {
 }
 
 /// Finds the skew of recordings under the nominal model and puts their commands off by it. Nothing changes where the
-/// recordings show none, or more than a row.
-pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise) {
-    let without = Fit::new(&Model::default(), nominal, tracks, noise).log_likelihood;
+/// recordings show none or more than a row, or where a skew is not most of what the nominal model leaves.
+pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise, scale: f64) {
+    let without = Fit::new(&Model::default(), nominal, tracks, noise);
     let mut trial = Nominal { skew_rows: Some(0.0), ..nominal.clone() };
     let mut shifted = tracks.to_vec();
+    let mut fit = Fit::new(&Model::default(), &trial, &shifted, noise);
+    if fit.log_likelihood - without.log_likelihood < SEEN {
+        return;
+    }
     for _ in 0..ROUNDS {
-        let fit = Fit::new(&Model::default(), &trial, &shifted, noise);
         let (Some(skew), Some(gain)) = (fit.value(Key::Skew), fit.value(Key::Gain)) else { return };
-        let before = trial.skew_rows.unwrap_or(0.0);
-        let step = skew / gain;
-        if fit.log_likelihood - without < SEEN || (before + step).abs() > AT_LIMIT * MOST_ROWS {
+        let (before, step) = (trial.skew_rows.unwrap_or(0.0), skew / gain);
+        if (before + step).abs() > AT_LIMIT * MOST_ROWS {
             return;
         }
         trial.skew_rows = Some(before + step);
         put_off(&mut shifted, step);
+        fit = Fit::new(&Model::default(), &trial, &shifted, noise);
         if step.abs() < FOUND {
             break;
         }
     }
-    tracks.clone_from_slice(&shifted);
-    nominal.skew_rows = trial.skew_rows;
+    let estimator = Estimator::new(tracks, noise, scale);
+    let count = 1.0 / nominal.rig.encoder.counts_per_unit;
+    let left = |fit: &Fit, tracks: &[BlockedRecording]| {
+        let totals = fit.totals(tracks);
+        let residuals: Vec<Vec<f64>> =
+            tracks.iter().zip(&totals).map(|(track, total)| estimator.residual(track, total)).collect();
+        estimator.rms(&residuals, tracks).powi(2) - estimator.counting(tracks, noise, count).powi(2)
+    };
+    if left(&fit, &shifted) < MOST_LEFT * left(&without, tracks) {
+        tracks.clone_from_slice(&shifted);
+        nominal.skew_rows = trial.skew_rows;
+    }
 }

@@ -243,7 +243,7 @@ pub struct Report {
     /// Rows by which commands act after their time stamps, -1 to 1; none where the recordings show no skew.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub command_late_rows: Option<f64>,
-    /// What the refit did that a reader has to know, each a clause.
+    /// Clauses that say what the refit did that a reader has to know.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub notes: Vec<String>,
     /// Bandwidth of the residuals, Hz.

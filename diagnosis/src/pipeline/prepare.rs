@@ -51,7 +51,8 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
     progress("refitting the nominal model", 0.1);
     let (mut noise, mut refit) = refit::settle(&mut nominal, &mut tracks);
     if nominal.virtual_inertia == 0.0 {
-        skew::settle(&mut nominal, &mut tracks, &noise);
+        let scale = refit::acceleration_scale(&nominal, &tracks);
+        skew::settle(&mut nominal, &mut tracks, &noise, scale);
     }
     if let Some(rows) = nominal.skew_rows {
         skew::put_off(&mut holdout, rows);

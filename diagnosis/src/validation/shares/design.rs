@@ -61,7 +61,7 @@ impl Products {
 pub(crate) struct Design {
     all: Vec<Products>,
     priors: Vec<Prior>,
-    /// Where the nominal columns end, and the places of each law's terms per recording.
+    /// Places of each law's terms per recording.
     pub(crate) laws: Vec<Vec<Vec<usize>>>,
 }
 

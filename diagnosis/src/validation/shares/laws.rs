@@ -93,7 +93,7 @@ fn seen(effect: &Effect, sight: &Sight, asked: &[f64], scale: Scale) -> Vec<Vec<
     inputs.iter().map(see).collect()
 }
 
-/// What the drive has to give more, block by block, for a law of the command to let pass what the motion asks for.
+/// Additional command of each block, for a law of the command to let pass what the motion asks for.
 fn more(law: &CommandLaw, sight: &Sight, asked: &[f64], scale: Scale) -> Option<Vec<f64>> {
     let spans = &sight.track.blocks.span;
     let n = asked.len();

@@ -9,7 +9,7 @@ pub(crate) struct Material {
     pub(crate) name: EffectName,
     /// Part of the force error that it takes on both.
     pub(crate) share: f64,
-    /// Every effect that takes nearly as much in its place, itself first.
+    /// Every effect that takes nearly as much instead, itself first.
     pub(crate) class: Vec<EffectName>,
 }
 

@@ -54,9 +54,9 @@ pub(crate) struct Selected {
     pub(crate) share: Share,
     /// Best first.
     pub(crate) rivals: Vec<Share>,
-    /// What the best force of any form in its place leaves, over what it leaves.
+    /// Residual of the best force of any form instead of it, over its own.
     pub(crate) form: f64,
-    /// The share of the physics without a name that takes most in its place.
+    /// The share of the physics without a name that takes most instead.
     unnamed: f64,
 }
 
@@ -67,7 +67,7 @@ impl Selected {
         fits && share >= NAMED_SHARE && self.form >= FORM_LEAVES && self.unnamed < share
     }
 
-    /// Every effect that takes nearly as much in its place, itself first.
+    /// Every effect that takes nearly as much instead, itself first.
     pub(crate) fn class(&self) -> Vec<N> {
         let most = (1.0 - self.share.least()) * (1.0 + AS_GOOD);
         let near = self.rivals.iter().filter(|rival| rival.fits() && 1.0 - rival.least() <= most);
@@ -81,7 +81,7 @@ pub(crate) struct Selection<'a> {
     noise: Noise,
     sights: Vec<Sight<'a>>,
     priors: Vec<Prior>,
-    /// How many of the sights are fitted.
+    /// Number of sights that are fitted.
     fits: usize,
 }
 
@@ -109,8 +109,7 @@ impl<'a> Selection<'a> {
         (of(0, self.fits), of(self.fits, self.sights.len()))
     }
 
-    /// Selects effects one after another while the best takes `least` of the force error, and swaps each once for what takes more
-    /// in its place.
+    /// Selects effects one after another while the best takes `least` of the force error, and swaps each once for what takes more.
     pub(crate) fn select(&self, least: f64) -> Vec<Selected> {
         let mut taken: Vec<Columns> = Vec::new();
         while taken.len() < MOST {
@@ -139,7 +138,7 @@ impl<'a> Selection<'a> {
         ranked.into_iter().enumerate().filter_map(again).collect()
     }
 
-    /// What the best force of any form in the place of a law leaves, over what that leaves.
+    /// Residual of the best force of any form instead of a law, over that of the law.
     fn form_in_place_of(&self, taken: &[Columns], i: usize, share: &Share) -> f64 {
         let others = taken.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| c).collect();
         let state = State::new(self, others);
@@ -189,7 +188,7 @@ impl<'a> Selection<'a> {
     }
 }
 
-/// An effect in its place among others.
+/// An effect with its rank among others.
 struct Ranked {
     share: Share,
     rivals: Vec<Share>,
