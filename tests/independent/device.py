@@ -59,6 +59,13 @@ class Device:
             raise RuntimeError(f"{' '.join(command)}: {done.stderr.strip()}")
         return done.stdout
 
+    def diagnose(self, rig, fits, holdout):
+        """Diagnoses files of the folder; the report, as read from `diagnosis.json`."""
+        fitted = [argument for file in fits for argument in ("--fit", self.folder / file)]
+        out = self.folder / "report"
+        self._run("diagnose", "--rig", self.folder / rig, *fitted, "--holdout", self.folder / holdout, "--out", out)
+        return json.loads((out / "diagnosis.json").read_text())
+
     def record(self, patient, hand, seconds, angle_deg=None):
         """Records `seconds` of a patient, given as the text of a profile, under the hand of a procedure, given likewise."""
         self.count += 1

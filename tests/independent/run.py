@@ -1,4 +1,5 @@
-"""Evaluates the equations of the three papers without this project's code and compares them with recordings of the virtual device.
+"""Evaluates the equations of the three papers without this project's code and compares them with recordings of the virtual device, and
+gives the diagnosis recordings in which nothing is missing.
 
     python tests/independent/run.py PROGRAM
 
@@ -15,12 +16,13 @@ import anatomy
 import paper_000
 import paper_001
 import paper_002
+import skew
 from device import Device, Report
 
 
 def main(program):
     report, begun = Report(), time.monotonic()
-    for part in (paper_000, paper_001, paper_002, anatomy):
+    for part in (paper_000, paper_001, paper_002, anatomy, skew):
         with tempfile.TemporaryDirectory() as folder:
             part.check(Device(program, folder), report)
     verdict = "pass" if report.failures == 0 else f"{report.failures} checks failed"
