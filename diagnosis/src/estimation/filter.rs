@@ -8,6 +8,7 @@
 
 use crate::estimation::input::{Input, Total};
 use crate::estimation::reading_lag::LagStep;
+use crate::numerics::parallel;
 use std::ops::Range;
 
 /// Noise of sensor and disturbance.
@@ -177,7 +178,7 @@ pub(crate) fn robust_loss(mean_square: f64) -> (f64, f64) {
 }
 
 /// Inputs that go through the filter together.
-pub(crate) const SIDE_BY_SIDE: usize = 4;
+const SIDE_BY_SIDE: usize = 4;
 
 /// Innovations at the start that only find the state.
 fn settling(track: &Observed) -> usize {
@@ -299,6 +300,12 @@ impl Gains {
             }
         }
         responses
+    }
+
+    /// Returns the same, shared by several cores.
+    pub(crate) fn all_responses(&self, track: &Observed, inputs: &[&Input]) -> Vec<Vec<f64>> {
+        let some: Vec<&[&Input]> = inputs.chunks(SIDE_BY_SIDE).collect();
+        parallel::map_all(&some, |some| self.responses(track, some)).into_iter().flatten().collect()
     }
 
     fn responses_of<const L: usize>(&self, track: &Observed, inputs: [&Input; L]) -> [Vec<f64>; L] {

@@ -1,13 +1,13 @@
 //! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise, SIDE_BY_SIDE, robust_loss};
+use crate::estimation::filter::{Gains, Noise, robust_loss};
 use crate::estimation::input::{Input, Total};
 use crate::estimation::model::{Column, Model, total};
 use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Prior, Solution, Square, bounded};
-use rayon::prelude::*;
+use crate::numerics::parallel;
 use std::ops::Range;
 
 /// A model over one recording under one noise: residuals at the reference and whitened columns.
@@ -38,8 +38,7 @@ impl Prepared {
         let at_reference = total(track, &columns, &reference);
         let residual = gains.innovations(&observed, &at_reference);
         let inputs: Vec<&Input> = columns.iter().map(|c| &c.input).collect();
-        let responses: Vec<Vec<f64>> =
-            inputs.par_chunks(SIDE_BY_SIDE).flat_map_iter(|some| gains.responses(&observed, some)).collect();
+        let responses = gains.all_responses(&observed, &inputs);
         let segments = grams(track, &responses, &residual);
         let bounds = track.blocks.segments.clone();
         let weight = vec![1.0; segments.len()];
@@ -133,22 +132,19 @@ fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
 /// Gram matrices of the columns and the residual, per segment.
 fn grams(track: &BlockedRecording, responses: &[Vec<f64>], residual: &[f64]) -> Vec<Square> {
     let p = responses.len();
-    (0..track.segment_count())
-        .into_par_iter()
-        .map(|s| {
-            let (a, b) = (track.blocks.segments[s], track.blocks.segments[s + 1]);
-            let mut m = Square::zero(p + 1);
-            let column = |i: usize| if i == p { &residual[a..b] } else { &responses[i][a..b] };
-            for i in 0..=p {
-                for j in 0..=i {
-                    let x = dot(column(i), column(j));
-                    m.a[i * (p + 1) + j] = x;
-                    m.a[j * (p + 1) + i] = x;
-                }
+    parallel::map(track.segment_count(), |s| {
+        let (a, b) = (track.blocks.segments[s], track.blocks.segments[s + 1]);
+        let mut m = Square::zero(p + 1);
+        let column = |i: usize| if i == p { &residual[a..b] } else { &responses[i][a..b] };
+        for i in 0..=p {
+            for j in 0..=i {
+                let x = dot(column(i), column(j));
+                m.a[i * (p + 1) + j] = x;
+                m.a[j * (p + 1) + i] = x;
             }
-            m
-        })
-        .collect()
+        }
+        m
+    })
 }
 
 /// A fitted model.
@@ -191,8 +187,7 @@ pub(crate) fn layout(prepared: &[Prepared]) -> (Vec<Vec<usize>>, Vec<Place>) {
 impl Fit {
     /// Fits a model to recordings.
     pub(crate) fn new(model: &Model, nominal: &Nominal, tracks: &[BlockedRecording], noise: &Noise) -> Self {
-        let prepared: Vec<Prepared> =
-            tracks.par_iter().map(|track| Prepared::new(model, nominal, track, noise)).collect();
+        let prepared = parallel::map_all(tracks, |track| Prepared::new(model, nominal, track, noise));
         Self::of(prepared)
     }
 

@@ -3,7 +3,7 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, Observed, robust_loss};
 use crate::estimation::input::Total;
-use rayon::prelude::*;
+use crate::numerics::parallel;
 use std::ops::Range;
 
 /// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
@@ -61,22 +61,19 @@ impl<'a> Excerpt<'a> {
 }
 
 fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
-    let each: Vec<f64> = parts
-        .par_iter()
-        .map(|part| {
-            let observed = part.observed();
-            let gains = Gains::new(&observed, noise);
-            let e = gains.innovations(&observed, &part.total);
-            let cost: f64 = e
-                .chunks(STRETCH)
-                .map(|e| {
-                    let square: f64 = e.iter().map(|e| e * e).sum();
-                    e.len() as f64 * robust_loss(square / e.len() as f64).0
-                })
-                .sum();
-            gains.log_det - 0.5 * cost
-        })
-        .collect();
+    let each = parallel::map_all(parts, |part| {
+        let observed = part.observed();
+        let gains = Gains::new(&observed, noise);
+        let e = gains.innovations(&observed, &part.total);
+        let cost: f64 = e
+            .chunks(STRETCH)
+            .map(|e| {
+                let square: f64 = e.iter().map(|e| e * e).sum();
+                e.len() as f64 * robust_loss(square / e.len() as f64).0
+            })
+            .sum();
+        gains.log_det - 0.5 * cost
+    });
     each.iter().sum()
 }
 

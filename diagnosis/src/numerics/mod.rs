@@ -4,3 +4,4 @@ pub(crate) mod bootstrap;
 pub(crate) mod digits;
 pub(crate) mod golden_section;
 pub(crate) mod linear;
+pub(crate) mod parallel;

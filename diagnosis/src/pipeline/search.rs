@@ -10,6 +10,7 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::estimation::refit;
 use crate::estimation::smoother::Knows;
+use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
@@ -19,7 +20,6 @@ use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residuals::forces;
-use rayon::prelude::*;
 
 /// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
@@ -279,11 +279,8 @@ fn plain_sets(on: &FitContext) -> Vec<Model> {
 
 /// The best model of each number of plain forces under its own noise, best first.
 fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
-    let mut ranked: Vec<FittedModel> = plain_sets(on)
-        .into_par_iter()
-        .map(|model| on.fit_at(model, &now.white.noise))
-        .filter(|fitted| fitted.merit - now.white.merit > MIN_LOG_LIKELIHOOD_GAIN)
-        .collect();
+    let mut ranked = parallel::map_all(&plain_sets(on), |model| on.fit_at(model.clone(), &now.white.noise));
+    ranked.retain(|fitted| fitted.merit - now.white.merit > MIN_LOG_LIKELIHOOD_GAIN);
     ranked.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     let mut sizes: Vec<usize> = Vec::new();
     let mut fitted: Vec<FittedModel> = Vec::new();

@@ -9,8 +9,8 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::Nominal;
+use crate::numerics::parallel;
 use crate::selection::candidates;
-use rayon::prelude::*;
 
 /// A model fitted with the noise that goes with it.
 pub(crate) struct FittedModel {
@@ -70,8 +70,7 @@ impl FitContext<'_> {
     /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
     /// what a disturbance explains are two optima.
     pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
-        let fits =
-            starts.par_iter().map(|from| self.fit(model.clone(), from, Colour::Slow)).collect::<Vec<_>>();
+        let fits = parallel::map_all(starts, |from| self.fit(model.clone(), from, Colour::Slow));
         fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
     }
 

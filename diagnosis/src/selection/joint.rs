@@ -7,10 +7,10 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::estimation::nominal::Machine;
+use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::shape_search::descend;
-use rayon::prelude::*;
 
 /// From how many of the best places a search goes downhill, and how many of the ends are settled.
 const STARTS: usize = 4;
@@ -62,11 +62,13 @@ pub(crate) fn search(
         found.truncate(count);
         found
     };
-    let starts = elsewhere(context, model).into_par_iter().map(|start| (merit(&start), start)).collect();
-    let down = |(value, start): (f64, Model)| descend(context, start, noise, value, merit);
-    let ends = best(starts, STARTS).into_par_iter().map(down).collect();
-    let settled = best(ends, SETTLED).into_par_iter().map(|end| settle(context, end, noise, merit));
-    settled.collect::<Vec<_>>().into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    let all: Vec<Model> = elsewhere(context, model).into_iter().collect();
+    let starts = parallel::map_all(&all, merit).into_iter().zip(all).collect();
+    let ends = parallel::map_all(&best(starts, STARTS), |(value, start)| {
+        descend(context, start.clone(), noise, *value, merit)
+    });
+    let settled = parallel::map_all(&best(ends, SETTLED), |end| settle(context, end.clone(), noise, merit));
+    settled.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// The model with its joint on another machine.

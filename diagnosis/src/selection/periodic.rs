@@ -11,9 +11,9 @@ use crate::estimation::nominal::Nominal;
 use crate::numerics::golden_section::golden;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
+use crate::numerics::parallel;
 use crate::selection::context::FitContext;
 use crate::selection::score_statistic::{Sums, Terms, project};
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Highest order of a turn that is looked for, and how many orders one effect may have.
@@ -128,7 +128,7 @@ impl<'a> Waves<'a> {
     /// The orders that gain most by themselves, apart from each other, each moved to where it gains most.
     fn best_alone(&self) -> Vec<f64> {
         let orders = &self.orders;
-        let single: Vec<f64> = orders.par_iter().map(|order| self.gain(*order)).collect();
+        let single = parallel::map_all(orders, |order| self.gain(*order));
         let mut ranked: Vec<usize> = (0..orders.len()).collect();
         ranked.sort_by(|a, b| single[*b].total_cmp(&single[*a]).then(a.cmp(b)));
         let mut kept: Vec<usize> = Vec::new();
@@ -146,12 +146,12 @@ impl<'a> Waves<'a> {
             return kept.iter().map(|k| orders[*k]).collect();
         }
         let refined = |k: &usize| golden(orders[*k] - 0.5, orders[*k] + 0.5, 7, |order| self.gain(order));
-        kept.par_iter().map(refined).collect()
+        parallel::map_all(&kept, refined)
     }
 
     /// The orders that gain most together, out of some, and their gain.
     fn best_together(&self, orders: &[f64]) -> (Vec<f64>, f64) {
-        let columns: Vec<Terms> = orders.par_iter().map(|order| self.terms(*order)).collect();
+        let columns = parallel::map_all(orders, |order| self.terms(*order));
         let recordings = self.context.tracks.len();
         let joined: Terms = (0..recordings)
             .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())

@@ -3,15 +3,15 @@
 use crate::effects::Effect;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::effective_command::{effective_command, effective_commands};
-use crate::estimation::fit::{Fit, Prepared};
+use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
 use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
+use crate::numerics::parallel;
 use crate::selection::context::PER_COEFFICIENT;
-use rayon::prelude::*;
 
 /// The result of a score test.
 #[derive(Debug, Clone)]
@@ -101,13 +101,14 @@ pub(crate) fn score(
         return Score { gain: 0.0 };
     }
     // Responses of the effect's terms under the noise of the fit.
-    let response = |(r, (track, one)): (usize, (&BlockedRecording, &Prepared))| -> Vec<Vec<f64>> {
+    let response = |r: usize| -> Vec<Vec<f64>> {
+        let (track, one) = (&tracks[r], &fit.prepared[r]);
         let after = effective.as_ref().map(|all| &all[r]);
         let inputs = added_inputs(model, track, effect, after);
         let observed = track.observed();
         one.gains.responses(&observed, &inputs.iter().collect::<Vec<_>>())
     };
-    let terms: Terms = tracks.par_iter().zip(&fit.prepared).enumerate().map(response).collect();
+    let terms: Terms = parallel::map(tracks.len(), response);
     let sums = project(fit, residuals, &terms, effect.name.definition().has_own_phase());
     if effective.is_some() {
         // The change of the command enters with the gain itself, or the shape would mean nothing.
@@ -134,8 +135,7 @@ pub(crate) fn best_on_grid(
     grid: &[Effect],
     nominal: &Nominal,
 ) -> Option<(Effect, Score)> {
-    let scores: Vec<Score> =
-        grid.par_iter().map(|effect| score(fit, residuals, model, tracks, effect, nominal)).collect();
+    let scores = parallel::map_all(grid, |effect| score(fit, residuals, model, tracks, effect, nominal));
     // Of profiles along the travel the finer has more values to fit.
     let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * effect.shape_or("degree", 0.0);
     let mut best: Option<(Effect, Score)> = None;

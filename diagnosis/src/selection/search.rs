@@ -6,13 +6,13 @@ use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::numerics::golden_section::golden;
+use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel, cost};
 use crate::selection::joint;
 use crate::selection::periodic::{self, Searched};
 use crate::selection::score_statistic;
 use crate::selection::shape_search::descend;
-use rayon::prelude::*;
 
 /// The number of effects that are fitted in full at each step.
 const FINALISTS: usize = 8;
@@ -91,7 +91,7 @@ impl FitContext<'_> {
             (worth > 0.0).then_some((effect, worth))
         };
         let all: Vec<N> = N::ALL.iter().chain(&self.nominal.rig.searched).copied().collect();
-        let mut found: Vec<(Effect, f64)> = all.par_iter().filter_map(best_of).collect();
+        let mut found: Vec<(Effect, f64)> = parallel::map_all(&all, best_of).into_iter().flatten().collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
     }
@@ -122,25 +122,19 @@ impl FitContext<'_> {
 
     /// Fits the best effects of a screening in full, each with noise of its own; best first.
     pub(crate) fn finalists(&self, now: &FittedModel, found: &[(Effect, f64)]) -> Vec<FittedModel> {
-        let mut full: Vec<FittedModel> = found
-            .iter()
-            .take(FINALISTS)
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|(effect, _)| {
-                let mut model = now.model.clone();
-                model.effects.push(effect.clone());
-                self.fit(model, &now.noise, Colour::White)
-            })
-            .collect();
+        let mut full = parallel::map_all(&found[..found.len().min(FINALISTS)], |(effect, _)| {
+            let mut model = now.model.clone();
+            model.effects.push(effect.clone());
+            self.fit(model, &now.noise, Colour::White)
+        });
         full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
         full
     }
 
     /// Polishes the best few candidates and puts them in order again.
     pub(crate) fn polish(&self, candidates: &mut [FittedModel]) {
-        let polished: Vec<FittedModel> =
-            candidates.par_iter().take(POLISHED).map(|c| self.polish_one(c)).collect();
+        let polished =
+            parallel::map_all(&candidates[..candidates.len().min(POLISHED)], |c| self.polish_one(c));
         for (old, new) in candidates.iter_mut().zip(polished) {
             if new.merit > old.merit {
                 *old = new;

@@ -5,10 +5,10 @@ use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
 use crate::estimation::model::{Model, total};
 use crate::numerics::linear::Factor;
+use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::FitContext;
 use crate::selection::score_statistic::{Terms, project};
-use rayon::prelude::*;
 
 /// Most steps, and the longest, as a change of a value's logarithm.
 const STEPS: usize = 6;
@@ -85,7 +85,7 @@ fn step(context: &FitContext, model: &Model, noise: &Noise) -> Vec<f64> {
                 };
                 one.gains.response(&track.observed(), &input)
             };
-            moved.par_iter().map(derivative).collect()
+            parallel::map_all(&moved, derivative)
         })
         .collect();
     let sums = project(&fit, &residuals, &terms, false);

@@ -4,7 +4,7 @@ use super::replay::{Beside, Deviation, Trajectory};
 use super::{Motion, PositionLoop};
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
-use rayon::prelude::*;
+use crate::numerics::parallel;
 use serde::Serialize;
 
 /// One model beside a recording.
@@ -110,7 +110,7 @@ impl Comparison {
             let afresh = (whole > 2.0 * AFRESH_S).then(|| beside.started_every(rig, AFRESH_S));
             Simulated { model: name.clone(), free, afresh, under, force: beside.force(rig), figures }
         };
-        let models: Vec<Simulated> = models.par_iter().map(simulated).collect();
+        let models = parallel::map_all(models, simulated);
         let force = motion.accelerations().iter().map(|a| a * first.model.inertia).collect();
         Self { file: recording.file.clone(), kind: first.kind, motion, force, feedback, models }
     }

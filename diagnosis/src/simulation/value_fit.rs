@@ -6,7 +6,7 @@ use super::replay::Beside;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::numerics::linear::{Factor, Square, dot};
-use rayon::prelude::*;
+use crate::numerics::parallel;
 
 /// Most iterations, and change of the sum of squares below which it is over.
 const ITERATIONS: usize = 30;
@@ -112,14 +112,11 @@ fn normal_equations(
     off: &(dyn Fn(&[f64]) -> Vec<f64> + Sync),
 ) -> (Square, Vec<f64>) {
     let n = theta.len();
-    let columns: Vec<Vec<f64>> = (0..n)
-        .into_par_iter()
-        .map(|k| {
-            let mut there = theta.to_vec();
-            there[k] += APART;
-            off(&there).iter().zip(at_theta).map(|(a, b)| (a - b) / APART).collect()
-        })
-        .collect();
+    let columns: Vec<Vec<f64>> = parallel::map(n, |k| {
+        let mut there = theta.to_vec();
+        there[k] += APART;
+        off(&there).iter().zip(at_theta).map(|(a, b)| (a - b) / APART).collect()
+    });
     let mut information = Square::zero(n);
     let mut score = vec![0.0; n];
     for i in 0..n {

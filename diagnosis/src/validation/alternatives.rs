@@ -9,6 +9,7 @@ use crate::estimation::noise::Colour;
 use crate::estimation::nominal::Nominal;
 use crate::io::rig::Kind;
 use crate::numerics::bootstrap::bootstrap;
+use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
@@ -18,7 +19,6 @@ use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
-use rayon::prelude::*;
 
 /// The number of rivals of each effect that are fitted in full.
 const RIVALS: usize = 4;
@@ -81,8 +81,7 @@ impl Contest<'_> {
             .into_iter()
             .take(RIVALS)
             .collect();
-        let mut rivals: Vec<Rival> =
-            others.par_iter().map(|(effect, _)| self.rival(&base.model, effect)).collect();
+        let mut rivals = parallel::map_all(&others, |(effect, _)| self.rival(&base.model, effect));
         self.tell_apart_by_slow_noise(&base.model, &others, &mut rivals);
         rivals
     }

@@ -10,10 +10,10 @@ use crate::estimation::model::{Model, total};
 use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::numerics::linear::Square;
+use crate::numerics::parallel;
 use crate::selection::context::FittedModel;
 use crate::selection::joint;
 use crate::selection::predictive::{FOLDS, fold_of};
-use rayon::prelude::*;
 
 /// A model laid on one held-out recording.
 pub(crate) struct HoldoutFit {
@@ -164,8 +164,7 @@ fn evaluate_once(
         sums.own_values(fitted.clone(), &one, &patterns)
     };
     let whole = own(&|_| true);
-    let by_fold: Vec<Vec<f64>> =
-        (0..FOLDS).into_par_iter().map(|fold| own(&|segment| fold_of(0, segment) != fold)).collect();
+    let by_fold = parallel::map(FOLDS, |fold| own(&|segment| fold_of(0, segment) != fold));
     let step_of = |theta: &Vec<f64>| -> Vec<f64> {
         theta.iter().zip(&one.reference).map(|(value, reference)| value - reference).collect()
     };

@@ -7,12 +7,12 @@ use crate::effects::{Effect, EffectName};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
+use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::rejection::Rather;
-use rayon::prelude::*;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.
 pub(crate) fn unnamed_like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
@@ -37,8 +37,8 @@ pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &Holdout
         let fit = Fit::new(&model(foreign), context.nominal, context.tracks, &refit.noise);
         fit.log_likelihood - foreign.freedom * PER_COEFFICIENT
     };
-    let tried: Vec<(f64, Unnamed)> = all.into_par_iter().map(|foreign| (merit(&foreign), foreign)).collect();
-    let (_, best) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let merits = parallel::map_all(&all, merit);
+    let (_, best) = merits.into_iter().zip(all).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = context.fit(model(&best), &refit.noise, Colour::White);
     let found = gather_evidence(context, &fitted, &refit.noise, holdout).pop()?;
     let is_sure = found.rejection().is_none() && found.is_certain() && found.share > OUTSIDE_ALONE;
@@ -56,9 +56,9 @@ pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, 
         fit.log_likelihood - fitted.fit.log_likelihood - least
     };
     let all = unnamed_like(Some(&fitted.model.effects[effect]), context);
-    let tried: Vec<(f64, Unnamed)> = all.into_par_iter().map(|foreign| (more(&foreign), foreign)).collect();
-    tried
+    parallel::map_all(&all, more)
         .into_iter()
+        .zip(all)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(more, _)| *more > 0.0)
         .map(|(_, foreign)| Rather::Unnamed { what: foreign.what })

@@ -5,8 +5,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::numerics::golden_section::golden;
+use crate::numerics::parallel;
 use crate::thresholds::MISTAKEN;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Samples per second that the search looks at, over the bandwidth of the residual.
@@ -135,11 +135,11 @@ pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
     let apart = apart(&left);
     let first = 2.0 * FEWEST_CYCLES * apart;
     let count = ((estimator.bandwidth_hz - first) / apart).max(0.0) as usize;
-    let (coarse, _) = (0..count)
-        .into_par_iter()
-        .map(|i| first + apart * i as f64)
-        .map(|hertz| (hertz, explained(&left, hertz)))
-        .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.total_cmp(&a.0)))?;
+    let tried = parallel::map(count, |i| {
+        let hertz = first + apart * i as f64;
+        (hertz, explained(&left, hertz))
+    });
+    let (coarse, _) = tried.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.total_cmp(&a.0)))?;
     Some(nearby(coarse, apart, &left))
 }
 

@@ -4,13 +4,13 @@ use super::basis::{self, Basis, Inputs, Point, Warps};
 use super::compare::{Densities, Density};
 use super::shape::{Coefficients, Shape};
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise, SIDE_BY_SIDE};
+use crate::estimation::filter::{Gains, Noise};
 use crate::estimation::fit::{Prepared, layout};
 use crate::estimation::input::Input;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::{Factor, Square, dot};
-use rayon::prelude::*;
+use crate::numerics::parallel;
 
 /// Segments that are scored together, and such units that are left out together.
 const TOGETHER: usize = 3;
@@ -76,8 +76,7 @@ struct Base {
 
 impl Base {
     fn new(model: &Model, nominal: &Nominal, tracks: &[BlockedRecording], noise: &Noise, scale: f64) -> Self {
-        let prepared: Vec<Prepared> =
-            tracks.par_iter().map(|track| Prepared::new(model, nominal, track, noise)).collect();
+        let prepared = parallel::map_all(tracks, |track| Prepared::new(model, nominal, track, noise));
         let (places, keys) = layout(&prepared);
         let mut precision = vec![0.0; keys.len()];
         for ((one, places), track) in prepared.iter().zip(&places).zip(tracks) {
@@ -129,35 +128,29 @@ impl<'a> Evaluator<'a> {
     ) -> Self {
         let points: Vec<Vec<Point>> = tracks.iter().map(basis::points).collect();
         let warps = Warps::of(&points, nominal.rig.turn());
-        let gains: Vec<Gains> = tracks.par_iter().map(|track| Gains::new(&track.observed(), noise)).collect();
+        let gains = parallel::map_all(tracks, |track| Gains::new(&track.observed(), noise));
         let units: Vec<Units> = tracks.iter().map(Units::of).collect();
-        let forms = Inputs::ALL
-            .par_iter()
-            .map(|inputs| {
-                let basis = Basis::new(*inputs, &warps);
-                let responses: Vec<Vec<Vec<f64>>> = tracks
-                    .iter()
-                    .zip(&points)
-                    .zip(&gains)
-                    .map(|((track, points), gains)| {
-                        let columns = basis.columns(track, points, nominal.known_gain());
-                        let observed = track.observed();
-                        let inputs: Vec<&Input> = columns.iter().collect();
-                        let some = inputs.par_chunks(SIDE_BY_SIDE);
-                        some.flat_map_iter(|some| gains.responses(&observed, some)).collect()
-                    })
-                    .collect();
-                let own = responses
-                    .iter()
-                    .zip(&units)
-                    .map(|(columns, units)| {
-                        let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-                        units.bounds.par_iter().map(|b| square_gram(&all, *b)).collect()
-                    })
-                    .collect();
-                Form { inputs: *inputs, frequency: basis.frequency, responses, own }
-            })
-            .collect();
+        let forms = parallel::map_all(&Inputs::ALL, |inputs| {
+            let basis = Basis::new(*inputs, &warps);
+            let responses: Vec<Vec<Vec<f64>>> = tracks
+                .iter()
+                .zip(&points)
+                .zip(&gains)
+                .map(|((track, points), gains)| {
+                    let columns = basis.columns(track, points, nominal.known_gain());
+                    gains.all_responses(&track.observed(), &columns.iter().collect::<Vec<_>>())
+                })
+                .collect();
+            let own = responses
+                .iter()
+                .zip(&units)
+                .map(|(columns, units)| {
+                    let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+                    parallel::map_all(&units.bounds, |b| square_gram(&all, *b))
+                })
+                .collect();
+            Form { inputs: *inputs, frequency: basis.frequency, responses, own }
+        });
         Self { nominal, tracks, noise: *noise, scale, units, points, warps, forms }
     }
 
@@ -240,23 +233,20 @@ impl Normal {
             all
         };
         let (whole, whole_b) = self.sum(None);
-        let solved: Vec<(usize, Vec<f64>)> = folds
-            .par_iter()
-            .map(|fold| {
-                let mut m = whole.clone();
-                let mut b = whole_b.clone();
-                for (unit, right, _, f) in &self.units {
-                    if f == fold {
-                        m.a.iter_mut().zip(&unit.a).for_each(|(a, x)| *a -= x);
-                        b.iter_mut().zip(right).for_each(|(a, x)| *a -= x);
-                    }
+        let solved = parallel::map_all(&folds, |fold| {
+            let mut m = whole.clone();
+            let mut b = whole_b.clone();
+            for (unit, right, _, f) in &self.units {
+                if f == fold {
+                    m.a.iter_mut().zip(&unit.a).for_each(|(a, x)| *a -= x);
+                    b.iter_mut().zip(right).for_each(|(a, x)| *a -= x);
                 }
-                for (i, p) in precision.iter().enumerate() {
-                    m.add(i, i, *p);
-                }
-                (*fold, Factor::new(&m).solve(&b))
-            })
-            .collect();
+            }
+            for (i, p) in precision.iter().enumerate() {
+                m.add(i, i, *p);
+            }
+            (*fold, Factor::new(&m).solve(&b))
+        });
         Density(
             self.units
                 .iter()
@@ -295,7 +285,8 @@ impl Evaluator<'_> {
             let precision = self.most_likely(form, &base, &normal);
             (form.inputs, normal.density(&precision))
         };
-        let with = self.forms.par_iter().filter(|form| !form.frequency.is_empty()).map(of).collect();
+        let forms: Vec<&Form> = self.forms.iter().filter(|form| !form.frequency.is_empty()).collect();
+        let with = parallel::map_all(&forms, |form| of(form));
         Densities { alone, with }
     }
 

@@ -10,12 +10,12 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::force_residual::Estimator;
 use crate::numerics::linear::Prior;
+use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel, MOST};
 use crate::selection::periodic::{self, Searched};
 use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE, SAME_SIZE_OF_SHARE};
 use crate::validation::out_of_library::unnamed_like;
-use rayon::prelude::*;
 
 /// Factors on a value of a shape by which it is moved, round after round.
 const MOVES: [[f64; 2]; 3] = [[0.5, 2.0], [0.7, 1.4], [0.85, 1.18]];
@@ -94,10 +94,8 @@ impl<'a> Selection<'a> {
     ) -> Option<Self> {
         let estimator = Estimator::new(context.tracks, &noise, context.scale);
         let all: Vec<&BlockedRecording> = context.tracks.iter().chain(holdout).collect();
-        let sight = |(r, track): (usize, &&'a BlockedRecording)| {
-            Sight::new(track, r, context.nominal, &noise, estimator)
-        };
-        let mut sights: Vec<Sight> = all.par_iter().enumerate().map(sight).collect();
+        let mut sights =
+            parallel::map(all.len(), |r| Sight::new(all[r], r, context.nominal, &noise, estimator));
         sights.retain(|sight| sight.rows() >= FEWEST_ROWS);
         let priors = priors(context.nominal, &context.tracks[0], &noise);
         let fits = sights.iter().filter(|sight| sight.track.place.is_some()).count();
@@ -158,10 +156,11 @@ impl<'a> Selection<'a> {
         let others = taken.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| c).collect();
         let state = State::new(self, others);
         let all = unnamed_like(Some(effect), self.context);
-        let same = all.par_iter().filter(|unnamed| unnamed.effect.name == effect.name);
+        let same: Vec<Unnamed> =
+            all.into_iter().filter(|unnamed| unnamed.effect.name == effect.name).collect();
         let share =
             |unnamed: &Unnamed| state.share(&columns(&unnamed.effect, &self.sights, nominal, &state.asked)?);
-        same.filter_map(share).map(|share| share.least()).reduce(|| 0.0, f64::max)
+        parallel::map_all(&same, share).iter().flatten().map(Share::least).fold(0.0, f64::max)
     }
 
     /// The share of an effect of known shape beside others.
@@ -273,7 +272,8 @@ impl<'a> State<'a> {
             Some((self.share(&tried)?, tried))
         };
         let all: Vec<N> = N::ALL.iter().chain(&context.nominal.rig.searched).copied().collect();
-        let mut found: Vec<(Share, Columns)> = all.par_iter().filter_map(best_of).collect();
+        let mut found: Vec<(Share, Columns)> =
+            parallel::map_all(&all, best_of).into_iter().flatten().collect();
         found.sort_by(|a, b| b.0.least().total_cmp(&a.0.least()));
         found
     }
