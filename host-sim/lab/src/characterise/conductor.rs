@@ -163,6 +163,7 @@ impl<'a> Conductor<'a> {
                 self.hello = Some(Hello::from(hello));
             }
             DeviceFrame::Samples(block) => self.block(block),
+            DeviceFrame::Crash(crash) => eprintln!("host-sim: {crash}"),
             DeviceFrame::Event(event) => {
                 if let EventKind::Fault { cause } = event.kind {
                     self.fault(cause);

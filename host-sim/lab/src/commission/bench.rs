@@ -265,6 +265,7 @@ impl<'a> Bench<'a> {
                     block.samples.last().into_iter().for_each(|newest| self.line.saw(newest));
                 }
                 DeviceFrame::Device(record) => self.record = Some(record),
+                DeviceFrame::Crash(crash) => eprintln!("host-sim: {crash}"),
                 DeviceFrame::Event(event) => match event.kind {
                     EventKind::Fault { cause } => self.fault = Some(cause),
                     EventKind::NotSaved { cause } => self.not_saved = Some(cause.to_string()),
