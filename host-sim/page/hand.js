@@ -90,7 +90,7 @@ export class Hand {
   say() {
     this.demo.disabled = !this.person;
     let text = this.source === "recording" ? "Recording" : "Moved by hand, on the device";
-    if (this.movable) text = this.person ? `Yours: drag${KEYS}` : "Demo: drag to take it";
+    if (this.movable) text = this.person ? `You hold it: drag${KEYS}` : "Demo: drag to take it";
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 
