@@ -8,6 +8,7 @@ pub(crate) const MOST_ROWS: f64 = 1.0;
 const MOST_SPREAD: f64 = 0.25;
 /// Standard deviation of a skew before anything is known, rows.
 const SD_ROWS: f64 = 0.5;
+
 /// Change of a command, held row by row, per row that it acts late.
 pub(crate) fn per_row_late(command: &[f64]) -> Vec<f64> {
     let last = command.len().saturating_sub(1);

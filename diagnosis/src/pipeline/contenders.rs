@@ -44,17 +44,8 @@ fn contested(weighed: &WeighedModel) -> Option<&WeighedEffect> {
 
 /// Odds of a rival that is `z` standard errors behind the winner, which has 1: both are normal.
 fn odds(z: f64) -> f64 {
-    let behind = 0.5 * (1.0 - erf(z / std::f64::consts::SQRT_2));
+    let behind = 0.5 * libm::erfc(z / std::f64::consts::SQRT_2);
     behind / (1.0 - behind).max(1e-12)
-}
-
-/// The error function to 1.5e-7 (Abramowitz and Stegun 7.1.26).
-fn erf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let sum = [1.061_405_429, -1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592]
-        .into_iter()
-        .fold(0.0, |sum, c| (sum + c) * t);
-    x.signum() * (1.0 - sum * (-x * x).exp())
 }
 
 /// What contenders are fitted with.

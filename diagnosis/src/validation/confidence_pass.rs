@@ -331,9 +331,9 @@ impl Scales<'_> {
         let is_there = parameters::is_there(found.effect.name, &parameters);
         let evidence = confidence::evidence(&found, left.evidence);
         let rather = out_of_library::rather(context, patched, i, found.fit.sum);
-        if let Some(Material { class, .. }) = &found.material {
-            let (class, is_there) = (class.clone(), parameters::has_size(found.effect.name, &parameters));
-            let confidence = found.material.as_ref().map_or(0.0, Material::confidence);
+        if let Some(material) = &found.material {
+            let (class, confidence) = (material.class.clone(), material.confidence());
+            let is_there = parameters::has_size(found.effect.name, &parameters);
             let (undecided, creeps) = (false, None);
             return WeighedEffect {
                 found,
