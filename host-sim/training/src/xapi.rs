@@ -24,28 +24,19 @@ pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> 
     let mut statements = Vec::new();
     each(recording, by, |span, judge, profile| {
         let mut statement = statement(&actor, profile, &judge.insertion(span));
-        if recording.begun_ns > 0 {
-            let since_s = span.end / u64::from(TICK_HZ);
-            statement["timestamp"] = json!(utc(recording.begun_ns / 1_000_000_000 + since_s));
+        let since_s = recording.begun_ns / 1_000_000_000 + span.end / u64::from(TICK_HZ);
+        if let Some(stamp) = utc(since_s).filter(|_| recording.begun_ns > 0) {
+            statement["timestamp"] = json!(stamp);
         }
         statements.push(statement);
     })?;
     Ok(statements)
 }
 
-/// Returns a time in seconds since 1970 as ISO 8601 in UTC. Days to a date: Howard Hinnant, *chrono-Compatible Low-Level Date Algorithms*,
-/// `civil_from_days`.
-fn utc(since_1970_s: u64) -> String {
-    let (days, second) = (since_1970_s / 86_400 + 719_468, since_1970_s % 86_400);
-    let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * from_march + 2) / 5 + 1;
-    let month = if from_march < 10 { from_march + 3 } else { from_march - 9 };
-    let year = year_of_era + era * 400 + u64::from(month <= 2);
-    let (hour, minute) = (second / 3_600, second / 60 % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{:02}Z", second % 60)
+/// Returns a time in seconds since 1970 as ISO 8601 in UTC; none beyond the year 9999.
+fn utc(since_1970_s: u64) -> Option<String> {
+    let stamp = jiff::Timestamp::from_second(i64::try_from(since_1970_s).ok()?).ok()?;
+    Some(stamp.to_string())
 }
 
 /// The trainee, identified by an e-mail address.
@@ -143,7 +134,7 @@ mod tests {
             (1_798_761_599, "2026-12-31T23:59:59Z"),
             (4_107_542_400, "2100-03-01T00:00:00Z"),
         ] {
-            assert_eq!(utc(since_1970_s), date);
+            assert_eq!(utc(since_1970_s).as_deref(), Some(date));
         }
     }
 

@@ -8,11 +8,8 @@ use diagnosis::rig::Rig;
 use fixed::types::{I8F24, I16F16};
 use std::time::Duration;
 
-/// Natural frequency of the servo, rad/s: the speed estimate is 6 ms late, which leaves it well damped.
-const SERVO_RAD_PER_S: f64 = 50.0;
-const SERVO_DAMPING_RATIO: f64 = 0.9;
 /// Furthest that the roller turns from where it began, mm along its surface.
-const TRAVEL_MM: f64 = 600.0;
+pub(crate) const TRAVEL_MM: f64 = 600.0;
 /// The instruction to the person at the device while the motor holds.
 const TILT_PROMPT: &str = "tilt the device slowly: level, needle down by 60°, level, up by 60°, level";
 
@@ -95,11 +92,10 @@ pub fn servo(inertia: f64, radius_mm: f64) -> Servo {
     let radius = radius_mm * 1e-3;
     // Inertia seen along the surface of the roller, kg; N/m and N·s/m are 1,000 of a N/mm and a N·s/mm.
     let mass = inertia / (radius * radius);
-    let stiffness = mass * SERVO_RAD_PER_S * SERVO_RAD_PER_S * 1e-3;
-    let damping = 2.0 * SERVO_DAMPING_RATIO * mass * SERVO_RAD_PER_S * 1e-3;
+    let soft = experiment::Servo::of(mass);
     Servo {
-        stiffness: Stiffness(I16F16::saturating_from_num(stiffness)),
-        damping: Damping(I8F24::saturating_from_num(damping)),
+        stiffness: Stiffness(I16F16::saturating_from_num(soft.stiffness * 1e-3)),
+        damping: Damping(I8F24::saturating_from_num(soft.damping * 1e-3)),
     }
 }
 

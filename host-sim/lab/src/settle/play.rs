@@ -1,7 +1,7 @@
 //! Inputs of the design as excitations of the device, within its limits.
 
 use super::{Asked, in_words};
-use crate::characterise::programme::{Programme, Step, servo};
+use crate::characterise::programme::{Programme, Step, TRAVEL_MM, servo};
 use crate::characterise::{self, configuration};
 use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
@@ -11,8 +11,7 @@ use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
 use fixed::types::I16F16;
 
-/// Largest distance from where an input begins, and largest speed, along the roller: those of `characterise`.
-const TRAVEL_MM: f64 = 600.0;
+/// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640 and 680 mm/s.
 const SPEED_MM_PER_S: f64 = 650.0;
 
 /// Strokes before random multisines, s.
