@@ -44,7 +44,7 @@ pub(crate) struct Nominal {
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
     pub(crate) virtual_inertia: f64,
-    /// Rows by which commands act after their time stamps and were put off; none where nothing speaks for any.
+    /// Rows by which the commands were delayed because they act after their time stamps; none if the recordings show no skew.
     pub(crate) skew_rows: Option<f64>,
 }
 

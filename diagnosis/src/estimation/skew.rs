@@ -1,6 +1,6 @@
 //! The skew between command and reading: a log may store a command up to a row before or after the time at which it acts, and a
-//! simulation that integrates by Euler's method is half a row early or late. If that is most of what the nominal model leaves, every model
-//! allows for it, so that no effect has to explain it.
+//! simulation that integrates by Euler's method is half a row early or late. If that explains most of the residual of the nominal model,
+//! every model allows for it, so that no effect has to explain it.
 //!
 //! Large skews shift the commands themselves; what is left is a column of the linear fit, and so is what happens within a row: a
 //! command may change there, or act all at once.
@@ -26,8 +26,8 @@ const ROUNDS: usize = 3;
 /// A skew that changes by less is found, rows.
 const FOUND: f64 = 0.01;
 
-/// Puts the commands of recordings off by a number of their rows.
-pub(crate) fn put_off(tracks: &mut [BlockedRecording], rows: f64) {
+/// Delays the commands of recordings by a number of their rows; a negative number advances them.
+pub(crate) fn delay_commands(tracks: &mut [BlockedRecording], rows: f64) {
     for track in tracks {
         let late = delayed(&track.rows.command, &track.rows.hold, rows * row_s(track));
         track.set_command(late);
@@ -46,8 +46,8 @@ pub(crate) fn row_s(track: &BlockedRecording) -> f64 {
     hold.iter().sum::<f64>() / hold.len().max(1) as f64
 }
 
-/// Finds the skew of recordings under the nominal model and puts their commands off by it. Nothing changes where the
-/// recordings show none or more than a row, or where a skew is not most of what the nominal model leaves.
+/// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing changes if the recordings show no
+/// skew or more than a row of it, or if it does not explain most of the residual of the nominal model.
 pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise, scale: f64) {
     let without = Fit::new(&Model::default(), nominal, tracks, noise);
     let mut trial = Nominal { skew_rows: Some(0.0), ..nominal.clone() };
@@ -63,7 +63,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noi
             return;
         }
         trial.skew_rows = Some(before + step);
-        put_off(&mut shifted, step);
+        delay_commands(&mut shifted, step);
         fit = Fit::new(&Model::default(), &trial, &shifted, noise);
         if step.abs() < FOUND {
             break;

@@ -23,14 +23,14 @@ pub(crate) fn per_part_spread(command: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The prior of a spread. A command that is put off by half a row as the mean over each row is spread by 1/4, where it changes
-/// within the row by 1/8, and where it acts at once, as Euler's method has it, by none.
+/// The prior of a spread. A command that is delayed by half a row, as the mean over each row, is spread by 1/4; one that changes in the
+/// middle of the row by 1/8; and one that acts at one instant, as in Euler's method, by nothing.
 pub(crate) fn prior_of_spread(gain: f64) -> Prior {
     let most = MOST_SPREAD * gain.abs();
     Prior { mean: 0.0, sd: 0.5 * most, low: -most, high: most }
 }
 
-/// The prior of the column's coefficient where commands were put off by `rows` already: all together is about zero.
+/// The prior of the coefficient of the skew if the commands were already delayed by `rows`: its mean is no skew in all.
 pub(crate) fn prior(gain: f64, rows: f64) -> Prior {
     let (a, b) = ((-MOST_ROWS - rows) * gain, (MOST_ROWS - rows) * gain);
     Prior { mean: -rows * gain, sd: SD_ROWS * gain.abs(), low: a.min(b), high: a.max(b) }

@@ -55,7 +55,7 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
         skew::settle(&mut nominal, &mut tracks, &noise, scale);
     }
     if let Some(rows) = nominal.skew_rows {
-        skew::put_off(&mut holdout, rows);
+        skew::delay_commands(&mut holdout, rows);
         (noise, refit) = refit::settle(&mut nominal, &mut tracks);
     }
     let scale = refit::acceleration_scale(&nominal, &tracks);

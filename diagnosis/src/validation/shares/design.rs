@@ -5,7 +5,7 @@ use super::sight::Sight;
 use crate::numerics::linear::{Prior, Square, bounded, dot};
 use crate::selection::predictive::FOLDS;
 
-/// Rows that tell as much as one that hangs together with none: the priors weigh against so many fewer.
+/// Number of correlated rows that carry as much information as one independent row; the priors are weighed accordingly.
 const TOGETHER: f64 = 10.0;
 
 /// One recording: inner products of its columns, target last, per fold.

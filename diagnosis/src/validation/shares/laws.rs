@@ -7,9 +7,9 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
 
-/// Part of a dead band over which its inverse passes from one side to the other.
+/// Part of a dead band over which its inverse rises from one side to the other.
 const RAMP: f64 = 0.3;
-/// Bounds of a law of the command whose shape says all: as it is at one.
+/// Bounds of the coefficient of a law of the command, which is one if the shape alone is right.
 pub(crate) const AS_IT_IS: (f64, f64) = (0.5, 2.0);
 
 /// The columns of an effect on every recording, per term.

@@ -17,9 +17,9 @@ use crate::selection::periodic::{self, Searched};
 use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE, SAME_SIZE_OF_SHARE};
 use crate::validation::out_of_library::unnamed_like;
 
-/// Factors on a value of a shape by which it is moved, round after round.
+/// Factors by which a value of a shape is moved, a pair in each round.
 const MOVES: [[f64; 2]; 3] = [[0.5, 2.0], [0.7, 1.4], [0.85, 1.18]];
-/// Share by which a rival must take more to be swapped in.
+/// Additional share that a rival must take to replace an effect.
 const SURELY: f64 = 0.01;
 /// The number of values of a shape that are moved.
 const MOVED: usize = 2;

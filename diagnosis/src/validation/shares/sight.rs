@@ -9,9 +9,9 @@ use crate::estimation::nominal::{Key, Nominal};
 use crate::numerics::linear::Prior;
 use crate::selection::predictive::fold_of;
 
-/// Rows per period at the end of the band: more tell nothing new.
+/// Rows per period of the highest frequency of the band; more add no information.
 const ROWS_PER_PERIOD: f64 = 4.0;
-/// Rows of a recording that are enough.
+/// Most rows that are used of a recording.
 const MOST_ROWS: usize = 4000;
 /// Fewest rows of a recording that can tell anything.
 pub(crate) const FEWEST_ROWS: usize = 25;
