@@ -2,7 +2,6 @@
 
 use super::{Round, Settled};
 use device_sim::failure::Failure;
-use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet};
 use std::path::Path;
 
@@ -80,9 +79,7 @@ fn html(settled: &Settled) -> String {
     };
     let rows: Vec<Vec<Cell>> = settled.rounds.iter().enumerate().map(row).collect();
     sheet.table(&["round", "asked", "why", "motion, s", "the diagnosis of all recordings so far"], &rows);
-    if let Some(figure) = contenders(settled) {
-        sheet.figures(&[figure]);
-    }
+    contenders(&mut sheet, settled);
     sheet.note("Each round's folder holds its recordings, its experiment (why this input) and its report.");
     sheet.finish()
 }
@@ -91,31 +88,28 @@ fn rounds(count: usize) -> String {
     if count == 1 { "1 round".to_owned() } else { format!("{count} rounds") }
 }
 
-/// Probabilities of the contenders over the rounds.
-fn contenders(settled: &Settled) -> Option<(String, String)> {
+/// Writes the probability of each contender after each round, in %; a dash where it does not contend.
+fn contenders(sheet: &mut Sheet, settled: &Settled) {
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in settled.rounds.iter().flat_map(|round| &round.contenders) {
         if !names.contains(&name.as_str()) {
             names.push(name);
         }
     }
-    if names.is_empty() || settled.rounds.len() < 2 {
-        return None;
+    if names.is_empty() {
+        return;
     }
-    let curve = |(colour, name): (usize, &&str)| {
-        let at = |(place, round): (usize, &Round)| {
+    sheet.heading("Names that still contend, and their probability, %");
+    let head: Vec<String> =
+        (1..=settled.rounds.len()).map(|number| format!("after round {number}")).collect();
+    let head: Vec<&str> = std::iter::once("").chain(head.iter().map(String::as_str)).collect();
+    let row = |name: &&str| {
+        let after = |round: &Round| {
             let found = round.contenders.iter().find(|(other, _)| other == name);
-            ((place + 1) as f64, 100.0 * found.map_or(0.0, |(_, probability)| *probability))
+            Cell::number(found.map(|(_, probability)| 100.0 * probability), 1)
         };
-        let points = settled.rounds.iter().enumerate().map(at).collect();
-        Curve { name: (*name).to_owned(), colour: colour as u8, dashed: false, points }
+        std::iter::once(Cell::text(*name)).chain(settled.rounds.iter().map(after)).collect()
     };
-    let chart = Chart {
-        title: "Names that still contend".into(),
-        x_label: "round".into(),
-        y_label: "probability, %".into(),
-        curves: names.iter().take(6).enumerate().map(curve).collect(),
-        ..Chart::default()
-    };
-    Some((chart.svg(), "A name at zero contends no more, or is settled.".to_owned()))
+    let rows: Vec<Vec<Cell>> = names.iter().map(row).collect();
+    sheet.table(&head, &rows);
 }
