@@ -98,7 +98,7 @@ pub(crate) fn wave_mean(wave: f64, position: f64, passed: f64) -> (f64, f64) {
 }
 
 /// sin x / x, to the last digits: by its series where that is faster.
-fn sinc(x: f64) -> f64 {
+pub(crate) fn sinc(x: f64) -> f64 {
     let y = x * x;
     if y > 0.09 {
         return x.sin() / x;

@@ -18,8 +18,8 @@ mod waves;
 pub(crate) use command::CommandLaw;
 pub(crate) use formula::read_effects;
 pub use formula::{Formula, FormulaId, FormulaText};
-pub(crate) use law::wave_mean;
 pub use law::{Law, State};
+pub(crate) use law::{sinc, wave_mean};
 pub use table::{Table, Variable};
 
 use definition::Definition;

@@ -12,3 +12,4 @@ pub(crate) mod score_statistic;
 pub(crate) mod search;
 pub(crate) mod shape_search;
 pub(crate) mod untested;
+pub(crate) mod wave_ladder;

@@ -59,21 +59,22 @@ impl FitContext<'_> {
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || now.model.effects.iter().any(is_dry);
         let no_losses = self.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
+        let is_tried = |name: &N| {
+            let definition = name.definition();
+            !there(*name)
+                && (!definition.needs_dry() || dry)
+                && (!definition.is_of_jumps() || !no_losses)
+                && candidates::is_seen(*name, self.nominal)
+                && wanted(*name)
+        };
+        let all: Vec<N> = N::ALL.iter().chain(&self.nominal.rig.searched).copied().filter(is_tried).collect();
+        let periodic: Vec<N> = all.iter().copied().filter(|name| name.definition().is_periodic()).collect();
+        let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
+        let waves = periodic::search(&periodic, self, &searched);
         let best_of = |name: &N| -> Option<(Effect, f64)> {
-            if there(*name)
-                || (name.definition().needs_dry() && !dry)
-                || (name.definition().is_of_jumps() && no_losses)
-                || !wanted(*name)
-            {
-                return None;
-            }
-            let best = match name {
-                name if !candidates::is_seen(*name, self.nominal) => None,
-                name if name.definition().is_periodic() => {
-                    let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
-                    periodic::search(*name, self, &searched)
-                }
-                _ => {
+            let best = match name.definition().is_periodic() {
+                true => waves.iter().find(|(effect, _)| effect.name == *name).cloned(),
+                false => {
                     let grid = candidates::shapes(*name, self.span, self.nominal);
                     score_statistic::best_on_grid(
                         &now.fit,
@@ -90,7 +91,6 @@ impl FitContext<'_> {
             let worth = gain - cost(&effect, self.tracks.len(), self.span);
             (worth > 0.0).then_some((effect, worth))
         };
-        let all: Vec<N> = N::ALL.iter().chain(&self.nominal.rig.searched).copied().collect();
         let mut found: Vec<(Effect, f64)> = parallel::map_all(&all, best_of).into_iter().flatten().collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
@@ -152,7 +152,7 @@ impl FitContext<'_> {
             let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
             let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
             let searched = Searched { fit: &base, residuals: &residuals, model: &model };
-            let (effect, _) = periodic::search(name, self, &searched)?;
+            let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
             model.effects.push(effect);
             Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
         };

@@ -13,7 +13,9 @@ use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
-use crate::thresholds::{BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, MOST_IN_CLASS};
+use crate::thresholds::{
+    BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
+};
 use crate::validation::acceptance_criteria::{EffectEvidence, Rival};
 use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::holdout_set::HoldoutSet;
@@ -132,6 +134,17 @@ impl Contest<'_> {
             }
         }
     }
+}
+
+/// Returns the rival that leads by most, with the place of the effect that it leads; none where no effect is led. Effects that
+/// shares of the force error name met their rivals there.
+pub(crate) fn leader(found: &[EffectEvidence]) -> Option<(usize, Effect)> {
+    let leads = |rival: &&Rival| rival.z < -LEADS_Z && rival.absence.is_none();
+    let by_likelihood = found.iter().enumerate().filter(|(_, one)| one.material.is_none());
+    let all = by_likelihood.flat_map(|(i, one)| one.rivals.iter().filter(leads).map(move |rival| (i, rival)));
+    let is_new = |rival: &Rival| found.iter().all(|one| one.effect.name != rival.name);
+    let best = all.filter(|(_, rival)| is_new(rival)).min_by(|a, b| a.1.z.total_cmp(&b.1.z));
+    best.map(|(i, rival)| (i, rival.effect.clone()))
 }
 
 /// Every effect that these recordings cannot tell from the one found, itself first.

@@ -1,8 +1,8 @@
 //! The confidence of each effect found. Effects that are too unsure are removed and the rest is weighed again: a false effect
 //! takes evidence from a true one.
 
-use crate::effects::EffectName;
 use crate::effects::definition::Definition;
+use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
@@ -11,12 +11,15 @@ use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
+use crate::thresholds::{
+    BEHIND_Z, LEAVES_MUCH, MATERIAL, MATERIAL_OF_FORCE, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD,
+};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence, Leftover};
 use crate::validation::contradictions::{are_alike, same_joint};
+use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library;
@@ -148,9 +151,7 @@ impl WeighedModel {
         if !assessed.is_there {
             return Some(Rejection::NoSize);
         }
-        let part = assessed.found.off_force;
-        let immaterial = (part < MATERIAL).then_some(Rejection::Immaterial { part });
-        immaterial.or_else(|| assessed.rather.clone().map(Rejection::Rather))
+        immaterial(&assessed.found).or_else(|| assessed.rather.clone().map(Rejection::Rather))
     }
 
     /// Returns what rules an effect out however much it explains; none if nothing does.
@@ -162,8 +163,8 @@ impl WeighedModel {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
             Some(Rejection::NoSize)
-        } else if assessed.found.off_force < MATERIAL {
-            Some(Rejection::Immaterial { part: assessed.found.off_force })
+        } else if let Some(why) = immaterial(&assessed.found) {
+            Some(why)
         } else if let Some(part) = assessed.creeps {
             Some(Rejection::Creeps { part })
         } else if let Some(rather) = &assessed.rather {
@@ -178,6 +179,13 @@ impl WeighedModel {
             None
         }
     }
+}
+
+/// Returns why the simulation is right without an effect, however sure it is; none if it is not.
+fn immaterial(found: &EffectEvidence) -> Option<Rejection> {
+    let EffectEvidence { off_force, of_force, .. } = *found;
+    let of_error = (off_force < MATERIAL).then_some(Rejection::Immaterial { part: off_force });
+    of_error.or_else(|| (of_force < MATERIAL_OF_FORCE).then_some(Rejection::SlightForce { part: of_force }))
 }
 
 /// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at
@@ -251,9 +259,8 @@ impl Scales<'_> {
     /// Weighs a model; `hertz` where the frequency of a swing is known from before.
     fn once(&self, standing: StandingModel, hertz: Option<f64>) -> WeighedModel {
         let Self { context, refit, holdout, .. } = *self;
-        let StandingModel { model: slow, effects: mut found, rejected, materials } = standing;
-        let patched = context.fit(slow.model.clone(), &slow.noise, Colour::White);
-        alternatives::fit_rivals(context, &patched, &slow, holdout, &mut found);
+        let (StandingModel { model: slow, effects: found, rejected, materials }, patched) =
+            self.against_rivals(standing);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
         let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
         let left = self.left_over(&slow, &shown, &estimator);
@@ -278,6 +285,46 @@ impl Scales<'_> {
             swing,
             repeats,
         }
+    }
+
+    /// A model whose effects have met their rivals, and its fit under white noise. A rival that leads takes the effect's place, once: the
+    /// search adds one effect after another, and what was best then need not be best in the end.
+    fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
+        let contested = |standing: &mut StandingModel| {
+            let StandingModel { model, effects, .. } = standing;
+            let patched = self.context.fit(model.model.clone(), &model.noise, Colour::White);
+            alternatives::fit_rivals(self.context, &patched, model, self.holdout, effects);
+            patched
+        };
+        let patched = contested(&mut standing);
+        match alternatives::leader(&standing.effects)
+            .and_then(|(i, rival)| self.replaced(&standing, i, rival))
+        {
+            Some(mut other) => {
+                let patched = contested(&mut other);
+                (other, patched)
+            }
+            None => (standing, patched),
+        }
+    }
+
+    /// A model with a rival in the place of effect `i`; none where the rival may not be named.
+    fn replaced(&self, standing: &StandingModel, i: usize, rival: Effect) -> Option<StandingModel> {
+        let Self { context, holdout, .. } = *self;
+        let StandingModel { model, rejected, materials, .. } = standing;
+        let mut with = model.model.clone();
+        with.effects[i] = rival;
+        let slow = context.fit_slow(with, &[&self.null.noise, &model.noise]);
+        let white = context.fit(slow.model.clone(), &slow.noise, Colour::White);
+        let effects = gather_evidence(context, &white, &slow.noise, holdout);
+        let may_stand = effects.iter().all(|one| one.rejection().is_none())
+            && parameters::absence(context, &white, i).is_none();
+        may_stand.then(|| StandingModel {
+            model: slow,
+            effects,
+            rejected: rejected.clone(),
+            materials: materials.clone(),
+        })
     }
 
     /// The force that a model leaves.

@@ -12,7 +12,7 @@ use crate::estimation::force_residual::Estimator;
 use crate::numerics::linear::Prior;
 use crate::numerics::parallel;
 use crate::selection::candidates;
-use crate::selection::context::{FitContext, FittedModel, MOST};
+use crate::selection::context::{FitContext, MOST};
 use crate::selection::periodic::{self, Searched};
 use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE, SAME_SIZE_OF_SHARE};
 use crate::validation::out_of_library::unnamed_like;
@@ -258,44 +258,57 @@ impl<'a> State<'a> {
             |law: &&Columns| law.effect.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = context.nominal.has(NominalTerm::Coulomb) || self.laws.iter().any(is_dry);
         let no_losses = context.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
-        let best_of = |name: &N| -> Option<(Share, Columns)> {
+        let is_tried = |name: &N| {
             let definition = name.definition();
-            if there(*name)
-                || (definition.needs_dry() && !dry)
-                || (definition.is_of_jumps() && no_losses)
-                || !candidates::is_seen(*name, context.nominal)
-                || !wanted(*name)
-            {
-                return None;
-            }
-            let tried = self.best_shape(*name, &now, &residuals)?;
+            !there(*name)
+                && (!definition.needs_dry() || dry)
+                && (!definition.is_of_jumps() || !no_losses)
+                && candidates::is_seen(*name, context.nominal)
+                && wanted(*name)
+        };
+        let all: Vec<N> =
+            N::ALL.iter().chain(&context.nominal.rig.searched).copied().filter(is_tried).collect();
+        let is_periodic = |name: &N| name.definition().is_periodic();
+        // Waves that stand out as a force may be of the drive, and the other way round.
+        let sought: Vec<N> = match all.iter().any(is_periodic) {
+            true => N::ALL.iter().copied().filter(is_periodic).collect(),
+            false => Vec::new(),
+        };
+        let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
+        let waves: Vec<Effect> =
+            periodic::search(&sought, context, &searched).into_iter().map(|(effect, _)| effect).collect();
+        let best_of = |name: &N| -> Option<(Share, Columns)> {
+            let tried = match is_periodic(name) {
+                true => self.best_waves(*name, &waves)?,
+                false => self.best_shape(*name)?,
+            };
             Some((self.share(&tried)?, tried))
         };
-        let all: Vec<N> = N::ALL.iter().chain(&context.nominal.rig.searched).copied().collect();
         let mut found: Vec<(Share, Columns)> =
             parallel::map_all(&all, best_of).into_iter().flatten().collect();
         found.sort_by(|a, b| b.0.least().total_cmp(&a.0.least()));
         found
     }
 
+    fn columns(&self, effect: &Effect) -> Option<Columns> {
+        columns(effect, &self.on.sights, self.on.context.nominal, &self.asked)
+    }
+
+    /// The waves that take most on stretches left out of the fit, as those of one effect.
+    fn best_waves(&self, name: N, waves: &[Effect]) -> Option<Columns> {
+        let tried = waves.iter().filter_map(|found| {
+            let columns = self.columns(&Effect { name, ..found.clone() })?;
+            Some((self.on_fit(&columns), columns))
+        });
+        Some(tried.max_by(|a, b| a.0.total_cmp(&b.0))?.1)
+    }
+
     /// The shape of an effect that takes most on stretches left out of the fit.
-    fn best_shape(&self, name: N, now: &FittedModel, residuals: &[Vec<f64>]) -> Option<Columns> {
+    fn best_shape(&self, name: N) -> Option<Columns> {
         let on = self.on;
-        let columns = |effect: &Effect| columns(effect, &on.sights, on.context.nominal, &self.asked);
-        if name.definition().is_periodic() {
-            let searched = Searched { fit: &now.fit, residuals, model: &now.model };
-            // Waves that stand out as a force may be of the drive, and the other way round.
-            let all = N::ALL.iter().filter(|other| other.definition().is_periodic());
-            let tried = all.filter_map(|other| {
-                let found = periodic::search(*other, on.context, &searched)?.0;
-                let columns = columns(&Effect { name, ..found })?;
-                Some((self.on_fit(&columns), columns))
-            });
-            return Some(tried.max_by(|a, b| a.0.total_cmp(&b.0))?.1);
-        }
         let grid = candidates::shapes(name, on.context.span, on.context.nominal);
         let tried = grid.iter().filter_map(|effect| {
-            let columns = columns(effect)?;
+            let columns = self.columns(effect)?;
             Some((self.on_fit(&columns), columns))
         });
         let mut best = tried.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -308,7 +321,7 @@ impl<'a> State<'a> {
                     if !name.definition().is_possible(&effect) {
                         continue;
                     }
-                    let Some(moved) = columns(&effect) else { continue };
+                    let Some(moved) = self.columns(&effect) else { continue };
                     let share = self.on_fit(&moved);
                     if share > best.0 {
                         best = (share, moved);
