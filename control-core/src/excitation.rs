@@ -131,7 +131,8 @@ impl Excitation {
     pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
         let limits = &plan.device().limits;
         let thousandth = |t: i64| I16F16::from_num(t) / 1000;
-        let seconds = I16F16::saturating_from_num(I32F32::from_num(self.duration_ms) / 1000);
+        // A sequence of weeks has more milliseconds than the number holds.
+        let seconds = I16F16::saturating_from_num(I32F32::saturating_from_num(self.duration_ms) / 1000);
         within(Field::DurationSeconds, seconds, thousandth(10), I16F16::from_num(600))?;
         within(Field::Travel, self.travel.0, I16F16::ONE, I16F16::from_num(1000))?;
         within(Field::ServoStiffness, self.servo.stiffness.0, I16F16::ZERO, limits.stiffness.0)?;

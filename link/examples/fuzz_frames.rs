@@ -3,6 +3,8 @@
 
 use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;
+use control_core::excitation::{Excitation, Servo, Signal};
+use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
 use control_core::{Controller, TickInput};
 use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
@@ -61,7 +63,7 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 }
 
 fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
-    let command = match random.u8(0..13) {
+    let command = match random.u8(0..15) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
@@ -70,6 +72,7 @@ fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
         9 => Command::Index(Some(random.i32(..))),
         10 => Command::RestoreDevice(Record::of(&config(random).device, [0; 12])),
         11 => Command::Commission,
+        12 | 13 => Command::Excite(excitation(random)),
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::Zero,
@@ -77,6 +80,45 @@ fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
         _ => return (0..random.usize(0..1500)).map(|_| random.u8(..)).collect(),
     };
     encoded(&HostFrame { id, command })
+}
+
+/// A sound sequence, some of its values replaced by any other.
+fn excitation(random: &mut fastrand::Rng) -> Excitation {
+    let any =
+        |random: &mut fastrand::Rng| fixed::types::I16F16::from_bits(random.i32(..) >> random.u32(0..32));
+    let small = |random: &mut fastrand::Rng| match random.bool() {
+        true => fixed::types::I16F16::from_num(random.u8(1..20)),
+        false => any(random),
+    };
+    let speed = MillimetresPerSecond(small(random));
+    let signal = match random.u8(0..6) {
+        0 => Signal::Triangle { stroke: Millimetres(small(random)), speed },
+        1 => Signal::SpeedStaircase {
+            slowest: speed,
+            ratio: small(random),
+            steps: random.u8(..),
+            dwell_ms: random.u16(..),
+        },
+        2 => Signal::ReversalLadder {
+            smallest: Millimetres(small(random)),
+            ratio: small(random),
+            steps: random.u8(..),
+            speed,
+        },
+        3 => Signal::Multisine {
+            torque: MillinewtonMetres(small(random)),
+            frequencies: (0..random.usize(0..12)).map(|_| random.u16(..)).collect(),
+        },
+        4 => Signal::BreakawayRamps { torque: MillinewtonMetres(small(random)), ramp_ms: random.u16(..) },
+        _ => Signal::Hold,
+    };
+    Excitation {
+        signal,
+        duration_ms: random.u32(..) >> random.u32(0..32),
+        servo: Servo { stiffness: Stiffness(any(random)), damping: Damping::default() },
+        travel: Millimetres(small(random)),
+        compensated: random.bool(),
+    }
 }
 
 /// A sound configuration, some of its values replaced by any other.

@@ -142,6 +142,7 @@ fn each_value_is_refused_beyond_its_range_and_not_at_its_end() {
     assert_eq!(with(|e| e.duration_ms = 9), Some(Field::DurationSeconds));
     assert_eq!(with(|e| e.duration_ms = 600_000), None);
     assert_eq!(with(|e| e.duration_ms = 600_001), Some(Field::DurationSeconds));
+    assert_eq!(with(|e| e.duration_ms = u32::MAX), Some(Field::DurationSeconds));
     assert_eq!(with(|e| e.travel.0 = q(1_000.1)), Some(Field::Travel));
     assert_eq!(with(|e| e.servo.stiffness.0 = q(2.0)), None);
     assert_eq!(with(|e| e.servo.stiffness.0 = q(2.001)), Some(Field::ServoStiffness));

@@ -4,14 +4,13 @@ use super::confirm::{Consent, ConsentFlags};
 use super::run::stop_on_signals;
 use clap::Args;
 use device_sim::device::Port;
-use device_sim::device::part;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
 use host_sim::serial::SerialPort;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
-use lab::compensate::{self, Outcome, Step, page};
+use lab::compensate::{self, Step, files};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -100,7 +99,11 @@ impl Compensate {
         }
         let outcome =
             compensate::compensate(&mut line, rig, self.gain, |step| consent.ask(&step, step.moves()))?;
-        let mut lines = self.write(&outcome)?;
+        let written = match &self.out {
+            Some(out) => files::write(out, &self.device, &outcome)?,
+            None => Vec::new(),
+        };
+        let mut lines: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
         lines.extend(outcome.weight_mnm.map(|weight| format!("weight measured={weight:.3} mN·m")));
         lines.extend(outcome.taken_back.iter().chain(&outcome.left_out).cloned());
         let (before, after) = (&outcome.before, &outcome.after);
@@ -118,25 +121,5 @@ impl Compensate {
             "the device is as it was before: {}; characterise and diagnose again",
             outcome.taken_back.join("; ")
         )))
-    }
-
-    /// Writes the page and the device's part; returns the files' names.
-    fn write(&self, outcome: &Outcome) -> Result<Vec<String>, Failure> {
-        let Some(out) = &self.out else { return Ok(Vec::new()) };
-        let refuse = |cause: std::io::Error| {
-            Failure::input(format_args!(
-                "{}: cannot be written ({cause}); the device keeps its compensation; choose another --out",
-                out.display()
-            ))
-        };
-        std::fs::create_dir_all(out).map_err(refuse)?;
-        let device = part::to_toml(&self.device, &outcome.record)?;
-        let mut written = Vec::new();
-        for (file, text) in [("compensation.html", page::html(outcome)), ("device.toml", device)] {
-            let path = out.join(file);
-            std::fs::write(&path, text).map_err(refuse)?;
-            written.push(path.display().to_string());
-        }
-        Ok(written)
     }
 }

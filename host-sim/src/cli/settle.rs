@@ -1,11 +1,17 @@
 //! `host-sim settle`: the device asks itself what the recordings cannot tell.
 
+use super::confirm::{Consent, ConsentFlags};
+use super::run::stop_on_signals;
 use clap::{Args, ValueEnum};
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
-use lab::characterise::{self, written};
-use lab::settle::{self, Inputs, MOST_MOTION_S, MOST_ROUNDS, Plant, Progress, Settings};
-use std::path::PathBuf;
+use host_sim::serial::SerialPort;
+use lab::settle::{
+    self, Feel, Inputs, MOST_MOTION_S, MOST_ROUNDS, Plant, Progress, Settings, Settled, Subject,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The source of each round's input.
 #[derive(Clone, Copy, ValueEnum)]
@@ -18,20 +24,26 @@ enum Source {
     Characterise,
 }
 
-/// Let the virtual device settle its own diagnosis: record, diagnose, design the deciding experiment, and record again.
+/// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and record again.
 ///
-/// At most five rounds and three minutes of motion. It ends when one name is left or nothing tells the rest apart, and writes a
-/// folder for each round (recordings, experiment, report), settle.json and settle.html, which say what was asked and why.
+/// At most five rounds and three minutes of motion, within the device's ceilings of torque and travel. It ends when one name is left
+/// or nothing tells the rest apart. Then the device feeds forward what was settled, and what a hand feels more than before is taken
+/// back. It writes a folder for each round (recordings, experiment, report), settle.json, settle.html, compensation.html and
+/// device.toml.
 #[derive(Args)]
-#[command(after_help = examples!("Example:
-  host-sim settle --plant hidden.toml --out /tmp/settled"))]
+#[command(after_help = examples!("Examples:
+  host-sim settle --plant hidden.toml --out /tmp/settled
+  host-sim settle --device /dev/ttyACM0 --page --out settled"))]
 pub(crate) struct Settle {
     /// The simulation as its author believes it (default: the rig of the data sheets)
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
+    /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
+    #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
+    device: String,
     /// The true mechanism of the virtual device: a rig file, with effects that the simulation does not know
-    #[arg(long, value_name = "RIG.toml")]
-    plant: PathBuf,
+    #[arg(long, value_name = "RIG.toml", required_if_eq("device", "virtual"))]
+    plant: Option<PathBuf>,
     /// The most rounds, 1 to 5
     #[arg(long, default_value_t = MOST_ROUNDS, value_name = "N")]
     rounds: usize,
@@ -44,6 +56,11 @@ pub(crate) struct Settle {
     /// Seed of the inputs
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
+    /// Feed nothing forward at the end
+    #[arg(long)]
+    no_compensate: bool,
+    #[command(flatten)]
+    consent: ConsentFlags,
     /// Folder for the files
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -59,40 +76,99 @@ impl Settle {
                 "--motion must be 20 to {MOST_MOTION_S:.0} s; correct it"
             )));
         }
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+        let consent = self.consent.open("Settling a diagnosis", &self.device, &stop)?;
+        let outcome = self.on_device(&consent, &stop);
+        let lines = outcome.as_ref().map(|settled| said(settled, &self.out));
+        consent.end(lines.clone());
+        if let Ok(lines) = lines {
+            for line in lines {
+                say!("{line}");
+            }
+        }
+        outcome.map(drop)
+    }
+
+    fn on_device(&self, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Failure> {
+        match &self.plant {
+            Some(_) if self.device != "virtual" => {
+                Err(Failure::input("--plant is for the virtual device: a real one has its own mechanism"))
+            }
+            Some(path) => {
+                let rig = Rig::read(path).map_err(Failure::input)?;
+                self.on(&mut Subject::Virtual(Plant { rig, file: path.display().to_string() }), consent, stop)
+            }
+            None => {
+                let mut port = SerialPort::find(&self.device)?;
+                consent.needle_is_out()?;
+                self.on(&mut Subject::Real { port: &mut port, stop }, consent, stop)
+            }
+        }
+    }
+
+    fn on(&self, subject: &mut Subject, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Failure> {
         let rig = match &self.rig {
             Some(path) => Rig::read(path).map_err(Failure::input)?,
-            None => written::nominal_rig(&characterise::scale(&characterise::configuration())?),
+            None => subject.data_sheet_rig()?,
         };
-        let plant = Plant {
-            rig: Rig::read(&self.plant).map_err(Failure::input)?,
-            file: self.plant.display().to_string(),
-        };
+        settle::settle(subject, &rig, &self.settings(), |progress| {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Failure::failed("stopped before the end; the rounds so far are in --out"));
+            }
+            match progress {
+                Progress::Asked(number, asked, why) => {
+                    consent.ask(&format_args!("round {number}: {asked}; why: {why}: hands off"), true)?;
+                }
+                Progress::Said(sentence) => note!("  {sentence}."),
+                Progress::Played(_) => {}
+                Progress::Feeds(step) => consent.ask(&step, step.moves())?,
+            }
+            Ok(())
+        })
+    }
+
+    fn settings(&self) -> Settings {
         let inputs = match self.inputs {
             Source::Designed => Inputs::Designed,
             Source::Multisines => Inputs::Multisines,
             Source::Characterise => Inputs::Characterise,
         };
-        let Self { rounds, motion: motion_s, seed, out, .. } = self;
-        let settings = Settings { inputs, rounds, motion_s, seed, out };
-        let settled = settle::settle(&plant, &rig, &settings, |progress| match progress {
-            Progress::Asked(number, asked, why) => {
-                note!("round {number}: {asked}");
-                note!("  why: {why}");
-            }
-            Progress::Said(sentence) => note!("  {sentence}."),
-            Progress::Played(_) => {}
-        })?;
-        for name in &settled.names {
-            say!("{} {:.2}", name.class.join(" or "), name.confidence);
+        Settings {
+            inputs,
+            rounds: self.rounds,
+            motion_s: self.motion,
+            seed: self.seed,
+            compensate: !self.no_compensate,
+            device: self.device.clone(),
+            out: self.out.clone(),
         }
-        say!("{}.", settled.conclusion);
-        say!("report: {}", settings.out.join("settle.html").display());
-        say!(
-            "rounds={} motion_s={:.1} names={}",
-            settled.rounds.len(),
-            settled.motion_s(),
-            settled.names.len()
-        );
-        Ok(())
     }
+}
+
+/// What was settled, one line each; the last one counts.
+fn said(settled: &Settled, out: &Path) -> Vec<String> {
+    let mut lines: Vec<String> = settled
+        .names
+        .iter()
+        .map(|name| format!("{} {:.2}", name.class.join(" or "), name.confidence))
+        .collect();
+    lines.push(format!("{}.", settled.conclusion));
+    match &settled.feel {
+        Some(Ok(Feel { before, after, notes })) => {
+            lines.extend(notes.iter().cloned());
+            let (before, after) = (1e3 * before.all(), 1e3 * after.all());
+            lines.push(format!("a hand feels the mechanism with {after:.1} mN rms, {before:.1} before"));
+        }
+        Some(Err(why)) => lines.push(why.clone()),
+        None => {}
+    }
+    lines.push(format!("report: {}", out.join("settle.html").display()));
+    lines.push(format!(
+        "rounds={} motion_s={:.1} names={}",
+        settled.rounds.len(),
+        settled.motion_s(),
+        settled.names.len()
+    ));
+    lines
 }

@@ -26,6 +26,7 @@ mod recordings;
 mod safety_page;
 #[cfg(unix)]
 mod serial;
+mod settle;
 mod simulate;
 mod streams;
 mod training;

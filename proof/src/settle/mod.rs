@@ -200,7 +200,7 @@ fn answer(
     std::fs::write(&concealed, &plant.toml)
         .map_err(|e| format!("cannot write {}: {e}", concealed.display()))?;
     let mut command = Command::new(program);
-    command.args(["--quiet", "settle", "--inputs", arm, "--seed"]).arg(seed.to_string());
+    command.args(["--quiet", "settle", "--no-compensate", "--inputs", arm, "--seed"]).arg(seed.to_string());
     command.arg("--plant").arg(&concealed).arg("--out").arg(folder);
     if motion_s.is_finite() {
         command.arg("--motion").arg(motion_s.max(LEAST_MOTION_S).to_string());

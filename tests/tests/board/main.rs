@@ -4,6 +4,7 @@ mod commissioning;
 mod compensation;
 mod control;
 mod crash;
+mod excitations;
 mod faults;
 mod fitted;
 mod holding;

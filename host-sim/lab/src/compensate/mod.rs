@@ -5,6 +5,7 @@
 pub mod angle;
 pub mod coefficients;
 pub mod felt;
+pub mod files;
 pub mod page;
 pub mod weight;
 

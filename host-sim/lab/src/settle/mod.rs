@@ -1,13 +1,17 @@
 //! `settle`: a device records, diagnoses, designs the experiment that tells the remaining rivals apart, and records again, until one
-//! name is left or nothing tells the rest apart.
+//! name is left or nothing tells the rest apart. What was settled is fed forward by the device, as far as it can be.
 
+mod feel;
 mod page;
 mod play;
+mod subject;
 
-use crate::characterise::News;
-use crate::characterise::mechanism::BareDevice;
+pub use feel::Feel;
+pub use subject::Subject;
+
 use crate::characterise::programme::{Programme, programmes};
-use crate::characterise::{self, written};
+use crate::characterise::written;
+use crate::compensate;
 use device_sim::failure::Failure;
 use diagnosis::report::{Report, Verdict};
 use diagnosis::rig::Rig;
@@ -58,6 +62,10 @@ pub struct Settings {
     pub motion_s: f64,
     /// Seed of the inputs.
     pub seed: u64,
+    /// True if what was settled is fed forward.
+    pub compensate: bool,
+    /// The device's name in its files: `virtual`, or a port.
+    pub device: String,
     /// Folder for all files.
     pub out: PathBuf,
 }
@@ -89,7 +97,7 @@ pub struct Name {
 }
 
 /// The outcome.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Settled {
     /// The rounds, in order.
     pub rounds: Vec<Round>,
@@ -97,6 +105,8 @@ pub struct Settled {
     pub names: Vec<Name>,
     /// Why no further round follows, a sentence without its full stop.
     pub conclusion: String,
+    /// The force on a hand before and after, or why nothing is fed forward; none where nothing is named or it was not asked for.
+    pub feel: Option<Result<Feel, String>>,
 }
 
 impl Settled {
@@ -115,6 +125,8 @@ pub enum Progress<'a> {
     Played(f64),
     /// The diagnosis says this.
     Said(&'a str),
+    /// A step of the compensation begins.
+    Feeds(compensate::Step),
 }
 
 /// A round that is to be played.
@@ -125,50 +137,110 @@ struct Asked {
     design: Option<Box<Design>>,
 }
 
-/// Settles the diagnosis of a virtual device whose mechanism is `plant` and whose simulation is `rig`. Before each recording the device
-/// rests until it is cold.
+/// Settles the diagnosis of a device whose simulation is `rig`. `progress` is told each round and each step of the compensation before the
+/// motor moves, and may end the run there.
 ///
 /// # Errors
-/// A sentence if an input is refused before it starts, a fault ends a recording, or files cannot be read or written.
+/// A sentence if an input is refused before it starts, a fault or a person ends a recording, or files cannot be read or written.
 pub fn settle(
-    plant: &Plant,
+    subject: &mut Subject,
     rig: &Rig,
     settings: &Settings,
-    mut progress: impl FnMut(Progress),
+    mut progress: impl FnMut(Progress) -> Result<(), Failure>,
 ) -> Result<Settled, Failure> {
-    let limited = Limited::new(rig)?;
-    let mut request = Request::default();
-    let mut settled = Settled { rounds: Vec::new(), names: Vec::new(), conclusion: String::new() };
-    let mut asked = first(&limited, rig, settings)?;
-    loop {
-        let number = settled.rounds.len() + 1;
-        let folder = settings.out.join(format!("round-{number}"));
-        progress(Progress::Asked(number, &asked.words, &asked.why));
-        if let Some(design) = &asked.design {
-            design.write(&folder.join("experiment")).map_err(Failure::failed)?;
-        }
-        record(plant, rig, &asked.programmes, &folder, &mut request, &mut progress)?;
-        let report = match diagnosed(&request, &folder.join("report")) {
-            Ok(outcome) => outcome.report,
-            Err(failure) if number == 1 => return Err(failure),
-            Err(failure) => {
-                // The names of the round before stand.
-                settled.conclusion = format!("the recordings of round {number} cannot be used: {failure}");
-                page::write(&settled, &settings.out)?;
-                return Ok(settled);
+    let limited = Limited::new(rig, subject.config()?)?;
+    let mut run = Run { limited, rig, settings, request: Request::default() };
+    let mut settled = Settled::default();
+    let report = run.rounds(subject, &mut settled, &mut progress)?;
+    if let Some(report) = report.filter(|_| settings.compensate && !settled.names.is_empty()) {
+        let radius_mm = run.limited.radius_mm();
+        settled.feel = Some(feel::feel(subject, &report, settings, radius_mm, &mut progress)?);
+    }
+    page::write(&settled, &settings.out)?;
+    Ok(settled)
+}
+
+/// A run over its rounds.
+struct Run<'a> {
+    limited: Limited,
+    rig: &'a Rig,
+    settings: &'a Settings,
+    /// All recordings so far.
+    request: Request,
+}
+
+impl Run<'_> {
+    /// Plays round after round until nothing is left to ask; returns the folder of the last report.
+    fn rounds(
+        &mut self,
+        subject: &mut Subject,
+        settled: &mut Settled,
+        progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
+    ) -> Result<Option<PathBuf>, Failure> {
+        let mut asked = first(&self.limited, self.rig, self.settings)?;
+        let mut last = None;
+        loop {
+            let number = settled.rounds.len() + 1;
+            let folder = self.settings.out.join(format!("round-{number}"));
+            progress(Progress::Asked(number, &asked.words, &asked.why))?;
+            if let Some(design) = &asked.design {
+                design.write(&folder.join("experiment")).map_err(Failure::failed)?;
             }
-        };
-        progress(Progress::Said(&report.sentence));
-        settled.rounds.push(round(asked, &report));
-        settled.names = names(&report);
-        match following(&limited, &report, &folder.join("report"), settings, &settled)? {
-            Ok(next) => asked = next,
-            Err(conclusion) => {
-                settled.conclusion = conclusion;
-                page::write(&settled, &settings.out)?;
-                return Ok(settled);
+            self.record(subject, &asked.programmes, &folder, progress)?;
+            let report = match diagnosed(&self.request, &folder.join("report")) {
+                Ok(outcome) => outcome.report,
+                Err(failure) if number == 1 => return Err(failure),
+                Err(failure) => {
+                    // The names of the round before stand.
+                    settled.conclusion =
+                        format!("the recordings of round {number} cannot be used: {failure}");
+                    return Ok(last);
+                }
+            };
+            progress(Progress::Said(&report.sentence))?;
+            settled.rounds.push(round(asked, &report));
+            settled.names = names(&report);
+            let folder = folder.join("report");
+            match following(&self.limited, &report, &folder, self.settings, settled)? {
+                Ok(next) => asked = next,
+                Err(conclusion) => {
+                    settled.conclusion = conclusion;
+                    return Ok(Some(folder));
+                }
             }
+            last = Some(folder);
         }
+    }
+
+    /// Plays programmes and writes the recordings, which the next diagnosis reads together with those before.
+    fn record(
+        &mut self,
+        subject: &mut Subject,
+        programmes: &[Programme],
+        folder: &Path,
+        progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let mut shown = Ok(());
+        let tracks = subject.play(programmes, |seconds| {
+            if shown.is_ok() {
+                shown = progress(Progress::Played(seconds));
+            }
+        })?;
+        shown?;
+        let paths = written::write_all(folder, &tracks)?;
+        for path in &paths[1..] {
+            let is_holdout = path.file_name().is_some_and(|name| name == "holdout.csv");
+            let to = if is_holdout { &mut self.request.holdout } else { &mut self.request.fit };
+            to.push(path.clone());
+        }
+        // Not the rig of the data sheets but the simulation as its author believes it.
+        self.request.rig = paths[0].clone();
+        std::fs::write(&self.request.rig, self.rig.to_toml()).map_err(|cause| {
+            Failure::failed(format_args!(
+                "{}: the rig cannot be written ({cause}); free some space or choose another --out",
+                self.request.rig.display()
+            ))
+        })
     }
 }
 
@@ -273,41 +345,6 @@ fn shortened(mut all: Vec<Programme>, most_s: f64) -> Vec<Programme> {
         step.excitation.duration_ms = (f64::from(step.excitation.duration_ms) * part) as u32;
     }
     all
-}
-
-/// Plays programmes and writes the recordings, which the next diagnosis reads together with those before.
-fn record(
-    plant: &Plant,
-    rig: &Rig,
-    programmes: &[Programme],
-    folder: &Path,
-    request: &mut Request,
-    progress: &mut impl FnMut(Progress),
-) -> Result<(), Failure> {
-    let mut tracks = Vec::new();
-    for programme in programmes {
-        let mut device = BareDevice::new(&plant.rig, &plant.file)?;
-        let one = std::slice::from_ref(programme);
-        tracks.extend(characterise::on_virtual(&mut device, one, |news| {
-            if let News::Played(seconds) = news {
-                progress(Progress::Played(seconds));
-            }
-        })?);
-    }
-    let paths = written::write_all(folder, &tracks)?;
-    for path in &paths[1..] {
-        let is_holdout = path.file_name().is_some_and(|name| name == "holdout.csv");
-        let to = if is_holdout { &mut request.holdout } else { &mut request.fit };
-        to.push(path.clone());
-    }
-    // Not the rig of the data sheets but the simulation as its author believes it.
-    request.rig = paths[0].clone();
-    std::fs::write(&request.rig, rig.to_toml()).map_err(|cause| {
-        Failure::failed(format_args!(
-            "{}: the rig cannot be written ({cause}); free some space or choose another --out",
-            request.rig.display()
-        ))
-    })
 }
 
 fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Failure> {

@@ -1,6 +1,7 @@
 //! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
-use super::{Round, Settled};
+use super::{Feel, Round, Settled};
+use crate::compensate::felt::Felt;
 use device_sim::failure::Failure;
 use html_report::{Cell, Sheet};
 use std::path::Path;
@@ -44,9 +45,25 @@ fn json(settled: &Settled) -> String {
         "names": names,
         "conclusion": settled.conclusion,
         "motion_s": settled.motion_s(),
+        "feel": settled.feel.as_ref().map(feel_json),
         "rounds": settled.rounds.iter().map(round).collect::<Vec<_>>(),
     });
     format!("{value:#}\n")
+}
+
+fn feel_json(feel: &Result<Feel, String>) -> serde_json::Value {
+    let phases = |felt: &Felt| {
+        let phases = felt.phases().map(|(name, force)| (name.to_owned(), serde_json::json!(1e3 * force)));
+        serde_json::Value::Object(phases.into_iter().collect())
+    };
+    match feel {
+        Ok(feel) => serde_json::json!({
+            "before_mn_rms": phases(&feel.before),
+            "after_mn_rms": phases(&feel.after),
+            "notes": feel.notes,
+        }),
+        Err(why) => serde_json::json!({ "why_not": why }),
+    }
 }
 
 fn html(settled: &Settled) -> String {
@@ -80,8 +97,37 @@ fn html(settled: &Settled) -> String {
     let rows: Vec<Vec<Cell>> = settled.rounds.iter().enumerate().map(row).collect();
     sheet.table(&["round", "asked", "why", "motion, s", "the diagnosis of all recordings so far"], &rows);
     contenders(&mut sheet, settled);
+    if let Some(feel) = &settled.feel {
+        felt(&mut sheet, feel);
+    }
     sheet.note("Each round's folder holds its recordings, its experiment (why this input) and its report.");
     sheet.finish()
+}
+
+/// Writes the force on a hand before and after.
+fn felt(sheet: &mut Sheet, feel: &Result<Feel, String>) {
+    sheet.heading("The mechanism's force on a hand, with what was settled fed forward");
+    let feel = match feel {
+        Ok(feel) => feel,
+        Err(why) => return sheet.note(&format!("{}.", capitalised(why))),
+    };
+    let phases = feel.before.phases().into_iter().zip(feel.after.phases());
+    let row = |((name, before), (_, after)): ((&str, f64), (&str, f64))| {
+        vec![Cell::text(name), Cell::number(Some(1e3 * before), 1), Cell::number(Some(1e3 * after), 1)]
+    };
+    let rows: Vec<Vec<Cell>> = phases.map(row).collect();
+    sheet.table(&["phase", "before, mN rms", "after, mN rms"], &rows);
+    for note in &feel.notes {
+        sheet.note(&format!("{}.", capitalised(note)));
+    }
+    sheet.note(
+        "device.toml holds what the device feeds forward, compensation.html where along the travel it helps.",
+    );
+}
+
+fn capitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn rounds(count: usize) -> String {

@@ -1,8 +1,8 @@
 //! Inputs of the design as excitations of the device, within its limits.
 
 use super::{Asked, in_words};
+use crate::characterise;
 use crate::characterise::programme::{Programme, Step, TRAVEL_MM, servo};
-use crate::characterise::{self, configuration};
 use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
@@ -27,8 +27,7 @@ pub(super) struct Limited {
 }
 
 impl Limited {
-    pub(super) fn new(rig: &Rig) -> Result<Self, Failure> {
-        let config = configuration();
+    pub(super) fn new(rig: &Rig, config: Config) -> Result<Self, Failure> {
         let hello = characterise::scale(&config)?;
         let radius_mm = hello.roller_radius_mm;
         Ok(Self {
@@ -152,11 +151,12 @@ impl Limited {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::characterise::configuration;
     use crate::characterise::written::nominal_rig;
 
     fn limited() -> Limited {
         let hello = characterise::scale(&configuration()).expect("the configuration is sound");
-        Limited::new(&nominal_rig(&hello)).expect("the configuration is sound")
+        Limited::new(&nominal_rig(&hello), configuration()).expect("the configuration is sound")
     }
 
     #[test]

@@ -1,0 +1,28 @@
+//! The files that a compensation leaves: a page, and the device's part of the configuration.
+
+use super::{Outcome, page};
+use device_sim::device::part;
+use device_sim::failure::Failure;
+use std::path::{Path, PathBuf};
+
+/// Writes `compensation.html` and `device.toml` of the device called `device` to a folder, which is made; returns their paths.
+///
+/// # Errors
+/// A sentence if they cannot be written.
+pub fn write(folder: &Path, device: &str, outcome: &Outcome) -> Result<Vec<PathBuf>, Failure> {
+    let refuse = |cause: std::io::Error| {
+        Failure::input(format_args!(
+            "{}: cannot be written ({cause}); the device keeps its compensation; choose another --out",
+            folder.display()
+        ))
+    };
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    let device = part::to_toml(device, &outcome.record)?;
+    let mut written = Vec::new();
+    for (file, text) in [("compensation.html", page::html(outcome)), ("device.toml", device)] {
+        let path = folder.join(file);
+        std::fs::write(&path, text).map_err(refuse)?;
+        written.push(path);
+    }
+    Ok(written)
+}

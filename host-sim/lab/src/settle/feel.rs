@@ -1,0 +1,58 @@
+//! The use of what was settled: the device feeds it forward, a hand's force is measured before and after, and what is not better is taken
+//! back.
+
+use super::subject::Subject;
+use super::{Progress, Settings};
+use crate::compensate::felt::Felt;
+use crate::compensate::{self, files};
+use device_sim::failure::Failure;
+use std::path::Path;
+
+/// The force that the mechanism adds to a hand, before and after.
+#[derive(Clone, Debug)]
+pub struct Feel {
+    /// As the device was.
+    pub before: Felt,
+    /// With what it feeds forward.
+    pub after: Felt,
+    /// The parts that were taken back or cannot be fed forward, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Feeds forward what the report in `report` found, and writes the page and the device's part beside `settle.html`. The sentence where
+/// nothing is fed forward.
+///
+/// # Errors
+/// A sentence if a person ends it or a file cannot be written.
+pub(super) fn feel(
+    subject: &mut Subject,
+    report: &Path,
+    settings: &Settings,
+    radius_mm: f64,
+    progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
+) -> Result<Result<Feel, String>, Failure> {
+    let rig = compensate::read_report(report)?;
+    let mut ended = None;
+    let outcome = subject.talk(radius_mm, |line| {
+        compensate::compensate(line, &rig, 1.0, |step| {
+            progress(Progress::Feeds(step)).map_err(|failure| {
+                let sentence = failure.to_string();
+                ended = Some(failure);
+                Failure::failed(sentence)
+            })
+        })
+    });
+    if let Some(failure) = ended {
+        return Err(failure);
+    }
+    let outcome = match outcome {
+        Ok(outcome) => outcome,
+        Err(why) => return Ok(Err(format!("nothing is fed forward: {why}"))),
+    };
+    files::write(&settings.out, &settings.device, &outcome)?;
+    let notes: Vec<String> = outcome.taken_back.iter().chain(&outcome.left_out).cloned().collect();
+    if !outcome.is_compensated {
+        return Ok(Err(format!("nothing is fed forward: {}", notes.join("; "))));
+    }
+    Ok(Ok(Feel { before: outcome.before, after: outcome.after, notes }))
+}

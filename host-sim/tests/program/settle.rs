@@ -1,0 +1,163 @@
+//! `settle`, on the virtual device and over a port: the rounds, the use of what was settled, and a person who ends it.
+
+use crate::common::folder;
+use device_sim::device::{Port, Wire};
+use device_sim::failure::Failure;
+use diagnosis::rig::Rig;
+use lab::characterise::mechanism::BareDevice;
+use lab::settle::{Inputs, Plant, Progress, Settings, Subject, settle};
+use link::codec::MAX_FRAME;
+use std::collections::VecDeque;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+fn hidden() -> Rig {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/hidden.toml");
+    Rig::read(&path).expect("a rig")
+}
+
+/// One round of recordings that last `motion_s` together.
+fn settings(out: &Path, motion_s: f64, compensate: bool) -> Settings {
+    let inputs = if compensate { Inputs::Designed } else { Inputs::Characterise };
+    Settings { inputs, rounds: 1, motion_s, seed: 1, compensate, device: "virtual".into(), out: out.into() }
+}
+
+#[test]
+fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
+    let out = folder("settle-feel");
+    let mut subject = Subject::Virtual(Plant { rig: hidden(), file: "hidden.toml".into() });
+    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let mut steps = 0;
+    let settled = settle(&mut subject, &rig, &settings(&out, 40.0, true), |progress| {
+        steps += usize::from(matches!(progress, Progress::Feeds(_)));
+        Ok(())
+    })
+    .expect("it is settled");
+    assert!(!settled.names.is_empty(), "{}", settled.conclusion);
+    let feel = settled.feel.expect("it was asked for").expect("something is fed forward");
+    let (before, after) = (feel.before.all(), feel.after.all());
+    assert!(after < 0.6 * before, "{after} N after {before} N");
+    assert!(steps >= 3, "each step is announced: {steps}");
+    // The device's part reads back, and the page shows what the file says.
+    let json = std::fs::read_to_string(out.join("settle.json")).expect("it was written");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let hold = json["feel"]["after_mn_rms"]["hold"].as_f64().expect("a number");
+    assert!((hold - 1e3 * feel.after.hold).abs() < 1e-9);
+    for file in ["device.toml", "compensation.html", "settle.html"] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+}
+
+/// A device with a mechanism behind a port. It moves on only while its wire is read, and no faster than a clock.
+struct Behind(Arc<Mutex<BareDevice>>);
+
+impl Port for Behind {
+    fn open(&mut self) -> io::Result<Box<dyn Wire>> {
+        let begun = self.0.lock().expect("nobody panicked").ticks();
+        let (device, waiting) = (self.0.clone(), VecDeque::new());
+        Ok(Box::new(Cable { device, waiting, begun, since: Instant::now() }))
+    }
+}
+
+struct Cable {
+    device: Arc<Mutex<BareDevice>>,
+    waiting: VecDeque<u8>,
+    begun: u64,
+    since: Instant,
+}
+
+/// Ticks between two readings at most, so that a slow computer makes a slow device and not a silent one.
+const BURST: u64 = 50;
+
+impl Wire for Cable {
+    fn read(&mut self, into: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let mut device = self.device.lock().expect("nobody panicked");
+        let due = self.begun + (self.since.elapsed().as_micros() / 100) as u64;
+        let ticks = due.saturating_sub(device.ticks());
+        if ticks == 0 && self.waiting.is_empty() {
+            std::thread::sleep(patience);
+        }
+        for _ in 0..ticks.min(BURST) {
+            device.tick(0.0);
+        }
+        let mut frame = [0; MAX_FRAME];
+        loop {
+            match device.transmit(&mut frame) {
+                0 => break,
+                count => self.waiting.extend(&frame[..count]),
+            }
+        }
+        let count = into.len().min(self.waiting.len());
+        for (place, byte) in into.iter_mut().zip(self.waiting.drain(..count)) {
+            *place = byte;
+        }
+        Ok(count)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.device.lock().expect("nobody panicked").receive(bytes);
+        Ok(())
+    }
+}
+
+fn behind() -> Behind {
+    Behind(Arc::new(Mutex::new(BareDevice::new(&hidden(), "hidden.toml").expect("a device"))))
+}
+
+/// Takes 9 s: the device is a real one to the program, and plays in real time.
+#[test]
+fn a_device_behind_a_port_is_recorded_and_diagnosed() {
+    let (out, stop) = (folder("settle-port"), AtomicBool::new(false));
+    let mut port = behind();
+    let mut subject = Subject::Real { port: &mut port, stop: &stop };
+    let rig = subject.data_sheet_rig().expect("the device tells its scale");
+    let settled = settle(&mut subject, &rig, &settings(&out, 9.0, false), |_| Ok(())).expect("it is settled");
+    assert_eq!(settled.rounds.len(), 1);
+    assert!(settled.feel.is_none(), "it was not asked for");
+    let rows = std::fs::read_to_string(out.join("round-1/fit.csv")).expect("a recording").lines().count();
+    assert!(rows > 20_000, "{rows} rows at 10 kHz");
+}
+
+#[test]
+fn a_person_ends_it_and_the_torque_goes() {
+    let (out, stop) = (folder("settle-stop"), AtomicBool::new(false));
+    let mut port = behind();
+    let device = port.0.clone();
+    let mut subject = Subject::Real { port: &mut port, stop: &stop };
+    let rig = subject.data_sheet_rig().expect("the device tells its scale");
+    let ended = settle(&mut subject, &rig, &settings(&out, 9.0, false), |progress| {
+        if matches!(progress, Progress::Played(seconds) if seconds > 0.5) {
+            stop.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    });
+    let said = ended.expect_err("it was stopped").to_string();
+    assert!(said.contains("stopped"), "{said}");
+    let mut device = device.lock().expect("nobody panicked");
+    // What the program sent last reaches the device: torque fades and stays away.
+    for _ in 0..2_000 {
+        device.tick(0.0);
+    }
+    let begin = device.position();
+    for _ in 0..2_000 {
+        device.tick(0.0);
+    }
+    assert!((device.position() - begin).abs() < 0.01, "the roller still turns");
+    assert!(!out.join("round-1").join("fit.csv").exists(), "half a recording was written");
+}
+
+#[test]
+fn a_person_refuses_the_first_movement() {
+    let out = folder("settle-refused");
+    let mut subject = Subject::Virtual(Plant { rig: hidden(), file: "hidden.toml".into() });
+    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let refused = settle(&mut subject, &rig, &settings(&out, 9.0, false), |progress| match progress {
+        Progress::Asked(..) => Err(Failure::failed("not now")),
+        _ => Ok(()),
+    });
+    assert_eq!(refused.expect_err("it was refused").to_string(), "not now");
+    assert!(!out.join("round-1").exists(), "nothing was played");
+}
