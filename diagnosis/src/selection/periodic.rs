@@ -67,7 +67,7 @@ struct Waves<'a> {
     searched: &'a Searched<'a>,
     /// The command's input of each recording, where the waves are in proportion to it.
     drives: Vec<Option<Input>>,
-    /// Where the blocks of each recording lie.
+    /// The places of each recording's blocks.
     places: Vec<Vec<(f64, f64)>>,
     /// Travel over which orders are counted, rad or m.
     turn: f64,

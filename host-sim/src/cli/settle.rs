@@ -146,7 +146,7 @@ impl Settle {
     }
 }
 
-/// What was settled, one line each; the last one counts.
+/// The outcome, one line each; the last one counts.
 fn said(settled: &Settled, out: &Path) -> Vec<String> {
     let mut lines: Vec<String> = settled
         .names
