@@ -7,6 +7,8 @@ use crate::solid::{Convex, Stretch, inside_all};
 /// From where to where along the section, mm from the point of entry, and between two columns.
 const ALONG_MM: [f64; 2] = [-60.0, 80.0];
 const STEP_MM: f64 = 1.25;
+/// At least so many columns show a part that is small.
+const COLUMNS: f64 = 24.0;
 /// Above and below this there is nothing to draw, mm below the point of entry.
 const DOWN_MM: [f64; 2] = [-90.0, 110.0];
 /// Halvings that find the end of a part between two columns.
@@ -39,11 +41,12 @@ fn outline(part: &[Convex], block: &Block) -> Vec<[f64; 2]> {
         let [from, to] = [from.max(DOWN_MM[0]), to.min(DOWN_MM[1])];
         (from < to).then_some([from, to])
     };
-    let columns = ((ALONG_MM[1] - ALONG_MM[0]) / STEP_MM) as usize;
+    let [low, high] = extent(part, block);
+    let columns = ((high - low) / STEP_MM).max(COLUMNS).ceil();
     let mut found: Vec<(f64, Stretch)> = vec![];
     let mut before: Option<(f64, Option<Stretch>)> = None;
-    for number in 0..=columns {
-        let x = ALONG_MM[0] + STEP_MM * number as f64;
+    for number in 0..=columns as usize {
+        let x = low + (high - low) * number as f64 / columns;
         let here = column(x);
         match (before, here) {
             (Some((empty, None)), Some(_)) => found.extend(end(empty, x, &column)),
@@ -56,6 +59,19 @@ fn outline(part: &[Convex], block: &Block) -> Vec<[f64; 2]> {
     let round = |mm: f64| (mm * 100.0).round() / 100.0;
     let first = found.iter().map(|(x, [from, _])| [round(*x), round(*from)]);
     first.chain(found.iter().rev().map(|(x, [_, to])| [round(*x), round(*to)])).collect()
+}
+
+/// From where to where along the section a part can be, a little more than it is, mm.
+fn extent(part: &[Convex], block: &Block) -> [f64; 2] {
+    let (points, around) = match part.first() {
+        Some(Convex::Capsule { ends, radius }) => (ends.to_vec(), *radius),
+        Some(Convex::Ellipsoid { centre, half }) => (vec![*centre], half.iter().copied().fold(0.0, f64::max)),
+        _ => return ALONG_MM,
+    };
+    let along = points.iter().map(|point| block.from_limb(*point)[0]);
+    let low = along.clone().fold(f64::INFINITY, f64::min) - 1.01 * around;
+    let high = along.fold(f64::NEG_INFINITY, f64::max) + 1.01 * around;
+    [low.clamp(ALONG_MM[0], ALONG_MM[1]), high.clamp(ALONG_MM[0], ALONG_MM[1])]
 }
 
 /// The last column of a part towards one without it.

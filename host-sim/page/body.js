@@ -84,9 +84,10 @@ export class BodyView {
     this.depth.max = scene.needle.length_mm;
     // A real device and a recording have no hand that a slider could move.
     this.depth.disabled = !scene.hand;
-    this.depth.closest("figcaption").hidden = !scene.hand;
+    this.depth.closest("label").hidden = !scene.hand;
     // Table 1 is skin, vessel and skin.
     this.model.disabled = !scene.vessel || Boolean(scene.body);
+    byId("model-row").hidden = Boolean(scene.body);
     if (this.model.disabled) this.model.value = "limb";
     if (this.picture) this.build();
   }

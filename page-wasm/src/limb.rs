@@ -12,6 +12,8 @@ pub(crate) const NUMBERS: usize = 7;
 const GRID: [usize; 2] = [28, 17];
 /// The block of tissue reaches so deep under the skin, mm.
 pub(crate) const BLOCK_MM: f64 = 30.0;
+/// A tube deeper than this is none of the block's, mm.
+const DEEPEST_MM: f32 = 40.0;
 /// A layer is drawn at least so thick, mm.
 const THINNEST_MM: f64 = 0.35;
 /// Starts above everything, mm.
@@ -117,7 +119,7 @@ impl Limb {
             let kind =
                 crate::picture::TISSUES.get(code(structure.tissue) as usize).copied().unwrap_or("other");
             let mut layer = Layer::of(kind, top, thick(number));
-            layer.rows = ((thick(number) / 2.0).round() as usize).clamp(1, 14);
+            layer.rows = ((thick(number) / 3.0).round() as usize).clamp(1, 9);
             let own = given.iter().find(|given| given.kind == code(structure.tissue));
             layer.gives_mm = own.map_or(0.0, |given| given.travel_mm.clamp(0.0, 30.0));
             top += layer.thickness_mm;
@@ -158,12 +160,9 @@ impl Limb {
                 continue;
             }
             for (tube, (line, radius)) in structure.tubes.iter().enumerate() {
-                let inside = |place: &[f64; 3]| {
-                    let [x, y, z] = place.map(|mm| mm as f32);
-                    x >= along[0] && x <= along[1] && y.abs() <= half_width && z < 40.0
-                };
-                let line = line.iter().map(|place| self.block().from_limb(*place));
-                let line: Vec<[f64; 3]> = line.filter(inside).collect();
+                let inside = |place: &&[f64; 3]| self.is_in_block(**place, along, half_width);
+                let line = line.iter().filter(inside).map(|place| self.block().from_limb(*place));
+                let line: Vec<[f64; 3]> = line.collect();
                 if line.len() < 3 {
                     continue;
                 }
@@ -187,6 +186,12 @@ impl Limb {
             }
         }
         best.map(|(_, vessel, tube)| (vessel, tube))
+    }
+
+    /// True if a place of the limb's frame is in the block of tissue.
+    pub(crate) fn is_in_block(&self, place: [f64; 3], along: [f32; 2], half_width: f32) -> bool {
+        let [x, y, z] = self.block().from_limb(place).map(|mm| mm as f32);
+        x >= along[0] && x <= along[1] && y.abs() <= half_width && z < DEEPEST_MM
     }
 
     /// Notes the tissue of each surface of the block: that of its layer, or a vessel's.

@@ -11,8 +11,10 @@ const LIMB_ACROSS_MM: f64 = 60.0;
 const LIMB_STEP_MM: f64 = 4.0;
 /// Skin deeper than this below the point of entry is not drawn, mm.
 const LOWEST_MM: f64 = 60.0;
-/// A section is painted over another by so much, mm towards the eye.
-const OVER_MM: f64 = 0.005;
+/// A section is painted over that of the structure before it by so much, mm towards the eye: all of them are thinner than a needle.
+const OVER_MM: f64 = 0.04;
+/// The section beyond the block of tissue reaches so far into it, mm.
+const EDGE_MM: f64 = 1.4;
 /// Points around a tube and a ball.
 const AROUND: usize = 16;
 const UPRIGHT: usize = 12;
@@ -63,14 +65,28 @@ impl Limb {
                 }
                 Role::Tube => {
                     for (tube, (line, radius)) in structure.tubes.iter().enumerate() {
-                        if moving != Some([number, tube]) {
-                            self.pipe(line, *radius, structure.tissue, &mut still);
+                        let pieces = if moving == Some([number, tube]) {
+                            self.beyond(line, along, half_width)
+                        } else {
+                            vec![line.clone()]
+                        };
+                        for line in pieces {
+                            self.pipe(&line, *radius, structure.tissue, &mut still);
                         }
                     }
                 }
             }
         }
         still
+    }
+
+    /// The pieces of a tube's line before and behind the block, each up to its first point in it.
+    fn beyond(&self, line: &[[f64; 3]], along: [f32; 2], half_width: f32) -> Vec<Vec<[f64; 3]>> {
+        let inside = |place: &[f64; 3]| self.is_in_block(*place, along, half_width);
+        let first = line.iter().position(inside).unwrap_or(line.len());
+        let last = line.iter().rposition(inside).unwrap_or(0);
+        let before = line[..(first + 1).min(line.len())].to_vec();
+        [before, line[last..].to_vec()].into_iter().filter(|piece| piece.len() > 1).collect()
     }
 
     fn skin_around(&self, along: [f64; 2], half_width: f64, still: &mut Still) {
@@ -115,27 +131,32 @@ impl Limb {
 
     /// Cut faces along the needle's plane, each painted over those before it.
     fn section(&self, along: [f64; 2], moving: Option<[usize; 2]>, still: &mut Still) {
-        for (order, outline) in self.body.outlines(self.block()).into_iter().enumerate() {
+        for outline in self.body.outlines(self.block()) {
             let structure = &self.body.structures[outline.structure];
             let is_moving = moving.is_some_and(|[number, _]| number == outline.structure);
             let is_layer = structure.role == Role::Layer;
-            let aside = (OVER_MM * (1 + order.min(40)) as f64) as f32;
+            let aside = (OVER_MM * (1 + outline.structure) as f64) as f32;
             let first = still.points.len() as u32;
             let count = outline.points_mm.len();
-            let in_block = |x: f64| x > along[0] && x < along[1];
+            // A little over its edges, which do not move.
+            let in_block = |x: f64| x > along[0] + EDGE_MM && x < along[1] - EDGE_MM;
             for (number, [x, z]) in outline.points_mm.iter().enumerate() {
                 // The block of tissue shows its own; under it the layer goes on.
                 let is_top = number < count / 2;
-                let lowest = if is_layer && is_top && in_block(*x) { self.skin(*x, 0.0) + BLOCK_MM } else { *z };
+                let lowest =
+                    if is_layer && is_top && in_block(*x) { self.skin(*x, 0.0) + BLOCK_MM } else { *z };
                 still.points.push([*x as f32, aside, z.max(lowest) as f32, 0.0]);
             }
             let mut triangles = vec![];
             for column in 0..(count / 2).saturating_sub(1) {
                 let corners = [column, column + 1, count - 2 - column, count - 1 - column];
-                let middle = 0.5 * (outline.points_mm[column][0] + outline.points_mm[column + 1][0]);
+                let ends = [column, column + 1].map(|number| outline.points_mm[number][0]);
                 let [a, b, c, d] = corners.map(|number| first + number as u32);
                 let depth = |corner: u32| still.points[corner as usize][2];
-                if (is_moving && in_block(middle)) || depth(a) >= depth(d) || depth(b) >= depth(c) {
+                if (is_moving && ends.into_iter().all(in_block))
+                    || depth(a) >= depth(d)
+                    || depth(b) >= depth(c)
+                {
                     continue;
                 }
                 triangles.extend([[a, b, c], [a, c, d]]);
