@@ -5,7 +5,7 @@ use crate::place::Block;
 use crate::solid::{Convex, Stretch, inside_all};
 
 /// From where to where along the section, mm from the point of entry, and between two columns.
-const ALONG_MM: [f64; 2] = [-60.0, 80.0];
+const ALONG_MM: [f64; 2] = [-90.0, 110.0];
 const STEP_MM: f64 = 1.25;
 /// At least so many columns show a part that is small.
 const COLUMNS: f64 = 24.0;

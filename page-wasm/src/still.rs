@@ -140,23 +140,22 @@ impl Limb {
             let count = outline.points_mm.len();
             // A little over its edges, which do not move.
             let in_block = |x: f64| x > along[0] + EDGE_MM && x < along[1] - EDGE_MM;
-            for (number, [x, z]) in outline.points_mm.iter().enumerate() {
-                // The block of tissue shows its own; under it the layer goes on.
-                let is_top = number < count / 2;
-                let lowest =
-                    if is_layer && is_top && in_block(*x) { self.skin(*x, 0.0) + BLOCK_MM } else { *z };
-                still.points.push([*x as f32, aside, z.max(lowest) as f32, 0.0]);
+            // The block of tissue shows its own; under it the layer goes on, from a second line of points.
+            let tops = outline.points_mm.iter().take(count / 2);
+            let under =
+                tops.map(|[x, z]| [*x, if is_layer { z.max(self.skin(*x, 0.0) + BLOCK_MM) } else { *z }]);
+            for [x, z] in outline.points_mm.iter().copied().chain(under) {
+                still.points.push([x as f32, aside, z as f32, 0.0]);
             }
             let mut triangles = vec![];
             for column in 0..(count / 2).saturating_sub(1) {
-                let corners = [column, column + 1, count - 2 - column, count - 1 - column];
-                let ends = [column, column + 1].map(|number| outline.points_mm[number][0]);
+                let is_within =
+                    [column, column + 1].into_iter().all(|number| in_block(outline.points_mm[number][0]));
+                let top = if is_within { count + column } else { column };
+                let corners = [top, top + 1, count - 2 - column, count - 1 - column];
                 let [a, b, c, d] = corners.map(|number| first + number as u32);
                 let depth = |corner: u32| still.points[corner as usize][2];
-                if (is_moving && ends.into_iter().all(in_block))
-                    || depth(a) >= depth(d)
-                    || depth(b) >= depth(c)
-                {
+                if (is_moving && is_within) || depth(a) >= depth(d) || depth(b) >= depth(c) {
                     continue;
                 }
                 triangles.extend([[a, b, c], [a, c, d]]);
