@@ -27,6 +27,7 @@ export class PlaceEditor {
     /** What is to be asked: keys of the body, or `incline_deg`. */
     this.wish = null;
     this.due = Infinity;
+    this.skinTilt = 0;
     this.turned = { degrees: NaN, since: 0, refused: NaN };
     this.asked = false;
     for (const [id, key] of Object.entries(SLIDERS)) byId(id).addEventListener("input", (event) => this.want({ [key]: Number(event.target.value) }));
@@ -36,6 +37,7 @@ export class PlaceEditor {
   /** Another anatomy: its limb's length. */
   setScene(scene) {
     this.body = scene.body ?? null;
+    this.skinTilt = scene.skin_tilt_rad;
     this.row.hidden = !this.body || !this.profile;
     this.site.value = this.body?.name ?? "";
     if (!this.body) return;
@@ -83,7 +85,8 @@ export class PlaceEditor {
       this.say("The needle is drawn out first.");
       return;
     }
-    const { incline_deg: incline = this.profile.entry_deg, ...body } = this.wish;
+    // The line is the needle's as it is held now.
+    const { incline_deg: incline = inclination(view, this.skinTilt), ...body } = this.wish;
     const profile = structuredClone(this.profile);
     profile.entry_deg = incline;
     Object.assign(profile.body, body);
@@ -92,16 +95,16 @@ export class PlaceEditor {
     if (!this.asked) this.say("The program is unreachable; nothing was sent.");
   }
 
-  /** A needle that a person has turned outside of the body gets the layers of its new line. */
+  /** A needle that has been turned outside of the body gets the layers of its new line. */
   watchTilt(view, now) {
-    const degrees = ((view.tilt - (this.skinTilt ?? 0)) * 180) / Math.PI;
+    const degrees = inclination(view, this.skinTilt);
     if (Math.abs(degrees - this.turned.degrees) > TURNED_DEG / 2 || Number.isNaN(this.turned.degrees)) {
       this.turned.degrees = degrees;
       this.turned.since = now;
     }
     const isNew = Math.abs(degrees - this.profile.entry_deg) > TURNED_DEG && Math.abs(degrees - this.turned.refused) > TURNED_DEG;
-    if (view.person && view.depth < 0 && isNew && now - this.turned.since > STILL_MS && !this.wish && !this.asked) {
-      this.want({ incline_deg: Math.min(90, Math.max(5, Math.round(degrees * 10) / 10)) }, 0);
+    if (view.depth < 0 && isNew && now - this.turned.since > STILL_MS && !this.wish && !this.asked) {
+      this.want({ incline_deg: degrees }, 0);
     }
   }
 
@@ -114,4 +117,10 @@ export class PlaceEditor {
       byId(`${id}-value`).textContent = `${value} ${key.endsWith("_mm") ? "mm" : "°"}`;
     }
   }
+}
+
+/** The needle's inclination in degrees, as a patient's file may say it. */
+function inclination(view, skinTilt) {
+  const degrees = ((view.tilt - skinTilt) * 180) / Math.PI;
+  return Math.min(90, Math.max(5, Math.round(degrees * 10) / 10));
 }
