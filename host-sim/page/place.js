@@ -30,8 +30,10 @@ export class PlaceEditor {
     this.skinTilt = 0;
     this.turned = { degrees: NaN, since: 0, refused: NaN };
     this.asked = false;
+    /** The demo is to go on once the needle is elsewhere. */
+    this.givesBack = false;
     for (const [id, key] of Object.entries(SLIDERS)) byId(id).addEventListener("input", (event) => this.want({ [key]: Number(event.target.value) }));
-    this.site.addEventListener("change", () => this.link.send({ do: "choose", patient: SITES[this.site.value] ?? "adult" }));
+    this.site.addEventListener("change", () => this.choose(SITES[this.site.value] ?? "adult"));
   }
 
   /** Another anatomy: its limb's length. */
@@ -50,12 +52,21 @@ export class PlaceEditor {
     this.profile = profile;
     this.row.hidden = !this.body;
     byId("site-row").hidden = false;
-    if (!this.asked) return;
-    this.asked = false;
-    const refused = answer && !answer.taken;
-    this.say(refused ? answer.reason : "");
-    if (refused) this.turned.refused = this.turned.degrees;
+    if (this.asked) {
+      this.asked = false;
+      const refused = answer && !answer.taken;
+      this.say(refused ? answer.reason : "");
+      if (refused) this.turned.refused = this.turned.degrees;
+      if (this.givesBack) this.link.send({ do: "demo" });
+      this.givesBack = false;
+    }
     this.show();
+  }
+
+  /** Another site, with its patient's own entry. */
+  choose(patient) {
+    this.wish = { patient };
+    this.due = performance.now();
   }
 
   /** A click on the skin enters there. */
@@ -65,7 +76,8 @@ export class PlaceEditor {
 
   want(keys, pause = PAUSE_MS) {
     if (!this.profile?.body) return;
-    this.wish = { ...this.wish, ...keys };
+    const { patient, ...others } = this.wish ?? {};
+    this.wish = { ...others, ...keys };
     this.due = performance.now() + pause;
     this.show();
   }
@@ -79,20 +91,25 @@ export class PlaceEditor {
     const now = performance.now();
     if (this.profile?.body) this.watchTilt(view, now);
     if (!this.wish || now < this.due || this.asked) return;
-    // The demo begins anew in any case; a person's needle first comes out.
-    if (view.person && view.depth > 0) {
-      this.hand.want(OUTSIDE_MM);
-      this.say("The needle is drawn out first.");
+    if (view.depth > 0) {
+      if (!view.person) this.givesBack = true;
+      if (this.hand.movable) this.hand.want(OUTSIDE_MM);
+      this.say(this.hand.movable ? "The needle is drawn out first." : "Draw the needle out first.");
       return;
     }
-    // The line is the needle's as it is held now.
+    const message = this.wish.patient ? { do: "choose", patient: this.wish.patient } : { do: "edit", profile: this.edited(view) };
+    this.wish = null;
+    this.asked = this.link.send(message);
+    if (!this.asked) this.say("The program is unreachable; nothing was sent.");
+  }
+
+  /** The patient with the entry that is wished, for the needle as it is held now. */
+  edited(view) {
     const { incline_deg: incline = inclination(view, this.skinTilt), ...body } = this.wish;
     const profile = structuredClone(this.profile);
     profile.entry_deg = incline;
     Object.assign(profile.body, body);
-    this.wish = null;
-    this.asked = this.link.send({ do: "edit", profile });
-    if (!this.asked) this.say("The program is unreachable; nothing was sent.");
+    return profile;
   }
 
   /** A needle that has been turned outside of the body gets the layers of its new line. */

@@ -6,9 +6,9 @@ use anatomy::{Role, Tissue};
 use ultrasound::Medium;
 
 /// The limb beyond the block: from where to where along and across, and between two lines, mm.
-const LIMB_MM: [f64; 2] = [-60.0, 80.0];
+const LIMB_MM: [f64; 2] = [-90.0, 110.0];
 const LIMB_ACROSS_MM: f64 = 60.0;
-const LIMB_STEP_MM: f64 = 4.0;
+const LIMB_STEP_MM: f64 = 5.0;
 /// Skin deeper than this below the point of entry is not drawn, mm.
 const LOWEST_MM: f64 = 60.0;
 /// A section is painted over that of the structure before it by so much, mm towards the eye: all of them are thinner than a needle.
