@@ -62,9 +62,9 @@ impl Structure {
 pub struct Piece {
     /// The number of the structure in [`Body::structures`].
     pub structure: usize,
-    /// Where it begins, mm along the line.
+    /// Its beginning, mm along the line.
     pub from_mm: f64,
-    /// Where it ends, mm along the line.
+    /// Its end, mm along the line.
     pub to_mm: f64,
 }
 

@@ -49,8 +49,8 @@ fn outline(part: &[Convex], block: &Block) -> Vec<[f64; 2]> {
         let x = low + (high - low) * number as f64 / columns;
         let here = column(x);
         match (before, here) {
-            (Some((empty, None)), Some(_)) => found.extend(end(empty, x, &column)),
-            (Some((full, Some(_))), None) => found.extend(end(x, full, &column)),
+            (Some((empty, None)), Some(_)) => found.extend(end(empty, x, column)),
+            (Some((full, Some(_))), None) => found.extend(end(x, full, column)),
             _ => {}
         }
         found.extend(here.map(|stretch| (x, stretch)));

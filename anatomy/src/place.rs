@@ -1,4 +1,4 @@
-//! Where and in which direction a needle enters a limb that may be turned, and the frame in which a picture shows it.
+//! The place and the direction in which a needle enters a limb that may be turned, and the frame in which a picture shows it.
 
 use crate::body::{Body, Piece};
 use crate::vector::{Vector, add, dot, scale, sub};

@@ -112,7 +112,7 @@ fn capsule(ends: [Vector; 2], radius: f64, origin: Vector, direction: Vector) ->
     stretches.into_iter().flatten().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
 
-/// What is in both.
+/// Returns the part of the line that is in both stretches.
 fn both(a: Stretch, b: Stretch) -> Option<Stretch> {
     let [from, to] = [a[0].max(b[0]), a[1].min(b[1])];
     (from < to).then_some([from, to])

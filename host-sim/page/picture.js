@@ -82,7 +82,7 @@ export class Picture {
     return { depth: this.core.skin(along, across), lean: this.core.upright(along, across, azimuth) };
   }
 
-  /** Where a line of sight meets the skin: `{ place, along, around }`, of which the last two are a body's, or null. */
+  /** Returns the place where a line of sight meets the skin: `{ place, along, around }`, of which the last two are a body's, or null. */
   pick(eye, direction) {
     this.floats(this.core.input(), 6).set([...eye, ...direction]);
     const pointer = this.core.pick();
@@ -108,7 +108,7 @@ export class Picture {
   }
 }
 
-/** What is built: Table 1 of Paper 000 (1), a body with its place (2), or level layers (0). */
+/** Returns the kind of tissue to build: Table 1 of Paper 000 (1), a body with its place (2), or level layers (0). */
 function how(scene, table1) {
   if (table1) return [1];
   const body = scene.body;

@@ -24,7 +24,7 @@ export class PlaceEditor {
     this.note = byId("place-note");
     this.site = byId("site");
     this.profile = null;
-    /** What is to be asked: keys of the body, or `incline_deg`. */
+    /** The wish that is to be asked: keys of the body, `incline_deg` or `patient`. */
     this.wish = null;
     this.due = Infinity;
     this.skinTilt = 0;

@@ -23,7 +23,7 @@ export class Tissue3d {
     this.canvas = canvas;
     this.colours = colours;
     this.renderer = renderer;
-    /** What a click or a drag on the skin does: functions of what `picture.pick` returns. */
+    /** Called for a click and for a drag on the skin: functions of what `picture.pick` returns. */
     this.clicked = () => {};
     this.probeMoved = () => {};
     /** The direction of view, rad, and the factor by which the view is farther away than needle and hub need. */
@@ -79,7 +79,7 @@ export class Tissue3d {
     });
   }
 
-  /** Where the skin is that is under the pointer, as `picture.pick` says it; null where none is. */
+  /** Returns the place of the skin under the pointer, as `picture.pick` says it; null where none is. */
   sight(event) {
     if (!this.seen || !this.picture) return null;
     const box = this.canvas.getBoundingClientRect();

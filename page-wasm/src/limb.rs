@@ -207,7 +207,7 @@ impl Limb {
         }
     }
 
-    /// Where a line of sight in the block's frame first meets the skin, and how far along (mm) and around (degrees) the limb that is.
+    /// Returns the place where a line of sight in the block's frame first meets the skin, and how far along (mm) and around (degrees) the limb that is.
     pub(crate) fn pick(&self, [eye, direction]: [[f64; 3]; 2]) -> Option<([f64; 3], [f64; 2])> {
         let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         let (from, ahead) =
@@ -221,7 +221,7 @@ impl Limb {
     }
 }
 
-/// Where a line of sight first meets a limb without a body: a cylinder that touches the entry from below.
+/// Returns the place where a line of sight first meets a limb without a body: a cylinder that touches the entry from below.
 pub(crate) fn pick_cylinder(radius: f64, [eye, direction]: [[f64; 3]; 2]) -> Option<[f64; 3]> {
     let limb = anatomy::solid::Convex::Cylinder { across: radius, down: radius };
     let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! What of a body stays as it is in the picture: the skin around the block of tissue, the section beyond it, bones, bursae and tubes.
+//! The parts of a body that stay as they are in the picture: the skin around the block of tissue, the section beyond it, bones, bursae and tubes.
 
 use crate::limb::{BLOCK_MM, Limb, code};
 use crate::picture::{Kind, SurfaceView};

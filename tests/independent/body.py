@@ -51,7 +51,7 @@ def tube(across, down, psi_deg, reach, radius):
 
     def inside(p):
         values = numpy.full(len(p), 1e3)
-        # Only what comes near at all.
+        # Only points that can be inside.
         low, high = curve.min(axis=0) - radius - 1.0, curve.max(axis=0) + radius + 1.0
         near = numpy.flatnonzero(((p > low) & (p < high)).all(axis=1))
         for part in numpy.array_split(near, max(1, len(near) // 500)):

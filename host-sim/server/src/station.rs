@@ -122,7 +122,8 @@ impl<'a> Station<'a> {
                 let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
                 procedure.into_iter().for_each(|procedure| device.follow(procedure));
                 // The layers of a body are those of a line: the needle points along it.
-                let on_line = self.bedside.as_ref().filter(|bedside| taken && bedside.profile().body.is_some());
+                let on_line =
+                    self.bedside.as_ref().filter(|bedside| taken && bedside.profile().body.is_some());
                 on_line.into_iter().for_each(|bedside| {
                     device.control(Control::Tilt { rad: bedside.profile().tilt_rad() });
                 });

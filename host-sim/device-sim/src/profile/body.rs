@@ -54,7 +54,7 @@ pub struct InBody {
     pub body: Body,
     /// The needle's way.
     pub line: Line,
-    /// What it meets, in order.
+    /// The pieces that it meets, in order.
     pub pieces: Vec<Piece>,
     /// The names of the layers that the device gets.
     pub names: Vec<String>,
@@ -256,7 +256,7 @@ mod tests {
         layers.map(|(layer, number)| (name(number), layer.depth.0.to_num::<f64>() / sine)).collect()
     }
 
-    /// What the needle meets at any inclination the device meets at the same mm along the needle.
+    /// At any inclination the device meets each structure at the same mm along the needle as the line does.
     #[test]
     fn the_devices_layers_are_those_of_the_line() {
         for (name, degrees) in [("forearm", 25.0), ("shoulder-joint", 45.0), ("hip", 80.0), ("knee", 45.0)] {
