@@ -2,11 +2,11 @@
 
 use crate::limb::{self, Limb};
 use crate::slab::{bottom_mm, configure, views};
-use crate::still::Closed;
+use crate::still::{Closed, Still};
 use crate::table_1;
 use tissue::body::Part;
 use tissue::needle::WallName;
-use tissue::{Needle, PunctureState, Punctures, Tissue};
+use tissue::{Configuration, Needle, PunctureState, Punctures, Tissue};
 use ultrasound::{Imager, InPlaneScore, Look, Medium, Mesh, Probe, Scene, Shaft};
 
 /// Tissues by the number that the page calls them by.
@@ -93,6 +93,35 @@ fn probe_for(given: &[Given]) -> Probe {
     Probe { width_mm: IMAGE_WIDTH_MM, depth_mm, focus_mm: depth_mm / 2.0, ..Probe::default() }
 }
 
+/// The layers from the numbers of the input.
+fn given(numbers: &[f32]) -> Vec<Given> {
+    let layers = numbers.chunks_exact(PER_LAYER).map(|n| Given {
+        kind: n[0] as u32,
+        depth_mm: n[1],
+        travel_mm: n[2],
+        is_vessel: n[0] == 7.0,
+        is_far: n[0] == 8.0,
+    });
+    layers.collect()
+}
+
+/// The surfaces to draw, of the tissue and of what stays beside it; and what stays, its points after the tissue's.
+fn surfaces(
+    tissue: &Tissue,
+    walls: &[Option<WallName>],
+    limb: Option<&Limb>,
+    configuration: &Configuration,
+    tube: Option<[usize; 2]>,
+) -> (Vec<SurfaceView>, Still) {
+    let mut surfaces = views(tissue, walls);
+    let Some(limb) = limb else { return (surfaces, Still::default()) };
+    let mut still = limb.still(configuration.along_mm, configuration.half_width_mm, tube);
+    still = still.after(tissue.points().len() as u32);
+    limb.name(&mut surfaces);
+    surfaces.append(&mut still.views);
+    (surfaces, still)
+}
+
 impl Picture {
     /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
@@ -108,16 +137,7 @@ impl Picture {
         if !(0.1..=5.0).contains(&diameter_mm) {
             return Err(format!("a needle {diameter_mm} mm thick"));
         }
-        let given: Vec<Given> = numbers[1..=PER_LAYER * count]
-            .chunks_exact(PER_LAYER)
-            .map(|n| Given {
-                kind: n[0] as u32,
-                depth_mm: n[1],
-                travel_mm: n[2],
-                is_vessel: n[0] == 7.0,
-                is_far: n[0] == 8.0,
-            })
-            .collect();
+        let given = given(&numbers[1..=PER_LAYER * count]);
         let angle: f32 = angle;
         let angle = if angle.is_finite() { angle.clamp(0.1, 1.57) } else { 0.5 };
         let limb = match rest.get(4) {
@@ -137,14 +157,7 @@ impl Picture {
         };
         let mut tissue = Tissue::new(&configuration).map_err(|refusal| refusal.to_string())?;
         tissue.set_punctures(Punctures::Told);
-        let still =
-            limb.as_ref().map(|limb| limb.still(configuration.along_mm, configuration.half_width_mm, tube));
-        let still = still.unwrap_or_default().after(tissue.points().len() as u32);
-        let mut surfaces = views(&tissue, &walls);
-        if let Some(limb) = &limb {
-            limb.name(&mut surfaces);
-        }
-        surfaces.extend(still.views);
+        let (surfaces, still) = surfaces(&tissue, &walls, limb.as_ref(), &configuration, tube);
         let media = configuration.layers.iter().map(|layer| Medium::named(&layer.name)).collect();
         let radius = configuration.limb_radius_mm.unwrap_or(1e4);
         let (tissue_points, particles) = (tissue.points().to_vec(), tissue.points().len());

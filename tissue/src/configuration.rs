@@ -302,7 +302,13 @@ impl Configuration {
                 "about {particles:.0} particles; at most {MOST_PARTICLES} are possible: widen spacing_mm"
             ));
         }
-        let Some(vessel) = &self.vessel else { return Ok(()) };
+        self.vessel.as_ref().map_or(Ok(()), |vessel| self.check_vessel(vessel, top))
+    }
+
+    /// Refuses a vessel that cannot be built in layers that end at `bottom`, mm.
+    fn check_vessel(&self, vessel: &Vessel, bottom: f32) -> Result<(), Refusal> {
+        let refuse = |what: String| Err(Refusal(what));
+        let within = |value: f32, low: f32, high: f32| value >= low && value <= high;
         let numbers = [
             (vessel.vertical_mm, 0.3, 50.0, "vertical_mm"),
             (vessel.horizontal_mm, 0.3, 50.0, "horizontal_mm"),
@@ -317,7 +323,7 @@ impl Configuration {
             (vessel.axis_deg, -360.0, 360.0, "axis_deg"),
             (vessel.centre_mm[0], self.along_mm[0], self.along_mm[1], "centre_mm along"),
             (vessel.centre_mm[1], -self.half_width_mm, self.half_width_mm, "centre_mm across"),
-            (vessel.top_mm, self.layers[0].top_mm + 0.1, top - vessel.vertical_mm - 0.1, "top_mm"),
+            (vessel.top_mm, self.layers[0].top_mm + 0.1, bottom - vessel.vertical_mm - 0.1, "top_mm"),
         ];
         let is_straight = vessel.path_mm.is_empty();
         if !is_straight
