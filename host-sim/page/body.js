@@ -62,6 +62,9 @@ export class BodyView {
     }
     renderer ??= new WebGl(canvas);
     this.limb = new Tissue3d(canvas, this.colours, renderer);
+    // A click on the skin is a wish to enter there; the probe is dragged over it.
+    this.limb.clicked = (found) => this.entered?.(found);
+    this.limb.probeMoved = (place, event) => this.ultrasound?.drag(place, event);
     this.stats.graphics = renderer.name;
     renderer.lost?.then(() => this.replaceLimb());
   }
@@ -81,10 +84,11 @@ export class BodyView {
     this.depth.max = scene.needle.length_mm;
     // A real device and a recording have no hand that a slider could move.
     this.depth.disabled = !scene.hand;
-    this.depth.closest("figcaption").hidden = !scene.hand;
+    this.depth.closest("label").hidden = !scene.hand;
     // Table 1 is skin, vessel and skin.
-    this.model.disabled = !scene.vessel;
-    if (!scene.vessel) this.model.value = "limb";
+    this.model.disabled = !scene.vessel || Boolean(scene.body);
+    byId("model-row").hidden = Boolean(scene.body);
+    if (this.model.disabled) this.model.value = "limb";
     if (this.picture) this.build();
   }
 
@@ -99,6 +103,12 @@ export class BodyView {
     this.limb?.build(this.picture, table1 ? asSlabs(this.scene) : this.scene);
     this.ultrasound.build(this.picture);
     this.stats.particles = this.picture.particles;
+    this.stats.structures = this.scene.layers.map((layer) => layer.structure ?? layer.name);
+    this.stats.entry = this.scene.body ?? null;
+    // Across the needle's plane: it moves where the limb turns.
+    this.stats.skinBesideMm = this.picture.skin(0, 8, 0).depth;
+    this.stats.probe = this.ultrasound.probe;
+    this.stats.sight = (x, y) => this.limb?.sight({ clientX: x, clientY: y }) ?? null;
   }
 
   happen(event) {

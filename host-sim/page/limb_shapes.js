@@ -152,14 +152,18 @@ export function perspective(field, aspect, near, far) {
   return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
 }
 
-/** z points down into the body, so up is −z. */
-export function look(eye, target) {
+/** The camera's directions to the right, up and back to the eye. z points down into the body, so up is −z. */
+export function axesOf(eye, target) {
   const norm = (v) => v.map((x) => x / Math.hypot(...v));
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const back = norm(eye.map((x, i) => x - target[i]));
   const right = norm(cross([0, 0, -1], back));
-  const up = cross(back, right);
+  return [right, cross(back, right), back];
+}
+
+export function look(eye, target) {
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const [right, up, back] = axesOf(eye, target);
   return [right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, -dot(right, eye), -dot(up, eye), -dot(back, eye), 1];
 }
 

@@ -8,6 +8,7 @@ import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PatientEditor } from "./patient.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
+import { PlaceEditor } from "./place.js";
 import { Practice } from "./practice.js";
 import { OwnForces } from "./own_forces.js";
 import { Scrub } from "./scrub.js";
@@ -34,7 +35,7 @@ let tissue = null;
 let linkStatus = null;
 /** The newest state, which is drawn. */
 const view = {
-  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, lateral: 0, vessel: "outside", state: "idle",
+  known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, skinAngle: 0.5, lateral: 0, vessel: "outside", state: "idle",
   hand: 0, person: false, seconds: 0, ghost: NaN,
 };
 /** The number of jumps of the played recording when this was drawn. */
@@ -50,12 +51,14 @@ const receive = {
     hand.followScene(scene);
     panel.scene(scene);
     body.setScene(scene);
+    place.setScene(scene);
   },
   device(message) {
     panel.device(message);
   },
   patient(message) {
     patient.follow(message);
+    place.follow(message);
   },
   practice(message) {
     practice.goal(message);
@@ -87,6 +90,7 @@ const receive = {
     view.torque = pose.torque_mnm;
     view.tilt = pose.tilt_rad;
     view.angle = pose.angle_rad;
+    view.skinAngle = angleToSkin(scene.body, pose.angle_rad);
     view.lateral = pose.lateral_n;
     view.vessel = pose.vessel;
     view.state = pose.state;
@@ -94,6 +98,13 @@ const receive = {
     hand.follow(message.hand, pose.depth_mm, pose.tilt_rad);
   },
 };
+
+/** The angle between the skin at entry and a needle at `angle` to the horizontal, rad: the same where the skin is level. */
+function angleToSkin(body, angle) {
+  if (!body) return angle;
+  const [ahead, , down] = body.inwards;
+  return Math.asin(Math.min(1, Math.max(-1, ahead * Math.cos(angle) + down * Math.sin(angle))));
+}
 
 /** Nothing has happened yet: another scene, or another place in a recording. */
 function forget() {
@@ -120,6 +131,8 @@ body.setHand(hand);
 const scrub = new Scrub(link);
 const ownForces = new OwnForces(link);
 const patient = new PatientEditor(link);
+const place = new PlaceEditor(link, hand);
+body.entered = (found) => place.enter(found);
 const practice = new Practice(link, palette);
 
 /** The values for tests and curious people: pictures per second, age of the last message, what is drawn, when first. */
@@ -141,6 +154,7 @@ function draw(nowMs) {
   lastDrawn = nowMs;
   view.hand = hand.depth;
   view.person = hand.person;
+  place.tell(view);
   const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
   if (tissue) {

@@ -104,12 +104,12 @@ export class Panel {
   show(view, link, condition, nowMs) {
     const known = view.known;
     write(byId("depth"), known ? number(view.depth, 2) : "–");
-    write(byId("under-skin"), known ? number(Math.max(0, view.depth * Math.sin(view.angle)), 2) : "–");
+    write(byId("under-skin"), known ? number(Math.max(0, view.depth * Math.sin(view.skinAngle)), 2) : "–");
     write(byId("motor-force"), known ? number(view.motor, 2) : "–");
     write(byId("force"), known ? number(view.force, 2) : "–");
     write(byId("speed"), known ? number(view.speed, 1) : "–");
     write(byId("torque"), known ? number(view.torque, 1) : "–");
-    write(byId("tilt"), known ? number((view.angle * 180) / Math.PI, 0) : "–");
+    write(byId("tilt"), known ? number((view.skinAngle * 180) / Math.PI, 0) : "–");
     // Of the one law that has such a force, once the needle was turned in its tissue.
     if (known && view.lateral) byId("lateral-row").hidden = false;
     write(byId("lateral"), known ? number(view.lateral, 2) : "–");

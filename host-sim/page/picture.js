@@ -2,10 +2,11 @@
 
 import { bytes } from "./bytes.js";
 
-const TISSUES = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+/** By the numbers of page-wasm; 7 to 9 are vessels. */
+export const TISSUES = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage", "lumen", "lumen", "lumen"];
 const VESSEL = 7;
 const FAR_WALL = 8;
-export const KINDS = { skinBehind: 0, skinBefore: 1, section: 2, vesselBehind: 3, vesselBefore: 4 };
+export const KINDS = { skinBehind: 0, skinBefore: 1, section: 2, vesselBehind: 3, vesselBefore: 4, insideBehind: 5, insideBefore: 6 };
 export const LINES = 256;
 export const SAMPLES = 1024;
 export const SLICES = 64;
@@ -34,7 +35,8 @@ export class Picture {
       const tissue = layer.is_vessel ? VESSEL : layer.is_far_wall ? FAR_WALL : Math.max(0, TISSUES.indexOf(layer.name));
       numbers.push(tissue, layer.depth_mm, layer.puncture_travel_mm ?? -1, layer.friction_n_per_mm);
     }
-    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle, scene.needle.diameter_mm, Number(table1));
+    numbers.push(scene.vessel?.width_mm ?? NaN, scene.vessel?.offset_mm ?? 0, angle, scene.needle.diameter_mm);
+    numbers.push(...how(scene, table1));
     this.floats(this.core.input(), numbers.length).set(numbers);
     this.built = this.core.build(numbers.length) === 1;
     return this.built;
@@ -70,8 +72,23 @@ export class Picture {
     return Array.from({ length: this.core.surfaces() }, (_, i) => {
       const [pointer, count] = [this.core.surface_triangles(i), 3 * this.core.surface_triangle_count(i)];
       const triangles = new Uint32Array(this.core.memory.buffer, pointer, count).slice();
-      return { kind: this.core.surface_kind(i), layer: this.core.surface_layer(i), triangles };
+      const tissue = TISSUES[this.core.surface_tissue(i)];
+      return { kind: this.core.surface_kind(i), layer: this.core.surface_layer(i), tissue, triangles };
     });
+  }
+
+  /** Returns the depth of the skin under a place of the limb, mm, and the lean of a probe that stands upright there, rad. */
+  skin(along, across, azimuth) {
+    return { depth: this.core.skin(along, across), lean: this.core.upright(along, across, azimuth) };
+  }
+
+  /** Returns the place where a line of sight meets the skin: `{ place, along, around }`, of which the last two are a body's, or null. */
+  pick(eye, direction) {
+    this.floats(this.core.input(), 6).set([...eye, ...direction]);
+    const pointer = this.core.pick();
+    if (!pointer) return null;
+    const [x, y, z, along, around] = this.floats(pointer, 5);
+    return { place: [x, y, z], along, around };
   }
 
   /** Returns the depth of the ultrasound image in this anatomy, mm. */
@@ -89,4 +106,12 @@ export class Picture {
     const seen = (what) => this.core.seen(what);
     return { share: seen(0), tip: seen(1) === 1, beside: seen(2), tipShare: seen(3), meanShare: seen(4), inserted: seen(5) };
   }
+}
+
+/** Returns the kind of tissue to build: Table 1 of Paper 000 (1), a body with its place (2), or level layers (0). */
+function how(scene, table1) {
+  if (table1) return [1];
+  const body = scene.body;
+  if (!body) return [0];
+  return [2, body.site, body.along_mm, body.around_deg, body.azimuth_deg, body.turn_deg, body.incline_deg, body.fat_mm];
 }

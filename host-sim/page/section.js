@@ -45,7 +45,8 @@ export class Section {
     this.look(view, tissue, width, height);
     g.fillStyle = this.colours.sky;
     g.fillRect(0, 0, width, height);
-    this.layers(g, tissue, width, height);
+    if (tissue.outlines) this.structures(g, tissue);
+    else this.layers(g, tissue, width, height);
     this.vessel(g, tissue, width);
     this.beside(g, tissue);
     if (!this.small) this.ruler(g, tissue);
@@ -163,6 +164,26 @@ export class Section {
       g.setLineDash(FIBRE_DASH);
       g.stroke();
       g.setLineDash([]);
+    }
+  }
+
+  /** The structures of a body, cut: each is painted over those before it. */
+  structures(g, tissue) {
+    for (const [number, { tissue: kind, points_mm: points }] of tissue.outlines.entries()) {
+      g.beginPath();
+      for (const [i, [x, y]] of points.entries()) {
+        displace(tissue, this.axis, x, y, this.point);
+        if (i === 0) g.moveTo(this.x(this.point.x), this.y(this.point.y));
+        else g.lineTo(this.x(this.point.x), this.y(this.point.y));
+      }
+      g.closePath();
+      const isVessel = kind === "vessel" || kind === "other";
+      g.fillStyle = this.colours[isVessel ? "lumen" : kind] ?? this.colours.other;
+      g.fill();
+      if (number > 0 && !isVessel) continue;
+      g.strokeStyle = this.colours[isVessel ? "lumen" : "skin-edge"];
+      g.lineWidth = isVessel ? 1 : 3;
+      g.stroke();
     }
   }
 
@@ -298,8 +319,11 @@ export class Section {
     g.textBaseline = "middle";
     let free = 0;
     for (const [i, layer] of tissue.layers.entries()) {
-      const name = layer.name.charAt(0).toUpperCase() + layer.name.slice(1);
-      const deep = width < NARROW ? ` ${layer.depth_mm.toFixed(1)}` : `, ${layer.depth_mm.toFixed(1)} mm under the skin`;
+      const called = layer.structure ?? layer.name;
+      const name = called.charAt(0).toUpperCase() + called.slice(1);
+      // In a body the skin is not level: what counts is where the needle meets it.
+      const [mm, where] = tissue.outlines ? [layer.along, "along the needle"] : [layer.depth_mm, "under the skin"];
+      const deep = width < NARROW ? ` ${mm.toFixed(1)}` : `, ${mm.toFixed(1)} mm ${where}`;
       const label = layer.depth_mm > 0 ? name + deep : name;
       const top = this.y(layer.depth_mm);
       const bottom = i + 1 < tissue.layers.length ? this.y(tissue.layers[i + 1].depth_mm) : height;

@@ -22,6 +22,8 @@ export class Tissue {
     }));
     this.needle = scene.needle;
     this.beside = scene.beside ?? [];
+    /** The section of a body, structure after structure, or null for level layers. */
+    this.outlines = scene.body?.outlines ?? null;
     const vessel = scene.vessel;
     this.vessel = vessel && {
       ...vessel, near_mm: vessel.axis_mm - vessel.height_mm / 2, far_mm: vessel.axis_mm + vessel.height_mm / 2,

@@ -1,13 +1,17 @@
 // The limb in three dimensions, cut along the needle's plane. What it draws comes from picture.js; it moves nothing. How triangles
 // reach the screen is limb_webgpu.js' and limb_webgl.js' business.
 
-import { DEEP_MM, LIMB_MM, along, look, multiply, needleShapes, perspective, shapes } from "./limb_shapes.js";
+import { DEEP_MM, LIMB_MM, along, axesOf, look, multiply, needleShapes, perspective, shapes } from "./limb_shapes.js";
 import { WAITING_MM, wholeLength } from "./needle.js";
-import { ALONG_MM, IMAGE_WIDTH_MM, KINDS, LIMB_RADIUS_MM } from "./picture.js";
+import { ALONG_MM, IMAGE_WIDTH_MM, KINDS } from "./picture.js";
 
 const MOST_PIXELS_PER_POINT = 2;
 /** The vertical field of view, rad. */
 const FIELD = 0.6;
+/** A pointer that moves less between down and up is a click, in CSS pixels. */
+const CLICK_PX = 5;
+/** A pointer so near the middle of the probe's face takes the probe, mm. */
+const PROBE_MM = 7;
 /** Free around tip and hub, mm. */
 const MARGIN_MM = 3;
 
@@ -19,6 +23,9 @@ export class Tissue3d {
     this.canvas = canvas;
     this.colours = colours;
     this.renderer = renderer;
+    /** Called for a click and for a drag on the skin: functions of what `picture.pick` returns. */
+    this.clicked = () => {};
+    this.probeMoved = () => {};
     /** The direction of view, rad, and the factor by which the view is farther away than needle and hub need. */
     this.orbit = { yaw: 0.35, pitch: 0.42, away: 1 };
     this.layers = [];
@@ -38,14 +45,26 @@ export class Tissue3d {
       this.orbit.yaw = clamp(this.orbit.yaw + dx * 0.008, -1.4, 1.4);
       this.orbit.pitch = clamp(this.orbit.pitch + dy * 0.008, -0.1, 1.5);
     };
+    let [moved, probe] = [0, false];
     this.canvas.addEventListener("pointerdown", (event) => {
       last = event;
+      moved = 0;
+      probe = this.onProbe(event);
       this.canvas.setPointerCapture(event.pointerId);
     });
     this.canvas.addEventListener("pointermove", (event) => {
       if (last?.pointerId !== event.pointerId) return;
-      turn(event.clientX - last.clientX, event.clientY - last.clientY);
+      const [dx, dy] = [event.clientX - last.clientX, event.clientY - last.clientY];
+      moved += Math.abs(dx) + Math.abs(dy);
+      if (probe) this.dragProbe(event);
+      else turn(dx, dy);
       last = event;
+    });
+    this.canvas.addEventListener("pointerup", (event) => {
+      if (last?.pointerId === event.pointerId && moved < CLICK_PX && !probe) {
+        const found = this.sight(event);
+        if (found) this.clicked(found);
+      }
     });
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => { last = null; });
     this.canvas.addEventListener("wheel", (event) => {
@@ -60,16 +79,42 @@ export class Tissue3d {
     });
   }
 
+  /** Returns the place of the skin under the pointer, as `picture.pick` says it; null where none is. */
+  sight(event) {
+    if (!this.seen || !this.picture) return null;
+    const box = this.canvas.getBoundingClientRect();
+    const [u, v] = [(2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height];
+    const { eye, target, aspect } = this.seen;
+    const [right, up, back] = axesOf(eye, target);
+    const tangent = Math.tan(FIELD / 2);
+    const direction = [0, 1, 2].map((i) => u * tangent * aspect * right[i] + v * tangent * up[i] - back[i]);
+    return this.picture.pick(eye, direction);
+  }
+
+  /** True if the pointer is on the probe, which sits on the skin. */
+  onProbe(event) {
+    const found = this.held && this.sight(event);
+    return Boolean(found) && Math.hypot(found.place[0] - this.held.along, found.place[1] - this.held.across) < PROBE_MM;
+  }
+
+  dragProbe(event) {
+    const found = this.sight(event);
+    if (found) this.probeMoved(found.place, event);
+  }
+
   /** Takes over what a newly built picture is made of. */
   build(picture, scene) {
+    this.picture = picture;
+    this.body = scene.body ?? null;
     this.measures = scene.needle;
     this.needle = this.upload(needleShapes(scene.needle));
     this.deepest = scene.layers.at(-1)?.depth_mm ?? 5;
     this.vessel = scene.vessel;
     const surfaces = picture.surfaces();
     const meshes = this.renderer.surfaces(picture.points, picture.normals, surfaces.map((surface) => surface.triangles));
-    this.layers = surfaces.map(({ kind, layer }, i) => ({ kind, mesh: meshes[i], name: scene.layers[layer]?.name }));
-    const bands = scene.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
+    this.layers = surfaces.map(({ kind, layer, tissue }, i) => ({ kind, mesh: meshes[i], name: this.body ? tissue : scene.layers[layer]?.name }));
+    // A body brings its own surroundings.
+    const bands = this.body ? [] : scene.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
     this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm, bottom: bands[i + 1]?.depth_mm ?? DEEP_MM }));
     // In the needle's plane; beside it the limb curves down.
     const points = picture.points;
@@ -83,6 +128,8 @@ export class Tissue3d {
   draw(picture, needle, probe) {
     const { width, height } = this.fit();
     const { eye, target } = this.camera(needle, width / height);
+    this.seen = { eye, target, aspect: width / height };
+    this.held = probe;
     this.renderer.begin(picture.points, picture.normals, {
       view: multiply(perspective(FIELD, width / height, 1, 400), look(eye, target)),
       eye,
@@ -126,8 +173,13 @@ export class Tissue3d {
       if (surface.kind === KINDS.skinBehind) this.renderer.mesh(surface.mesh, { colour: [...skin, 1] });
       if (surface.kind === KINDS.vesselBehind) this.renderer.mesh(surface.mesh, { colour: [...rgb(this.colours.lumen), 1], shine: 0.25 });
     }
-    this.renderer.mesh(this.static.limbBehind, { colour: [...skin, 1] });
-    this.renderer.mesh(this.static.limbEnds, { colour: [...this.tissue(this.bands.at(-1)?.name), 1] });
+    for (const surface of this.layers) {
+      if (surface.kind === KINDS.insideBehind) this.renderer.mesh(surface.mesh, { colour: [...this.tissue(surface.name), 1], shine: 0.1 });
+    }
+    if (!this.body) {
+      this.renderer.mesh(this.static.limbBehind, { colour: [...skin, 1] });
+      this.renderer.mesh(this.static.limbEnds, { colour: [...this.tissue(this.bands.at(-1)?.name), 1] });
+    }
     if (this.vessel) this.vesselEnds();
     const steel = { colour: [...rgb(this.colours.steel), 1], shine: 0.7, model: along(needle) };
     this.renderer.mesh(this.needle.cannula, steel);
@@ -170,20 +222,23 @@ export class Tissue3d {
       for (const surface of this.layers) if (surface.kind === kind) this.renderer.mesh(surface.mesh, how);
     };
     all(KINDS.vesselBefore, wall);
+    for (const surface of this.layers) {
+      if (surface.kind === KINDS.insideBefore) this.renderer.mesh(surface.mesh, { ...wall, colour: [...this.tissue(surface.name), 0.18] });
+    }
     if (probe) this.probe(probe);
     all(KINDS.skinBefore, skin);
-    this.renderer.mesh(this.static.limbBefore, skin);
+    if (!this.body) this.renderer.mesh(this.static.limbBefore, skin);
   }
 
   /** The probe's face and the plane that it sees. */
   probe(probe) {
     const colour = rgb(this.colours.depth);
     const [s, c] = [Math.sin(probe.azimuth), Math.cos(probe.azimuth)];
-    const [sl, cl] = [Math.sin(probe.lean), Math.cos(probe.lean)];
+    const { depth: sag, lean: upright } = this.picture.skin(probe.along, probe.across, probe.azimuth);
+    const [sl, cl] = [Math.sin(probe.lean + upright), Math.cos(probe.lean + upright)];
     const lateral = [c, s, 0];
     const axial = [-s * sl, c * sl, cl];
     const side = [-s * cl, c * cl, -sl];
-    const sag = LIMB_RADIUS_MM - Math.sqrt(Math.max(0, LIMB_RADIUS_MM ** 2 - probe.across ** 2));
     const place = (u, v, n) => [0, 1, 2].map((i) => [probe.along, probe.across, sag][i] + u * lateral[i] + v * axial[i] + n * side[i]);
     const model = (at, a, b, d) => [...a, 0, ...b, 0, ...d, 0, ...at, 1];
     const wide = lateral.map((x) => x * IMAGE_WIDTH_MM);

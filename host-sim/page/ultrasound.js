@@ -71,6 +71,17 @@ export class Ultrasound {
     });
   }
 
+  /** Goes to a place of the skin; with Shift it turns and leans where it is. */
+  drag([along, across], event) {
+    if (event.shiftKey) {
+      this.move("azimuth", event.movementX * 0.01);
+      this.move("lean", event.movementY * 0.01);
+      return;
+    }
+    this.move("along", along - this.probe.along);
+    this.move("across", across - this.probe.across);
+  }
+
   /** Another anatomy: the image reaches as deep as that asks for. */
   build(picture) {
     this.probe.depth = picture.imageDepth;

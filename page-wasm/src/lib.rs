@@ -6,7 +6,10 @@
 //!
 //! The names are exported as they stand, which the language counts as unsafe; there is no other unsafe code.
 
+mod limb;
 pub mod picture;
+mod slab;
+mod still;
 mod table_1;
 
 use picture::{Picture, SurfaceView};
@@ -18,6 +21,7 @@ const INPUT: usize = 256;
 
 thread_local! {
     static INPUT_NUMBERS: RefCell<Vec<f32>> = RefCell::new(vec![0.0; INPUT]);
+    static PICKED: RefCell<[f32; 5]> = const { RefCell::new([0.0; 5]) };
     static PICTURE: RefCell<Option<Picture>> = const { RefCell::new(None) };
 }
 
@@ -96,7 +100,8 @@ pub extern "C" fn surfaces() -> u32 {
     with(|picture| picture.surfaces().len() as u32)
 }
 
-/// Returns the kind of a surface: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3 vessel behind, 4 vessel before.
+/// Returns the kind of a surface: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3 vessel behind, 4 vessel
+/// before, 5 and 6 a part inside the body behind and before.
 #[unsafe(no_mangle)]
 pub extern "C" fn surface_kind(number: u32) -> u32 {
     surface(number, |surface| surface.kind as u32)
@@ -106,6 +111,12 @@ pub extern "C" fn surface_kind(number: u32) -> u32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn surface_layer(number: u32) -> u32 {
     surface(number, |surface| surface.layer as u32)
+}
+
+/// Its tissue in a body, by the numbers of [`build`]; 9 is an artery.
+#[unsafe(no_mangle)]
+pub extern "C" fn surface_tissue(number: u32) -> u32 {
+    surface(number, |surface| surface.tissue)
 }
 
 /// Its triangles: three numbers of particles each.
@@ -130,6 +141,30 @@ pub extern "C" fn lumen() -> usize {
 #[unsafe(no_mangle)]
 pub extern "C" fn probe(along_mm: f32, across_mm: f32, azimuth: f32, lean: f32) {
     with(|picture| picture.hold_probe(along_mm, across_mm, azimuth, lean));
+}
+
+/// Returns the depth of the skin where the probe is, mm.
+#[unsafe(no_mangle)]
+pub extern "C" fn skin(along_mm: f32, across_mm: f32) -> f32 {
+    with(|picture| picture.on_skin([along_mm, across_mm], 0.0)[0])
+}
+
+/// Returns the lean that makes a probe stand upright on the skin, rad.
+#[unsafe(no_mangle)]
+pub extern "C" fn upright(along_mm: f32, across_mm: f32, azimuth: f32) -> f32 {
+    with(|picture| picture.on_skin([along_mm, across_mm], azimuth)[1])
+}
+
+/// Looks from the first three numbers of [`input`] in the direction of the next three: the address of the place of the skin there, mm, and
+/// how far along (mm) and around (degrees) the limb that is; 0 where there is no skin.
+#[unsafe(no_mangle)]
+pub extern "C" fn pick() -> usize {
+    let line = INPUT_NUMBERS.with_borrow(|n| [[n[0], n[1], n[2]], [n[3], n[4], n[5]]]);
+    let Some(found) = with(|picture| picture.pick(line[0], line[1])) else { return 0 };
+    PICKED.with_borrow_mut(|picked| {
+        *picked = found;
+        address(picked)
+    })
 }
 
 /// Returns the depth of the ultrasound image, mm: as deep as the anatomy asks for.

@@ -1,19 +1,18 @@
 //! Tissue, needle, probe and image together, from the anatomy that the page was told of.
 
+use crate::limb::{self, Limb};
+use crate::slab::{bottom_mm, configure, views};
+use crate::still::{Closed, Still};
 use crate::table_1;
 use tissue::body::Part;
 use tissue::needle::WallName;
-use tissue::{Configuration, Layer, Needle, PunctureState, Punctures, Tissue, Vessel};
+use tissue::{Configuration, Needle, PunctureState, Punctures, Tissue};
 use ultrasound::{Imager, InPlaneScore, Look, Medium, Mesh, Probe, Scene, Shaft};
 
 /// Tissues by the number that the page calls them by.
-const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+pub(crate) const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
 /// Numbers for each layer in the input.
 const PER_LAYER: usize = 4;
-/// Deepest that is drawn, mm.
-const DEEPEST_MM: f32 = 40.0;
-/// Thinner layers are drawn as part of the next, mm.
-const THINNEST_MM: f32 = 0.3;
 /// Places along the insertion where the vessel's walls in the needle's plane are known.
 pub const SLICES: usize = 64;
 /// Width of the ultrasound image, mm.
@@ -35,6 +34,10 @@ pub enum Kind {
     VesselBehind = 3,
     /// The vessel's wall before it.
     VesselBefore = 4,
+    /// A part inside the body, such as a bone, behind the plane.
+    InsideBehind = 5,
+    /// The same before it.
+    InsideBefore = 6,
 }
 
 /// A surface as the page draws it.
@@ -44,6 +47,8 @@ pub struct SurfaceView {
     pub kind: Kind,
     /// Number of its layer in the scene.
     pub layer: usize,
+    /// In a body, its tissue by the number that the page calls it by: those of the input, 9 an artery.
+    pub tissue: u32,
     /// Three particles each.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -58,6 +63,12 @@ pub struct Picture {
     media: Vec<Medium>,
     along_mm: [f32; 2],
     limb_radius_mm: f32,
+    /// The body, where there is one.
+    limb: Option<Limb>,
+    closed: Vec<Closed>,
+    /// Places and normals of the tissue's particles, then of what stays.
+    points: Vec<[f32; 4]>,
+    normals: Vec<[f32; 4]>,
     lumen: [[f32; 2]; SLICES],
     imager: Imager,
     probe: Probe,
@@ -82,11 +93,41 @@ fn probe_for(given: &[Given]) -> Probe {
     Probe { width_mm: IMAGE_WIDTH_MM, depth_mm, focus_mm: depth_mm / 2.0, ..Probe::default() }
 }
 
+/// The layers from the numbers of the input.
+fn given(numbers: &[f32]) -> Vec<Given> {
+    let layers = numbers.chunks_exact(PER_LAYER).map(|n| Given {
+        kind: n[0] as u32,
+        depth_mm: n[1],
+        travel_mm: n[2],
+        is_vessel: n[0] == 7.0,
+        is_far: n[0] == 8.0,
+    });
+    layers.collect()
+}
+
+/// The surfaces to draw, of the tissue and of what stays beside it; and what stays, its points after the tissue's.
+fn surfaces(
+    tissue: &Tissue,
+    walls: &[Option<WallName>],
+    limb: Option<&Limb>,
+    configuration: &Configuration,
+    tube: Option<[usize; 2]>,
+) -> (Vec<SurfaceView>, Still) {
+    let mut surfaces = views(tissue, walls);
+    let Some(limb) = limb else { return (surfaces, Still::default()) };
+    let mut still = limb.still(configuration.along_mm, configuration.half_width_mm, tube);
+    still = still.after(tissue.points().len() as u32);
+    limb.name(&mut surfaces);
+    surfaces.append(&mut still.views);
+    (surfaces, still)
+}
+
 impl Picture {
     /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
     /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
-    /// the skin in rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 in place of the limb.
+    /// the skin in rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 instead of the limb, or 2 for a body, with its
+    /// numbers as [`Limb::new`] reads them.
     pub fn new(numbers: &[f32]) -> Result<Self, String> {
         let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
         let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();
@@ -96,27 +137,30 @@ impl Picture {
         if !(0.1..=5.0).contains(&diameter_mm) {
             return Err(format!("a needle {diameter_mm} mm thick"));
         }
-        let given: Vec<Given> = numbers[1..=PER_LAYER * count]
-            .chunks_exact(PER_LAYER)
-            .map(|n| Given {
-                kind: n[0] as u32,
-                depth_mm: n[1],
-                travel_mm: n[2],
-                is_vessel: n[0] == 7.0,
-                is_far: n[0] == 8.0,
-            })
-            .collect();
+        let given = given(&numbers[1..=PER_LAYER * count]);
         let angle: f32 = angle;
         let angle = if angle.is_finite() { angle.clamp(0.1, 1.57) } else { 0.5 };
-        let (configuration, walls) = match rest.get(4) {
-            Some(1.0) => table_1::configure(&given, bottom_mm(&given))?,
-            _ => configure(&given, [width, offset], angle),
+        let limb = match rest.get(4) {
+            Some(2.0) => Some(Limb::new(rest.get(5..5 + limb::NUMBERS).unwrap_or_default())?),
+            _ => None,
+        };
+        let (configuration, walls, tube) = match (&limb, rest.get(4)) {
+            (Some(limb), _) => limb.configure(&given),
+            (None, Some(1.0)) => {
+                let (configuration, walls) = table_1::configure(&given, bottom_mm(&given))?;
+                (configuration, walls, None)
+            }
+            _ => {
+                let (configuration, walls) = configure(&given, [width, offset], angle);
+                (configuration, walls, None)
+            }
         };
         let mut tissue = Tissue::new(&configuration).map_err(|refusal| refusal.to_string())?;
         tissue.set_punctures(Punctures::Told);
-        let surfaces = views(&tissue, &walls);
+        let (surfaces, still) = surfaces(&tissue, &walls, limb.as_ref(), &configuration, tube);
         let media = configuration.layers.iter().map(|layer| Medium::named(&layer.name)).collect();
         let radius = configuration.limb_radius_mm.unwrap_or(1e4);
+        let (tissue_points, particles) = (tissue.points().to_vec(), tissue.points().len());
         let mut picture = Self {
             tissue,
             surfaces,
@@ -124,6 +168,10 @@ impl Picture {
             media,
             along_mm: configuration.along_mm,
             limb_radius_mm: radius,
+            limb,
+            closed: still.closed,
+            points: [tissue_points, still.points].concat(),
+            normals: [vec![[0.0; 4]; particles], still.normals].concat(),
             lumen: [[0.0; 2]; SLICES],
             imager: Imager::default(),
             probe: probe_for(&given),
@@ -155,6 +203,8 @@ impl Picture {
     pub fn step(&mut self, seconds: f32, depth_mm: f32, angle: f32) {
         let needle = Needle::entering(depth_mm, angle, 0.0);
         self.tissue.step(&needle, seconds);
+        let moved = self.tissue.points();
+        self.points[..moved.len()].copy_from_slice(moved);
         self.cut_vessel();
         let is_in = self.tissue.states().next().is_some_and(|(_, state, _)| state == PunctureState::Inserted);
         let inserted_mm = if is_in && depth_mm > 0.0 { depth_mm } else { 0.0 };
@@ -170,12 +220,14 @@ impl Picture {
 
     /// Places of the particles.
     pub fn points(&self) -> &[[f32; 4]] {
-        self.tissue.points()
+        &self.points
     }
 
     /// Their normals.
     pub fn normals(&mut self) -> &[[f32; 4]] {
-        self.tissue.normals()
+        let own = self.tissue.normals();
+        self.normals[..own.len()].copy_from_slice(own);
+        &self.normals
     }
 
     /// Returns the surfaces to draw.
@@ -191,9 +243,35 @@ impl Picture {
 
     /// Holds the probe.
     pub fn hold_probe(&mut self, along_mm: f32, across_mm: f32, azimuth: f32, lean: f32) {
-        let radius = self.limb_radius_mm;
-        let sag = radius - (radius * radius - across_mm * across_mm).max(0.0).sqrt();
-        self.probe = Probe { centre_mm: [along_mm, across_mm, sag], azimuth, lean, ..self.probe }.checked();
+        let [down, slope] = self.on_skin([along_mm, across_mm], azimuth);
+        let centre_mm = [along_mm, across_mm, down];
+        self.probe = Probe { centre_mm, azimuth, lean: lean + slope, ..self.probe }.checked();
+    }
+
+    /// Returns the depth of the skin at a place along and across, mm, and, on a body, the lean that makes a probe of this turn stand
+    /// upright on it, rad.
+    pub fn on_skin(&self, [along_mm, across_mm]: [f32; 2], azimuth: f32) -> [f32; 2] {
+        let Some(limb) = &self.limb else {
+            let radius = self.limb_radius_mm;
+            return [radius - (radius * radius - across_mm * across_mm).max(0.0).sqrt(), 0.0];
+        };
+        let (side, ahead) = azimuth.sin_cos();
+        let skin = |aside: f32| {
+            let [x, y] = [along_mm - side * aside, across_mm + ahead * aside].map(f64::from);
+            limb.skin(x, y) as f32
+        };
+        [skin(0.0), -(0.5 * (skin(1.0) - skin(-1.0))).atan()]
+    }
+
+    /// Returns where a line of sight meets the skin: the place in mm and, on a body, how far along (mm) and around (degrees) the limb that is.
+    pub fn pick(&self, eye: [f32; 3], direction: [f32; 3]) -> Option<[f32; 5]> {
+        let line = [eye, direction].map(|v| v.map(f64::from));
+        let (place, [along, around]) = match &self.limb {
+            Some(limb) => limb.pick(line)?,
+            None => (limb::pick_cylinder(f64::from(self.limb_radius_mm), line)?, [f64::NAN; 2]),
+        };
+        let [x, y, z] = place;
+        Some([x, y, z, along, around].map(|number| number as f32))
     }
 
     /// Makes an image, `seconds` after the last.
@@ -212,6 +290,12 @@ impl Picture {
                 wall_mm,
             });
         }
+        meshes.extend(self.closed.iter().map(|closed| Mesh {
+            points: &self.points,
+            triangles: &closed.triangles,
+            behind: closed.behind,
+            wall_mm: Some(if closed.has_wall { 0.4 } else { 0.0 }),
+        }));
         let first = self.media.first().copied().unwrap_or(ultrasound::medium::SKIN);
         let scene = Scene { first, meshes: &meshes, shaft: Some(self.shaft) };
         let standard = Look::default();
@@ -269,102 +353,6 @@ impl Picture {
             }
         }
     }
-}
-
-/// Returns the depth of the block that is drawn, mm.
-fn bottom_mm(given: &[Given]) -> f32 {
-    let depth =
-        |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
-    let (near, far) = (depth(|layer| layer.is_vessel), depth(|layer| layer.is_far));
-    let innermost = given.iter().map(|layer| layer.depth_mm).fold(6.0, f32::max);
-    let bottom = far.or(near.map(|near| near + 3.0)).map_or(innermost + 6.0, |far| far + 8.0);
-    if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 }
-}
-
-/// Layers and vessel for the tissue picture, and which of its walls belongs to which layer of the scene.
-fn configure(
-    given: &[Given],
-    [width, offset]: [f32; 2],
-    angle: f32,
-) -> (Configuration, Vec<Option<WallName>>) {
-    let standard = Configuration::default();
-    let depth =
-        |wanted: fn(&Given) -> bool| given.iter().find(|layer| wanted(layer)).map(|layer| layer.depth_mm);
-    let near = depth(|layer| layer.is_vessel);
-    let far = depth(|layer| layer.is_far);
-    let bottom = bottom_mm(given);
-    let mut layers: Vec<Layer> = vec![];
-    let mut walls = vec![None; given.len()];
-    let bands: Vec<(usize, &Given)> =
-        given.iter().enumerate().filter(|(_, layer)| !layer.is_vessel && !layer.is_far).collect();
-    for (place, (number, band)) in bands.iter().enumerate() {
-        let top = if layers.is_empty() { 0.0 } else { band.depth_mm };
-        let end =
-            bands[place + 1..].iter().map(|(_, next)| next.depth_mm).find(|next| *next > top + THINNEST_MM);
-        let end = end.unwrap_or(bottom).min(bottom);
-        let drawn_to = layers.last().map_or(0.0, |layer: &Layer| layer.top_mm + layer.thickness_mm);
-        if (top - drawn_to).abs() > 1e-3 || end - top < THINNEST_MM {
-            continue;
-        }
-        let kind = TISSUES.get(band.kind as usize).copied().unwrap_or("other");
-        let mut layer = Layer::of(kind, top, end - top);
-        layer.gives_mm = band.travel_mm.clamp(0.0, 30.0);
-        walls[*number] = Some(WallName::Layer(layers.len()));
-        layers.push(layer);
-    }
-    let travel = |wanted: fn(&Given) -> bool| {
-        given.iter().find(|layer| wanted(layer)).map_or(0.0, |layer| layer.travel_mm.clamp(0.0, 30.0))
-    };
-    let vessel = near.map(|near| {
-        let height = far.map_or(3.0, |far| (far - near).clamp(0.5, 20.0));
-        let number = |value: f32, or: f32, low: f32, high: f32| {
-            if value.is_finite() { value.clamp(low, high) } else { or }
-        };
-        Vessel {
-            top_mm: near,
-            vertical_mm: height,
-            horizontal_mm: number(width, height, 0.5, 14.0),
-            // In the middle of what is drawn, so that the path to it is.
-            centre_mm: [near / angle.tan(), number(offset, 0.0, -8.0, 8.0)].map(|c| c.clamp(-8.0, 20.0)),
-            near_gives_mm: travel(|layer| layer.is_vessel),
-            far_gives_mm: travel(|layer| layer.is_far),
-            ..Vessel::default()
-        }
-    });
-    for (slot, layer) in walls.iter_mut().zip(given) {
-        if layer.is_vessel {
-            *slot = Some(WallName::Near);
-        } else if layer.is_far {
-            *slot = Some(WallName::Far);
-        }
-    }
-    (Configuration { layers, vessel, ..standard }, walls)
-}
-
-/// The surfaces as the page draws them.
-fn views(tissue: &Tissue, walls: &[Option<WallName>]) -> Vec<SurfaceView> {
-    let scene_layer =
-        |layer: usize| walls.iter().position(|wall| *wall == Some(WallName::Layer(layer))).unwrap_or(0);
-    let mut views = vec![];
-    for surface in tissue.surfaces() {
-        let view = |kind, layer| SurfaceView { kind, layer, triangles: surface.triangles.clone() };
-        match surface.part {
-            Part::SkinBehind => views.push(view(Kind::SkinBehind, 0)),
-            Part::SkinBefore => views.push(view(Kind::SkinBefore, 0)),
-            Part::Section(layer) => views.push(view(Kind::Section, scene_layer(layer))),
-            Part::Vessel => {
-                let is_behind = |triangle: &&[u32; 3]| {
-                    triangle.iter().map(|index| tissue.rest()[*index as usize][1]).sum::<f32>() < 0.0
-                };
-                let (behind, before) = surface.triangles.iter().partition(is_behind);
-                let layer = walls.iter().position(|wall| *wall == Some(WallName::Near)).unwrap_or(0);
-                views.push(SurfaceView { kind: Kind::VesselBehind, layer, triangles: behind });
-                views.push(SurfaceView { kind: Kind::VesselBefore, layer, triangles: before });
-            }
-            Part::Top(_) | Part::End(_) => {}
-        }
-    }
-    views
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ import tempfile
 import time
 
 import anatomy
+import body
 import paper_000
 import paper_001
 import paper_002
@@ -22,7 +23,7 @@ from device import Device, Report
 
 def main(program):
     report, begun = Report(), time.monotonic()
-    for part in (paper_000, paper_001, paper_002, anatomy, skew):
+    for part in (paper_000, paper_001, paper_002, anatomy, body, skew):
         with tempfile.TemporaryDirectory() as folder:
             part.check(Device(program, folder), report)
     verdict = "pass" if report.failures == 0 else f"{report.failures} checks failed"

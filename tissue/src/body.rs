@@ -2,7 +2,7 @@
 
 use crate::configuration::{Configuration, Refusal};
 use crate::constraint::{Point, Tie, place};
-use crate::lattice::Lattice;
+use crate::lattice::{Extent, Lattice};
 use crate::needle::{Insertion, Needle, PunctureState, Punctures, Wall, WallName};
 use crate::solver::{Pace, Parts, Solver};
 use crate::tube::Tube;
@@ -56,9 +56,15 @@ impl Tissue {
         let c = configuration;
         let mut parts = Parts::default();
         let mut lattices: Vec<Lattice> = vec![];
-        for layer in &c.layers {
-            let lattice =
-                Lattice::build(layer, c.along_mm, c.half_width_mm, c.limb_radius_mm, c.density, &mut parts);
+        let extent = Extent {
+            along: c.along_mm,
+            half_width: c.half_width_mm,
+            limb_radius: c.limb_radius_mm,
+            relief: c.relief.as_ref(),
+            density: c.density,
+        };
+        for (number, layer) in c.layers.iter().enumerate() {
+            let lattice = Lattice::build(layer, number, extent, &mut parts);
             if let Some(above) = lattices.last() {
                 tie_layers(above, &lattice, &mut parts);
             }
@@ -68,8 +74,7 @@ impl Tissue {
             lowest.hold_bottom(&mut parts);
         }
         let tube = c.vessel.as_ref().map(|vessel| {
-            let tube =
-                Tube::build(vessel, c.along_mm, c.half_width_mm, c.limb_radius_mm, c.density, &mut parts);
+            let tube = Tube::build(vessel, extent, &mut parts);
             for particle in tube.particles() {
                 let rest = place(&parts.points[particle as usize]);
                 if let Some(anchor) = lattices.iter().find_map(|lattice| lattice.anchor(rest)) {

@@ -60,6 +60,49 @@ pub struct Vessel {
     pub far_gives_mm: f32,
     /// The travel over which the pierced wall is dragged along, mm.
     pub drag_mm: f32,
+    /// Its centre line through the block, mm, if it is not straight; then `top_mm`, `centre_mm` and `axis_deg` do not count.
+    pub path_mm: Vec<[f32; 3]>,
+}
+
+/// Curved layers: the height of the top of each, and of the bottom of the last, over a grid that spans the block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relief {
+    /// Points of the grid along the insertion, at least 2.
+    pub columns: usize,
+    /// Points across it, at least 2.
+    pub lines: usize,
+    /// For each top from the skin inwards, and for the bottom, `lines` × `columns` depths in mm, line after line.
+    pub faces_mm: Vec<Vec<f32>>,
+}
+
+impl Relief {
+    /// The depth of face `face` at shares of the block's length and width, 0–1, mm.
+    pub(crate) fn depth(&self, face: usize, along: f32, across: f32) -> f32 {
+        let split = |share: f32, count: usize| {
+            let at = share.clamp(0.0, 1.0) * (count - 1) as f32;
+            let cell = (at as usize).min(count - 2);
+            (cell, at - cell as f32)
+        };
+        let ((i, u), (j, v)) = (split(along, self.columns), split(across, self.lines));
+        let at = |i: usize, j: usize| self.faces_mm[face][j * self.columns + i];
+        let line = |j: usize| at(i, j) + u * (at(i + 1, j) - at(i, j));
+        line(j) + v * (line(j + 1) - line(j))
+    }
+
+    fn check(&self, layers: usize) -> Result<(), Refusal> {
+        let points = self.columns * self.lines;
+        let is_whole = self.columns > 1 && self.lines > 1 && self.faces_mm.len() == layers + 1;
+        if !is_whole || self.faces_mm.iter().any(|face| face.len() != points) {
+            return Err(Refusal(
+                "relief must have a grid of at least 2 × 2 for each layer and one for the bottom".into(),
+            ));
+        }
+        let is_thick = |pair: &[Vec<f32>]| pair[0].iter().zip(&pair[1]).all(|(top, end)| end - top >= 0.05);
+        if !self.faces_mm.windows(2).all(is_thick) {
+            return Err(Refusal("relief must have each layer at least 0.05 mm thick everywhere".into()));
+        }
+        Ok(())
+    }
 }
 
 /// Everything that is drawn.
@@ -75,6 +118,8 @@ pub struct Configuration {
     pub half_width_mm: f32,
     /// Radius of the limb across, mm; `None` is flat.
     pub limb_radius_mm: Option<f32>,
+    /// Curved layers; then each layer's depth and thickness say only how many rows it has and how stiff they are.
+    pub relief: Option<Relief>,
     /// Density of the particles, g/mm³. Heavier than tissue (1e-3), so that the soft layers answer within a frame or two what a
     /// few iterations can solve (mass scaling).
     pub density: f32,
@@ -141,6 +186,7 @@ impl Default for Vessel {
             near_gives_mm: 1.4,
             far_gives_mm: 1.4,
             drag_mm: 0.5,
+            path_mm: vec![],
         }
     }
 }
@@ -154,6 +200,7 @@ impl Default for Configuration {
             along_mm: [-9.1, 26.0],
             half_width_mm: 10.4,
             limb_radius_mm: Some(42.0),
+            relief: None,
             density: 0.05,
             substeps: 2,
             iterations: 1,
@@ -216,6 +263,7 @@ impl Configuration {
         if !(1..=64).contains(&self.substeps) || !(1..=64).contains(&self.iterations) {
             return refuse("substeps and iterations must be from 1 to 64".into());
         }
+        self.relief.as_ref().map_or(Ok(()), |relief| relief.check(self.layers.len()))?;
         let mut particles = 0.0;
         let mut top = self.layers[0].top_mm;
         for (number, layer) in self.layers.iter().enumerate() {
@@ -254,7 +302,13 @@ impl Configuration {
                 "about {particles:.0} particles; at most {MOST_PARTICLES} are possible: widen spacing_mm"
             ));
         }
-        let Some(vessel) = &self.vessel else { return Ok(()) };
+        self.vessel.as_ref().map_or(Ok(()), |vessel| self.check_vessel(vessel, top))
+    }
+
+    /// Refuses a vessel that cannot be built in layers that end at `bottom`, mm.
+    fn check_vessel(&self, vessel: &Vessel, bottom: f32) -> Result<(), Refusal> {
+        let refuse = |what: String| Err(Refusal(what));
+        let within = |value: f32, low: f32, high: f32| value >= low && value <= high;
         let numbers = [
             (vessel.vertical_mm, 0.3, 50.0, "vertical_mm"),
             (vessel.horizontal_mm, 0.3, 50.0, "horizontal_mm"),
@@ -264,12 +318,21 @@ impl Configuration {
             (vessel.near_gives_mm, 0.0, 50.0, "near_gives_mm"),
             (vessel.far_gives_mm, 0.0, 50.0, "far_gives_mm"),
             (vessel.drag_mm, 0.0, 20.0, "drag_mm"),
+        ];
+        let placed = [
             (vessel.axis_deg, -360.0, 360.0, "axis_deg"),
             (vessel.centre_mm[0], self.along_mm[0], self.along_mm[1], "centre_mm along"),
             (vessel.centre_mm[1], -self.half_width_mm, self.half_width_mm, "centre_mm across"),
-            (vessel.top_mm, self.layers[0].top_mm + 0.1, top - vessel.vertical_mm - 0.1, "top_mm"),
+            (vessel.top_mm, self.layers[0].top_mm + 0.1, bottom - vessel.vertical_mm - 0.1, "top_mm"),
         ];
-        match numbers.into_iter().find(|(value, low, high, _)| !within(*value, *low, *high)) {
+        let is_straight = vessel.path_mm.is_empty();
+        if !is_straight
+            && (vessel.path_mm.len() < 2 || vessel.path_mm.iter().flatten().any(|mm| !within(*mm, -1e3, 1e3)))
+        {
+            return refuse("the vessel's path_mm must have at least 2 points within 1000 mm".into());
+        }
+        let placed = placed.into_iter().filter(|_| is_straight);
+        match numbers.into_iter().chain(placed).find(|(value, low, high, _)| !within(*value, *low, *high)) {
             Some((value, low, high, name)) => {
                 refuse(format!("the vessel's {name} is {value}; it must be from {low} to {high}"))
             }

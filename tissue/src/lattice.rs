@@ -1,6 +1,6 @@
 //! A layer as a lattice of cells, each of five tetrahedra.
 
-use crate::configuration::Layer;
+use crate::configuration::{Layer, Relief};
 use crate::constraint::{Anchor, Bending, Distance, Volume, bending_angle, place, volume};
 use crate::solver::Parts;
 use crate::vector::{Vector, length, sub};
@@ -19,7 +19,26 @@ pub(crate) struct Lattice {
     x: [f32; 2],
     half_width: f32,
     z: [f32; 2],
-    limb_radius: Option<f32>,
+    faces: Faces,
+}
+
+/// The upper and lower face of a layer.
+#[derive(Clone, Debug)]
+enum Faces {
+    /// Level along, and across as round as the limb.
+    Limb(Option<f32>),
+    /// As a grid says: the layer of this number in it.
+    Relief(Relief, usize),
+}
+
+/// The block that all layers are cut from.
+#[derive(Clone, Copy)]
+pub(crate) struct Extent<'a> {
+    pub(crate) along: [f32; 2],
+    pub(crate) half_width: f32,
+    pub(crate) limb_radius: Option<f32>,
+    pub(crate) relief: Option<&'a Relief>,
+    pub(crate) density: f32,
 }
 
 /// Tetrahedra of a cell by its corners (bit 0: x, bit 1: y, bit 2: z), in two orientations that alternate, so that the
@@ -36,14 +55,9 @@ pub(crate) fn sag(limb_radius: Option<f32>, y: f32) -> f32 {
 
 impl Lattice {
     /// Adds the particles and constraints of `layer` to `parts`.
-    pub(crate) fn build(
-        layer: &Layer,
-        along: [f32; 2],
-        half_width: f32,
-        limb_radius: Option<f32>,
-        density: f32,
-        parts: &mut Parts,
-    ) -> Self {
+    /// `number` counts them from the skin.
+    pub(crate) fn build(layer: &Layer, number: usize, extent: Extent<'_>, parts: &mut Parts) -> Self {
+        let Extent { along, half_width, limb_radius, relief, density } = extent;
         let cells = |long: f32| ((long / layer.spacing_mm).round() as usize).max(2);
         // An even number across, so that a row of particles lies in the needle's plane.
         let across = cells(2.0 * half_width).next_multiple_of(2);
@@ -55,7 +69,10 @@ impl Lattice {
             x: along,
             half_width,
             z: [layer.top_mm, layer.top_mm + layer.thickness_mm],
-            limb_radius,
+            faces: match relief {
+                Some(relief) => Faces::Relief(relief.clone(), number),
+                None => Faces::Limb(limb_radius),
+            },
         };
         for k in 0..lattice.nz {
             for j in 0..lattice.ny {
@@ -78,11 +95,21 @@ impl Lattice {
     fn rest(&self, i: usize, j: usize, k: usize) -> Vector {
         let share = |number: usize, of: usize| number as f32 / (of - 1) as f32;
         let y = self.half_width * (2.0 * share(j, self.ny) - 1.0);
-        [
-            self.x[0] + (self.x[1] - self.x[0]) * share(i, self.nx),
-            y,
-            self.z[0] + (self.z[1] - self.z[0]) * share(k, self.nz) + sag(self.limb_radius, y),
-        ]
+        let x = self.x[0] + (self.x[1] - self.x[0]) * share(i, self.nx);
+        let [top, bottom] = self.span(x, y);
+        [x, y, top + (bottom - top) * share(k, self.nz)]
+    }
+
+    /// Returns its upper and lower face over a place, mm.
+    fn span(&self, x: f32, y: f32) -> [f32; 2] {
+        match &self.faces {
+            Faces::Limb(radius) => self.z.map(|z| z + sag(*radius, y)),
+            Faces::Relief(relief, number) => {
+                let along = (x - self.x[0]) / (self.x[1] - self.x[0]);
+                let across = 0.5 * (y / self.half_width + 1.0);
+                [*number, *number + 1].map(|face| relief.depth(face, along, across))
+            }
+        }
     }
 
     fn constrain(&self, layer: &Layer, density: f32, parts: &mut Parts) {
@@ -216,7 +243,8 @@ impl Lattice {
 
     /// The tissue that was at `rest` before anything moved: a mean of the eight corners of its cell; `None` outside.
     pub(crate) fn anchor(&self, rest: Vector) -> Option<Anchor> {
-        let upright = rest[2] - sag(self.limb_radius, rest[1]);
+        let [top, bottom] = self.span(rest[0], rest[1]);
+        let deep = (rest[2] - top) / (bottom - top);
         let split = |value: f32, low: f32, high: f32, count: usize| {
             let cells = (count - 1) as f32;
             let at = (value - low) / (high - low) * cells;
@@ -228,7 +256,7 @@ impl Lattice {
         };
         let (i, fx) = split(rest[0], self.x[0], self.x[1], self.nx)?;
         let (j, fy) = split(rest[1], -self.half_width, self.half_width, self.ny)?;
-        let (k, fz) = split(upright, self.z[0], self.z[1], self.nz)?;
+        let (k, fz) = split(deep, 0.0, 1.0, self.nz)?;
         let side = |bit: usize, share: f32| if bit == 1 { share } else { 1.0 - share };
         let corners: Vec<(u32, f32)> = (0..8_usize)
             .map(|bits| {

@@ -20,5 +20,5 @@ mod tube;
 pub mod vector;
 
 pub use body::{Surface, Tissue};
-pub use configuration::{Configuration, Layer, Refusal, Vessel};
+pub use configuration::{Configuration, Layer, Refusal, Relief, Vessel};
 pub use needle::{Needle, PunctureState, Punctures};

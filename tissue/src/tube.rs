@@ -2,9 +2,9 @@
 
 use crate::configuration::Vessel;
 use crate::constraint::{Bending, Distance, Volume, bending_angle, place, volume};
-use crate::lattice::{KPA, sag};
+use crate::lattice::{Extent, KPA, sag};
 use crate::solver::Parts;
-use crate::vector::{Vector, add, cross, dot, length, scale, sub};
+use crate::vector::{Vector, add, cross, direction, dot, length, scale, sub};
 
 /// Particles around a ring.
 pub(crate) const AROUND: usize = 16;
@@ -23,36 +23,26 @@ pub(crate) struct Tube {
 }
 
 impl Tube {
-    /// Adds the vessel's particles and constraints to `parts`; it runs from one side of the block to the other.
-    pub(crate) fn build(
-        vessel: &Vessel,
-        along: [f32; 2],
-        half_width: f32,
-        limb_radius: Option<f32>,
-        density: f32,
-        parts: &mut Parts,
-    ) -> Self {
-        let (sine, cosine) = vessel.axis_deg.to_radians().sin_cos();
-        let [low, high] = reach(vessel, [cosine, sine], along, half_width);
-        let rings = (((high - low) / BETWEEN_MM).round() as usize).clamp(2, 64) + 1;
+    /// Adds the vessel's particles and constraints to `parts`; it runs from one side of the block to the other, or along its path.
+    pub(crate) fn build(vessel: &Vessel, extent: Extent<'_>, parts: &mut Parts) -> Self {
+        let line = if vessel.path_mm.is_empty() { straight(vessel, extent) } else { vessel.path_mm.clone() };
+        let long: f32 = line.windows(2).map(|ends| length(sub(ends[1], ends[0]))).sum();
+        let rings = ((long / BETWEEN_MM).round() as usize).clamp(2, 64) + 1;
         let tube = Self {
             first: parts.points.len() as u32,
             rings,
             axis_first: (parts.points.len() + rings * AROUND) as u32,
         };
-        let [cx, cy] = vessel.centre_mm;
-        let centre = |ring: usize| {
-            let s = low + (high - low) * ring as f32 / (rings - 1) as f32;
-            let (x, y) = (cx + s * cosine, cy + s * sine);
-            // Its depth counts from the skin above it.
-            [x, y, vessel.top_mm + 0.5 * vessel.vertical_mm + sag(limb_radius, y)]
-        };
+        let on_line = |ring: usize| along_line(&line, long * ring as f32 / (rings - 1) as f32);
+        let centre = |ring: usize| on_line(ring).0;
         for ring in 0..rings {
+            let (middle, ahead) = on_line(ring);
+            let across = direction([-ahead[1], ahead[0], 0.0]).unwrap_or([0.0, 1.0, 0.0]);
+            let up = cross(across, ahead);
             for number in 0..AROUND {
-                let (across, down) = (number as f32 / AROUND as f32 * std::f32::consts::TAU).sin_cos();
-                let side = 0.5 * vessel.horizontal_mm * across;
-                let offset = [-sine * side, cosine * side, -0.5 * vessel.vertical_mm * down];
-                let [x, y, z] = add(centre(ring), offset);
+                let (aside, height) = (number as f32 / AROUND as f32 * std::f32::consts::TAU).sin_cos();
+                let side = scale(across, 0.5 * vessel.horizontal_mm * aside);
+                let [x, y, z] = add(middle, add(side, scale(up, 0.5 * vessel.vertical_mm * height)));
                 parts.points.push([x, y, z, 0.0]);
             }
         }
@@ -60,7 +50,7 @@ impl Tube {
             let [x, y, z] = centre(ring);
             parts.points.push([x, y, z, 0.0]);
         }
-        tube.constrain(vessel, density, parts);
+        tube.constrain(vessel, extent.density, parts);
         tube
     }
 
@@ -181,6 +171,35 @@ impl Tube {
         let middle = scale(add(at(self.on_axis(ring)), at(self.on_axis(ring + 1))), 0.5);
         if dot(normal, sub(at(a), middle)) < 0.0 { [a, c, b] } else { [a, b, c] }
     }
+}
+
+/// The centre line of a straight vessel: its depth counts from the skin above it.
+fn straight(vessel: &Vessel, extent: Extent<'_>) -> Vec<Vector> {
+    let (sine, cosine) = vessel.axis_deg.to_radians().sin_cos();
+    let [low, high] = reach(vessel, [cosine, sine], extent.along, extent.half_width);
+    let [cx, cy] = vessel.centre_mm;
+    let points = (((high - low) / BETWEEN_MM).round() as usize).clamp(2, 64);
+    let point = |number: usize| {
+        let s = low + (high - low) * number as f32 / points as f32;
+        let (x, y) = (cx + s * cosine, cy + s * sine);
+        [x, y, vessel.top_mm + 0.5 * vessel.vertical_mm + sag(extent.limb_radius, y)]
+    };
+    (0..=points).map(point).collect()
+}
+
+/// The place `way` mm along a line of points, and the direction there.
+fn along_line(line: &[Vector], mut way: f32) -> (Vector, Vector) {
+    let mut last = ([0.0; 3], [1.0, 0.0, 0.0]);
+    for ends in line.windows(2) {
+        let piece = sub(ends[1], ends[0]);
+        let (long, ahead) = (length(piece), direction(piece).unwrap_or([1.0, 0.0, 0.0]));
+        last = (add(ends[0], scale(ahead, way.min(long))), ahead);
+        if way <= long {
+            break;
+        }
+        way -= long;
+    }
+    last
 }
 
 /// From where to where along its axis the vessel lies in the block, mm from its centre.

@@ -315,7 +315,8 @@ struct Piece {
 fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut take: impl FnMut(Piece)) {
     let sample_mm = probe.depth_mm / SAMPLES as f32;
     let mut layer = scene.first;
-    let mut inside: Option<usize> = None;
+    // A bit for each closed mesh that the line is in; where they overlap, the last one counts.
+    let mut inside = 0_u64;
     let (mut depth, mut shown, mut pressure) = (0.0_f32, 0.0_f32, 1.0_f32);
     let mut medium = layer;
     let mut echo: Option<(f32, f32)> = None;
@@ -339,24 +340,21 @@ fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut tak
             return;
         }
         let mesh = &scene.meshes[crossing.mesh];
-        let next = match (mesh.wall_mm, inside) {
-            (Some(_), Some(own)) if own == crossing.mesh => {
-                inside = None;
-                layer
-            }
-            (Some(_), _) => {
-                inside = Some(crossing.mesh);
-                mesh.behind
-            }
-            (None, _) => {
-                layer = mesh.behind;
-                if inside.is_some() { medium } else { layer }
-            }
-        };
+        match mesh.wall_mm {
+            Some(_) => inside ^= 1_u64.unbounded_shl(crossing.mesh as u32),
+            None => layer = mesh.behind,
+        }
+        let innermost = inside.checked_ilog2().and_then(|number| scene.meshes.get(number as usize));
+        let next = innermost.map_or(layer, |mesh| mesh.behind);
+        let has_wall = mesh.wall_mm.is_some_and(|mm| mm > 0.0);
+        if !has_wall && next == medium {
+            // A surface under another: nothing changes there.
+            continue;
+        }
         // A vessel's wall stands out from both sides.
-        let met = if mesh.wall_mm.is_some() { VESSEL_WALL } else { next };
+        let met = if has_wall { VESSEL_WALL } else { next };
         let reflected = medium.pressure_reflection(&met);
-        let wall = if mesh.wall_mm.is_some() { met.pressure_reflection(&next) } else { 0.0 };
+        let wall = if has_wall { met.pressure_reflection(&next) } else { 0.0 };
         let back = reflected.abs().max(wall.abs());
         echo = Some((pressure * back, crossing.facing));
         // There and back: (1 − R) of the intensity passes each interface each time.

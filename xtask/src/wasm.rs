@@ -11,7 +11,7 @@ use std::process::Command;
 /// The browser's target.
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// The crates that it is built from: the sources and manifests in their folders.
-const CRATES: [&str; 3] = ["tissue", "ultrasound", "page-wasm"];
+const CRATES: [&str; 4] = ["anatomy", "tissue", "ultrasound", "page-wasm"];
 /// The product and its note.
 const PRODUCT: &str = "host-sim/page/picture.wasm";
 const NOTE: &str = "host-sim/page/picture.wasm.from";

@@ -121,6 +121,12 @@ impl<'a> Station<'a> {
             if let Some(taken) = self.patient_answer() {
                 let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
                 procedure.into_iter().for_each(|procedure| device.follow(procedure));
+                // The layers of a body are those of a line: the needle points along it.
+                let on_line =
+                    self.bedside.as_ref().filter(|bedside| taken && bedside.profile().body.is_some());
+                on_line.into_iter().for_each(|bedside| {
+                    device.control(Control::Tilt { rad: bedside.profile().tilt_rad() });
+                });
                 // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
                 if !self.person_starts {
                     self.driver.request(Request::Start);

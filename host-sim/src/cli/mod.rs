@@ -11,6 +11,7 @@ mod experiment;
 mod export;
 mod fit_force;
 mod import;
+mod layers;
 pub(crate) mod output;
 mod progress;
 mod recordings;
@@ -49,6 +50,7 @@ enum Command {
     Score(training::Score),
     Debrief(training::Debrief),
     Profiles(training::Profiles),
+    Layers(layers::Layers),
     Reproduce(training::Reproduce),
     Commission(commission::Commission),
     Compensate(compensate::Compensate),
@@ -75,6 +77,7 @@ impl Cli {
             Some(Command::Score(command)) => command.run(),
             Some(Command::Debrief(command)) => command.run(),
             Some(Command::Profiles(command)) => command.run(),
+            Some(Command::Layers(command)) => command.run(),
             Some(Command::Reproduce(command)) => command.run(),
             Some(Command::Commission(command)) => command.run(),
             Some(Command::Compensate(command)) => command.run(),

@@ -48,7 +48,8 @@ pub(crate) struct Run {
     /// host-sim/procedures; without it, the one in the patient's file
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom, or a TOML file like those in
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom, those with a body in three
+    /// dimensions (shoulder-joint, forearm, knee, hip), or a TOML file like those in
     /// host-sim/profiles; without it, adult, or the default one of --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,

@@ -50,6 +50,17 @@ fn every_row_is_there_and_has_a_test_or_a_reason() {
 }
 
 #[test]
+fn the_rows_are_counted_right() {
+    let page = std::fs::read_to_string(top().join("docs/papers.md")).expect("it is there");
+    for (table, (heading, _)) in tables().iter().zip(ROWS) {
+        let count = |wanted: &str| table.iter().filter(|row| row[2] == wanted).count();
+        let paper = heading.trim_start_matches("## Paper ");
+        let counted = format!("| {paper} | {} | {} | {} |", count("yes"), count("partly"), count("no"));
+        assert!(page.lines().any(|line| line == counted), "{counted}");
+    }
+}
+
+#[test]
 fn every_test_that_a_row_names_exists() {
     let mut count = 0;
     for [number, feature, _, evidence] in tables().iter().flatten() {

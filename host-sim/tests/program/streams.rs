@@ -22,6 +22,7 @@ fn scene() -> Scene {
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,
+        body: None,
         beside: Vec::new(),
         needle: SceneNeedle::reaching(15.6),
         hand: true,

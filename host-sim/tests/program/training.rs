@@ -224,6 +224,10 @@ fn patients_are_listed_with_their_layers() {
         "dorsal-hand",
         "shoulder",
         "phantom",
+        "shoulder-joint",
+        "forearm",
+        "knee",
+        "hip",
         "vessel, 3.0 × 4.5 mm",
         "gives way at 1.00 N",
     ] {

@@ -75,3 +75,77 @@ fn numbers_that_are_none_are_refused_or_drawn_as_something() {
         }
     }
 }
+
+/// The shoulder's layers on its usual line, then the body's numbers.
+fn shoulder(around: f32, turn: f32) -> Vec<f32> {
+    let mut numbers = vec![6.0];
+    for (kind, depth, travel) in [
+        (0.0, 0.0, 1.2),
+        (1.0, 2.5, -1.0),
+        (2.0, 6.9, -1.0),
+        (4.0, 19.4, -1.0),
+        (5.0, 22.0, -1.0),
+        (6.0, 28.1, -1.0),
+    ] {
+        numbers.extend([kind, depth, travel, 0.0]);
+    }
+    numbers.extend([f32::NAN, 0.0, 0.785, 0.82, 2.0, 0.0, 25.0, around, 180.0, turn, 45.0, 4.39]);
+    numbers
+}
+
+#[test]
+fn a_body_is_drawn_cut_and_imaged() {
+    let mut picture = Picture::new(&shoulder(0.0, 0.0)).expect("it can be built");
+    let tissues = |kind: Kind| {
+        let mut all: Vec<u32> =
+            picture.surfaces().iter().filter(|s| s.kind == kind).map(|s| s.tissue).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    };
+    // Skin, fat, muscle, bursa, tendon and cartilage are cut; bursa, tendon and cartilage are bodies of their own.
+    assert_eq!(tissues(Kind::Section), [0, 1, 2, 4, 5, 6]);
+    assert_eq!(tissues(Kind::InsideBehind), [4, 5, 6]);
+    for step in 0..120 {
+        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.05, 0.785);
+    }
+    assert!(picture.points().iter().flatten().all(|number| number.abs() < 400.0), "it holds together");
+    // Bone reflects: straight down from over the humerus the image is bright at its depth, and dark where there is only muscle.
+    picture.hold_probe(25.0, 0.0, 0.0, 0.0);
+    let brightest = picture.image(0.1, 0.0).iter().copied().max();
+    assert!(brightest > Some(150), "{brightest:?}");
+}
+
+#[test]
+fn the_skin_is_met_where_one_looks_and_turns_with_the_limb() {
+    let level = Picture::new(&shoulder(0.0, 0.0)).expect("it can be built");
+    let found = level.pick([0.0, 0.0, -80.0], [0.0, 0.0, 1.0]).expect("the entry is under it");
+    let wanted = [0.0, 0.0, 0.0, 25.0, 0.0];
+    assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-3), "{found:?}");
+    assert!(level.pick([0.0, 0.0, -80.0], [0.0, 0.0, -1.0]).is_none(), "nothing but sky");
+    // With the limb turned under it the same skin slopes, and the probe leans with it.
+    let turned = Picture::new(&shoulder(0.0, 20.0)).expect("it can be built");
+    let [_, lean] = turned.on_skin([0.0, 0.0], 0.0);
+    assert!((lean.abs().to_degrees() - 20.0).abs() < 1.0, "{}", lean.to_degrees());
+    assert!(level.on_skin([0.0, 0.0], 0.0)[1].abs() < 1e-3);
+}
+
+#[test]
+fn a_vein_on_the_line_gives_way_at_the_devices_word() {
+    // Straight down on the shoulder's vein, 39 degrees around at 30 mm along; its layers: skin, fat, vein, fat.
+    let mut numbers = vec![4.0];
+    for (kind, depth, travel) in [(0.0, 0.0, 1.2), (1.0, 2.5, -1.0), (7.0, 4.2, -1.0), (1.0, 7.2, -1.0)] {
+        numbers.extend([kind, depth, travel, 0.0]);
+    }
+    numbers.extend([f32::NAN, 0.0, 1.48, 0.82, 2.0, 0.0, 30.0, 39.24, 0.0, -39.24, 85.0, 4.39]);
+    let mut picture = Picture::new(&numbers).expect("it can be built");
+    let vessel = picture.surfaces().iter().filter(|s| s.kind == Kind::VesselBehind).count();
+    assert_eq!(vessel, 3, "the vein is part of the tissue that moves, and goes on beyond it at both ends");
+    let cut: Vec<f32> = picture.lumen().iter().map(|[top, bottom]| bottom - top).collect();
+    assert!(cut.iter().any(|high| (*high - 3.0).abs() < 0.6), "{cut:?}");
+    picture.tell(0, PunctureState::Inserted);
+    for step in 0..200 {
+        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.035, 1.48);
+    }
+    assert_ne!(picture.wall_state(2), PunctureState::Away);
+}

@@ -1,6 +1,7 @@
 //! The page, in a real browser.
 
 mod access;
+mod body;
 mod browser;
 mod graphics;
 mod guide;

@@ -45,17 +45,35 @@ impl Written {
     }
 }
 
-/// Returns the goal of the file, else the lumen of the vessel; none without a vessel.
-pub(super) fn goal(written: Option<Written>, patient: &Patient, entry_rad: f64) -> Option<Goal> {
+/// The number of a layer that the needle's line does not meet.
+const NOT_MET: u8 = u8::MAX;
+
+/// Returns the goal of the file, else the lumen of the vessel. Without such a layer there is none, or, where `may_miss` because the line
+/// through a body need not meet it, one that cannot be reached.
+pub(super) fn goal(
+    written: Option<Written>,
+    patient: &Patient,
+    entry_rad: f64,
+    may_miss: bool,
+) -> Option<Goal> {
     let layers = &patient.layers;
     let tissue = written.map_or(Tissue::Vessel, |goal| goal.tissue.into());
-    let index = layers.iter().position(|layer| layer.tissue == tissue)?;
+    let name = if tissue == Tissue::Vessel { "lumen" } else { tissue_name(tissue) };
+    let Some(index) = layers.iter().position(|layer| layer.tissue == tissue) else {
+        let name = name.to_owned();
+        return may_miss.then_some(Goal {
+            name,
+            layer: NOT_MET,
+            has_wall: false,
+            below: None,
+            reach_mm: None,
+        });
+    };
     let ruptures = ruptures(patient, entry_rad);
     let has_wall = |index: usize| {
         layers.get(index).is_some_and(|layer| layer.wall.is_some())
             || ruptures.iter().any(|rupture| rupture.layer == index)
     };
-    let name = if tissue == Tissue::Vessel { "lumen" } else { tissue_name(tissue) };
     Some(Goal {
         name: name.to_owned(),
         layer: index as u8,

@@ -133,7 +133,7 @@ pub(super) enum Friction {
 }
 
 /// `cutting` of a layer.
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Cut {
     pub(super) inwards_n: f64,

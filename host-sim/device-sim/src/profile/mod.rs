@@ -3,10 +3,12 @@
 //! refuses is refused here too.
 
 mod beside;
+mod body;
 mod condition;
 mod goal;
 mod law;
 mod person;
+mod refusal;
 mod rupture;
 mod tissues;
 
@@ -15,11 +17,12 @@ use crate::library::{self, Text};
 use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
-use control_core::{Device, Patient, Plan, plan};
+use control_core::{Device, Patient, Plan};
 use fixed::types::I16F16;
 use serde::Deserialize;
 
 pub use beside::Beside;
+pub use body::InBody;
 pub use goal::Goal;
 pub use law::Model;
 use person::Thickness;
@@ -27,7 +30,7 @@ pub use person::{Difficulty, Person, Sex, Site};
 pub(crate) use tissues::TissueName;
 
 /// The profiles that come with the program.
-pub const BUILT_IN: [(&str, &str); 7] = [
+pub const BUILT_IN: [(&str, &str); 11] = [
     ("adult", include_str!("../../../profiles/adult.toml")),
     ("thin-elderly", include_str!("../../../profiles/thin-elderly.toml")),
     ("high-body-mass", include_str!("../../../profiles/high-body-mass.toml")),
@@ -35,6 +38,10 @@ pub const BUILT_IN: [(&str, &str); 7] = [
     ("dorsal-hand", include_str!("../../../profiles/dorsal-hand.toml")),
     ("shoulder", include_str!("../../../profiles/shoulder.toml")),
     ("phantom", include_str!("../../../profiles/phantom.toml")),
+    ("shoulder-joint", include_str!("../../../profiles/shoulder-joint.toml")),
+    ("forearm", include_str!("../../../profiles/forearm.toml")),
+    ("knee", include_str!("../../../profiles/knee.toml")),
+    ("hip", include_str!("../../../profiles/hip.toml")),
 ];
 
 /// A profile that may run.
@@ -56,6 +63,8 @@ pub struct Profile {
     pub spared: Vec<u8>,
     /// Structures beside the way that the needle is to spare.
     pub beside: Vec<Beside>,
+    /// The body that its layers come from, if it has one.
+    pub body: Option<InBody>,
     /// The needle's target.
     goal: Option<goal::Written>,
     /// The text that it came from, for recordings.
@@ -90,14 +99,16 @@ impl Profile {
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
+        let body = file.take_body().map_err(refuse)?;
         let config = Config { device: *device, patient: file.config().map_err(refuse)? };
-        let plan = config.plan().map_err(|refusal| refuse(say(&refusal, &file)))?;
+        let plan = config.plan().map_err(|refusal| refuse(refusal::say(&refusal, &file)))?;
         let spared =
             (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
         Ok(Self {
             spared: spared.collect(),
             goal: file.target,
             beside: file.beside,
+            body,
             procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
             person: file.patient,
             name: file.name,
@@ -119,6 +130,7 @@ impl Profile {
         let sine = libm::sin(self.entry_rad);
         let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
             name: tissue_name(layer.tissue).to_owned(),
+            structure: self.body.as_ref().and_then(|body| body.names.get(index).cloned()),
             is_vessel: layer.tissue == Tissue::Vessel,
             is_far_wall: layer.tissue == Tissue::FarWall,
             depth_mm: layer.depth.0.to_num(),
@@ -146,7 +158,8 @@ impl Profile {
             force_scale: self.config.patient.scale.to_num(),
             tilt_rad: self.tilt_rad(),
             skin_tilt_rad: self.skin_tilt_rad(),
-            vessel: self.vessel(),
+            vessel: self.vessel().filter(|_| self.body.is_none()),
+            body: self.body.as_ref().map(InBody::scene),
             beside: self.beside.iter().map(SceneBeside::from).collect(),
             needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
         }
@@ -155,18 +168,24 @@ impl Profile {
     /// The same patient with another angle to the skin at entry, 5 to 90°.
     pub fn at_angle(self, degrees: f64) -> Result<Self, Failure> {
         check_angle("--angle", degrees).map_err(Failure::input)?;
+        if self.body.is_some() {
+            return self.with_keys(&[("entry_deg", degrees)], &[]);
+        }
         Ok(Self { entry_rad: degrees.to_radians(), ..self })
     }
 
     /// Returns the name of layer `number`.
     pub fn layer_name(&self, number: u8) -> Option<String> {
+        if let Some(body) = &self.body {
+            return body.names.get(usize::from(number)).cloned();
+        }
         let layer = self.config.patient.layers.get(usize::from(number))?;
         Some(tissue_name(layer.tissue).to_owned())
     }
 
     /// Returns the needle's target: that of the file, else the vessel's lumen if there is a vessel.
     pub fn goal(&self) -> Option<Goal> {
-        goal::goal(self.goal, &self.config.patient, self.entry_rad)
+        goal::goal(self.goal, &self.config.patient, self.entry_rad, self.body.is_some())
     }
 
     /// Inclination of the needle laid on the skin, in rad.
@@ -216,26 +235,6 @@ fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
     from_vertex * from_vertex / parabola.compliance.0.to_num::<f64>() + parabola.base.0.to_num::<f64>()
 }
 
-/// The control law names layers by number; a person by what they are.
-fn say(refusal: &plan::Refusal, file: &File) -> String {
-    use plan::Refusal::{
-        BeyondTravel, ContactStep, NoVessel, Overlap, ReliefAboveElastic, TooStiff, TooStrong, WrongWay,
-    };
-    let layer = match *refusal {
-        TooStiff { layer, .. } | TooStrong { layer, .. } | Overlap { layer } | ContactStep { layer, .. } => {
-            layer
-        }
-        WrongWay { layer } | ReliefAboveElastic { layer } | BeyondTravel { layer } | NoVessel { layer } => {
-            layer
-        }
-        _ => return refusal.to_string(),
-    };
-    match file.layer.get(usize::from(layer)) {
-        Some(named) => format!("{refusal} (layer {layer} is {})", tissue_name(named.tissue.into())),
-        None => refusal.to_string(),
-    }
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -253,6 +252,7 @@ struct File {
     friction: Option<law::Friction>,
     force_table: Option<law::Forces>,
     layer: Vec<Layer>,
+    body: Option<body::Written>,
     vessel: Option<Vessel>,
     target: Option<goal::Written>,
     #[serde(default)]
@@ -267,13 +267,14 @@ struct Vessel {
     offset_mm: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Layer {
     tissue: TissueName,
     /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
     spare: Option<bool>,
-    depth_mm: f64,
+    /// Perpendicular to the skin; in a body it follows from the line and stands in no file.
+    depth_mm: Option<f64>,
     /// The rule for its thickness; the layers below move with it.
     thickness: Option<Thickness>,
     wall: Option<Wall>,
@@ -283,7 +284,7 @@ struct Layer {
     cutting: Option<law::Cut>,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Wall {
     elastic: Parabola,
@@ -294,7 +295,7 @@ struct Wall {
     spring_back: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parabola {
     vertex_mm: f64,

@@ -43,6 +43,10 @@ pub enum Site {
     DorsalHand,
     /// The shoulder.
     Shoulder,
+    /// The knee.
+    Knee,
+    /// The hip.
+    Hip,
     /// No patient: layers of gelatin.
     Phantom,
 }
@@ -87,17 +91,24 @@ impl Thickness {
 pub(super) fn depths_mm(layers: &[Layer], person: &Person) -> Result<Vec<f64>, String> {
     let (mut depths_mm, mut moved_mm) = (Vec::new(), 0.0);
     for (number, layer) in layers.iter().enumerate() {
-        if layer.depth_mm < 0.0 {
-            return Err(format!("depth_mm of layer {number} is {}; it must be 0 or more", layer.depth_mm));
-        }
-        depths_mm.push(layer.depth_mm + moved_mm);
+        let depth_mm = own_depth_mm(layer, number)?;
+        depths_mm.push(depth_mm + moved_mm);
         if let Some(thickness) = layer.thickness {
             let below = layers.get(number + 1);
             let below = below.ok_or_else(|| format!("layer {number} has a thickness and none below it"))?;
-            moved_mm += thickness.of_mm(person)? - (below.depth_mm - layer.depth_mm);
+            moved_mm += thickness.of_mm(person)? - (own_depth_mm(below, number + 1)? - depth_mm);
         }
     }
     Ok(depths_mm)
+}
+
+/// The depth that a layer's key gives, mm.
+fn own_depth_mm(layer: &Layer, number: usize) -> Result<f64, String> {
+    let depth_mm = layer.depth_mm.ok_or_else(|| format!("depth_mm of layer {number} is missing; add it"))?;
+    if depth_mm < 0.0 {
+        return Err(format!("depth_mm of layer {number} is {depth_mm}; it must be 0 or more"));
+    }
+    Ok(depth_mm)
 }
 
 impl Person {

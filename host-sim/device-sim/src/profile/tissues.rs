@@ -17,6 +17,23 @@ pub(crate) enum TissueName {
     FarWall,
 }
 
+impl TissueName {
+    /// Returns its name in a file.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Skin => "skin",
+            Self::Fat => "fat",
+            Self::Muscle => "muscle",
+            Self::Vessel => "vessel",
+            Self::Other => "other",
+            Self::Bursa => "bursa",
+            Self::Tendon => "tendon",
+            Self::Cartilage => "cartilage",
+            Self::FarWall => "far-wall",
+        }
+    }
+}
+
 impl From<TissueName> for Tissue {
     fn from(name: TissueName) -> Self {
         match name {

@@ -5,7 +5,8 @@ mod scene;
 mod told;
 
 pub use scene::{
-    Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, state_name, tissue_name, vessel_name,
+    Scene, SceneBeside, SceneBody, SceneLayer, SceneNeedle, SceneOutline, SceneVessel, Source, state_name,
+    tissue_name, vessel_name,
 };
 pub use told::{
     Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
@@ -307,6 +308,7 @@ mod tests {
             tilt_rad: 0.0,
             skin_tilt_rad: 0.0,
             vessel: None,
+            body: None,
             beside: Vec::new(),
             needle: SceneNeedle::reaching(15.6),
             hand: true,

@@ -29,6 +29,9 @@ pub struct Scene {
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
+    /// The body that the layers come from; without it they are slabs that go on for ever.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<SceneBody>,
     /// Structures beside the way that the needle is to spare.
     pub beside: Vec<SceneBeside>,
     /// The needle, the same for every picture.
@@ -66,6 +69,44 @@ pub struct SceneVessel {
     pub width_mm: f64,
     /// The distance of the needle's plane from the axis in mm.
     pub offset_mm: f64,
+}
+
+/// A body in three dimensions, and where a needle enters it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneBody {
+    /// Its number in `anatomy::Site::ALL`.
+    pub site: usize,
+    /// Its name.
+    pub name: String,
+    /// The point of entry along the limb in mm.
+    pub along_mm: f64,
+    /// The point of entry around the limb in degrees.
+    pub around_deg: f64,
+    /// The needle's direction seen from above in degrees.
+    pub azimuth_deg: f64,
+    /// The turn of the limb about its axis in degrees.
+    pub turn_deg: f64,
+    /// The needle's inclination that the layers are for, in degrees.
+    pub incline_deg: f64,
+    /// Thickness of its fat in mm.
+    pub fat_mm: f64,
+    /// From where to where along the limb a needle may enter, in mm.
+    pub reach_mm: [f64; 2],
+    /// The direction of length 1 into the body perpendicular to the skin at entry: along the needle's plane, across it, down.
+    pub inwards: [f64; 3],
+    /// The section along the needle's plane, in the order in which it is painted.
+    pub outlines: Vec<SceneOutline>,
+}
+
+/// A structure of a body cut along the needle's plane.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneOutline {
+    /// Its name.
+    pub name: String,
+    /// Its tissue, as in a patient's file; `other` is an artery.
+    pub tissue: String,
+    /// A closed line: mm along the section and below the point of entry.
+    pub points_mm: Vec<[f64; 2]>,
 }
 
 /// A structure to be spared, drawn as an ellipse in the needle's plane.
@@ -116,8 +157,11 @@ impl SceneNeedle {
 /// One layer of tissue.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneLayer {
-    /// Its name.
+    /// The name of its tissue.
     pub name: String,
+    /// The name of the body's structure that it is, if it comes from a body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub structure: Option<String>,
     /// True if it is the vessel that the procedure aims at.
     pub is_vessel: bool,
     /// True if it begins with the vessel's far wall.

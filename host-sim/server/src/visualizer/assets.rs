@@ -49,6 +49,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/events.js", "events.js", SCRIPT),
     asset!("/hand.js", "hand.js", SCRIPT),
     asset!("/patient.js", "patient.js", SCRIPT),
+    asset!("/place.js", "place.js", SCRIPT),
     asset!("/practice.js", "practice.js", SCRIPT),
     asset!("/learning_curve.js", "learning_curve.js", SCRIPT),
     asset!("/own_forces.js", "own_forces.js", SCRIPT),

@@ -31,6 +31,7 @@ pub(crate) fn test_scene() -> device_sim::session::Scene {
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
         vessel: None,
+        body: None,
         beside: Vec::new(),
         needle: device_sim::session::SceneNeedle::reaching(15.6),
         hand: true,

@@ -1,0 +1,324 @@
+//! `[body]` of a patient: a site in three dimensions with a point of entry, a direction and the turn of the limb. The layers of the file
+//! then say what each tissue feels like, and the line through the body says which are met and where.
+
+use super::{File, Layer, Profile, TissueName};
+use crate::failure::Failure;
+use crate::library::Text;
+use crate::session::{SceneBody, SceneOutline};
+use anatomy::{Body, Line, Piece, Place, Site, Tissue};
+use control_core::config::MAX_LAYERS;
+use serde::Deserialize;
+
+/// Thinner pieces of a line are not told to the device, mm.
+const THINNEST_MM: f64 = 0.2;
+/// The length of the needle's line that is asked for layers, mm: within the device's travel, a wall's puncture included.
+const REACH_MM: f64 = 55.0;
+/// Thickness that fat may have, mm.
+const FAT_MM: [f64; 2] = [1.0, 60.0];
+
+/// A site by its name in a file.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum SiteName {
+    Shoulder,
+    Forearm,
+    Knee,
+    Hip,
+}
+
+/// As the file has it.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Written {
+    site: SiteName,
+    along_mm: f64,
+    around_deg: f64,
+    #[serde(default)]
+    azimuth_deg: f64,
+    #[serde(default)]
+    turn_deg: f64,
+    /// Thickness of the fat; without it, that of the site.
+    fat_mm: Option<f64>,
+}
+
+/// The body that a needle enters, its way and what it meets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InBody {
+    /// The site.
+    pub site: Site,
+    /// Thickness of its fat, mm.
+    pub fat_mm: f64,
+    /// The point of entry, the direction and the limb's turn.
+    pub place: Place,
+    /// The structures.
+    pub body: Body,
+    /// The needle's way.
+    pub line: Line,
+    /// The pieces that it meets, in order.
+    pub pieces: Vec<Piece>,
+    /// The names of the layers that the device gets.
+    pub names: Vec<String>,
+}
+
+impl Written {
+    /// Returns the body for a needle that is inclined by `incline_deg`; `fat_mm` if the patient's own figures say how thick the fat is.
+    pub(super) fn resolve(&self, incline_deg: f64, fat_mm: Option<f64>) -> Result<InBody, String> {
+        let site = match self.site {
+            SiteName::Shoulder => Site::Shoulder,
+            SiteName::Forearm => Site::Forearm,
+            SiteName::Knee => Site::Knee,
+            SiteName::Hip => Site::Hip,
+        };
+        let [low, high] = site.along_mm();
+        if !(low..=high).contains(&self.along_mm) {
+            return Err(format!(
+                "body.along_mm is {}; it must be from {low} to {high} at the {}",
+                self.along_mm,
+                site.name()
+            ));
+        }
+        for (key, degrees) in
+            [("around_deg", self.around_deg), ("azimuth_deg", self.azimuth_deg), ("turn_deg", self.turn_deg)]
+        {
+            if !(-180.0..=180.0).contains(&degrees) {
+                return Err(format!("body.{key} is {degrees}; it must be from -180 to 180"));
+            }
+        }
+        let fat_mm = fat_mm.or(self.fat_mm).unwrap_or(site.usual_fat_mm());
+        if !(FAT_MM[0]..=FAT_MM[1]).contains(&fat_mm) {
+            return Err(format!("body.fat_mm is {fat_mm}; it must be from {} to {}", FAT_MM[0], FAT_MM[1]));
+        }
+        let place = Place {
+            along_mm: self.along_mm,
+            around_deg: self.around_deg,
+            azimuth_deg: self.azimuth_deg,
+            turn_deg: self.turn_deg,
+            incline_deg,
+        };
+        let body = site.body(fat_mm);
+        let line = place.line(&body).map_err(|refusal| format!("body: {refusal}"))?;
+        let pieces = line.met(&body, REACH_MM);
+        Ok(InBody { site, fat_mm, place, body, line, pieces, names: vec![] })
+    }
+}
+
+/// The tissue of a file's layer that gives a structure its forces.
+fn tissue_name(tissue: Tissue) -> TissueName {
+    match tissue {
+        Tissue::Skin => TissueName::Skin,
+        Tissue::Fat => TissueName::Fat,
+        Tissue::Muscle => TissueName::Muscle,
+        Tissue::Vessel => TissueName::Vessel,
+        Tissue::Artery => TissueName::Other,
+        Tissue::Bursa => TissueName::Bursa,
+        Tissue::Tendon => TissueName::Tendon,
+        Tissue::Cartilage => TissueName::Cartilage,
+    }
+}
+
+impl InBody {
+    /// Returns the layers along the line, each with the forces of the file's layer of its tissue and its depth for a needle of this inclination,
+    /// and notes their names. The device holds six: past the sixth the needle goes on in it.
+    pub(super) fn layers(&mut self, kinds: &[Layer]) -> Result<Vec<Layer>, String> {
+        let of = |tissue: TissueName| kinds.iter().find(|layer| layer.tissue == tissue);
+        if let Some(missing) =
+            self.body.structures.iter().find(|structure| of(tissue_name(structure.tissue)).is_none())
+        {
+            return Err(format!(
+                "no [[layer]] has the forces of the {}; add one with tissue = \"{}\"",
+                missing.name,
+                tissue_name(missing.tissue).word()
+            ));
+        }
+        let sine = libm::sin(self.place.incline_deg.to_radians());
+        let (mut layers, mut names, mut last) = (Vec::<Layer>::new(), Vec::<String>::new(), None);
+        let mut put = |kind: &Layer, name: &str, from_mm: f64| {
+            if layers.len() < MAX_LAYERS {
+                layers.push(Layer { depth_mm: Some(from_mm * sine), thickness: None, ..kind.clone() });
+                names.push(name.to_owned());
+            }
+        };
+        let (mut vessel, mut under_wall) = (false, None);
+        for piece in &self.pieces {
+            let structure = &self.body.structures[piece.structure];
+            let tissue = tissue_name(structure.tissue);
+            if tissue == TissueName::Skin && last.is_some() {
+                // The needle comes out of the limb again: nothing resists it there.
+                break;
+            }
+            let again = last == Some(piece.structure) || under_wall == Some(piece.from_mm);
+            let second_vessel = tissue == TissueName::Vessel && vessel;
+            if piece.to_mm - piece.from_mm < THINNEST_MM || second_vessel {
+                continue;
+            }
+            last = Some(piece.structure);
+            if again {
+                continue;
+            }
+            let Some(kind) = of(tissue) else { continue };
+            put(kind, structure.name, piece.from_mm);
+            if tissue == TissueName::Vessel {
+                vessel = true;
+                if let Some(far) = of(TissueName::FarWall) {
+                    put(far, "far wall", piece.to_mm);
+                    under_wall = Some(piece.to_mm);
+                }
+            }
+        }
+        self.names = names;
+        Ok(layers)
+    }
+
+    /// Returns the body for a picture.
+    pub(super) fn scene(&self) -> SceneBody {
+        let word = |number: usize| tissue_name(self.body.structures[number].tissue).word().to_owned();
+        let outlines = self.body.outlines(&self.line.block);
+        let outlines = outlines.into_iter().map(|outline| SceneOutline {
+            name: self.body.structures[outline.structure].name.to_owned(),
+            tissue: word(outline.structure),
+            points_mm: outline.points_mm,
+        });
+        SceneBody {
+            site: Site::ALL.iter().position(|site| *site == self.site).unwrap_or(0),
+            name: self.site.name().to_owned(),
+            along_mm: self.place.along_mm,
+            around_deg: self.place.around_deg,
+            azimuth_deg: self.place.azimuth_deg,
+            turn_deg: self.place.turn_deg,
+            incline_deg: self.place.incline_deg,
+            fat_mm: self.fat_mm,
+            reach_mm: self.site.along_mm(),
+            inwards: self.line.inwards,
+            outlines: outlines.collect(),
+        }
+    }
+}
+
+impl Profile {
+    /// The same patient with other numbers in its file, at its top and in its `[body]`: what the line through a body meets follows from them.
+    pub fn with_keys(&self, top: &[(&str, f64)], body: &[(&str, f64)]) -> Result<Self, Failure> {
+        let unreadable =
+            |cause: &dyn std::fmt::Display| Failure::input(format_args!("{}: {cause}", self.source.origin));
+        let mut table: toml::Table =
+            self.source.text.parse().map_err(|cause: toml::de::Error| unreadable(&cause))?;
+        for (key, value) in top {
+            table.insert((*key).to_owned(), toml::Value::Float(*value));
+        }
+        for (key, value) in body {
+            let own = table.get_mut("body").and_then(toml::Value::as_table_mut);
+            let own = own.ok_or_else(|| {
+                unreadable(&"this patient is layers without a body; choose one with [body], such as forearm")
+            })?;
+            own.insert((*key).to_owned(), toml::Value::Float(*value));
+        }
+        let text = toml::to_string(&table).map_err(|cause| unreadable(&cause))?;
+        Self::parse_for(Text { origin: self.source.origin.clone(), text }, &self.config.device)
+    }
+}
+
+impl File {
+    /// Replaces the layers, which say what each tissue feels like, by those that the needle's line meets in the body, if there is one.
+    pub(super) fn take_body(&mut self) -> Result<Option<InBody>, String> {
+        let Some(written) = self.body else { return Ok(None) };
+        if self.force_table.is_some() || self.vessel.is_some() || !self.beside.is_empty() {
+            return Err("a patient with [body] takes its vessels and what is beside them from the body and has no force table; remove [vessel], \
+                 [[beside]] and [force_table]"
+                .into());
+        }
+        if let Some(layer) = self.layer.iter().find(|layer| layer.depth_mm.is_some()) {
+            let word = layer.tissue.word();
+            return Err(format!(
+                "depth_mm of the {word} is given, and [body] says where it is; remove depth_mm"
+            ));
+        }
+        let by_person = self.layer.iter().find_map(|layer| layer.thickness);
+        let fat_mm = by_person.map(|rule| rule.of_mm(&self.patient)).transpose()?;
+        let mut body = written.resolve(self.entry_deg, fat_mm)?;
+        self.layer = body.layers(&self.layer)?;
+        Ok(Some(body))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::procedure::Procedure;
+    use crate::profile::BUILT_IN;
+
+    fn find(name: &str) -> Profile {
+        Profile::find(name).expect("it is built in")
+    }
+
+    fn layers(profile: &Profile) -> Vec<(String, f64)> {
+        let sine = profile.entry_rad.sin();
+        let layers = profile.config.patient.layers.iter().zip(0..);
+        let name = |number| profile.layer_name(number).expect("it has a name");
+        layers.map(|(layer, number)| (name(number), layer.depth.0.to_num::<f64>() / sine)).collect()
+    }
+
+    /// At any inclination the device meets each structure at the same mm along the needle as the line does.
+    #[test]
+    fn the_devices_layers_are_those_of_the_line() {
+        for (name, degrees) in [("forearm", 25.0), ("shoulder-joint", 45.0), ("hip", 80.0), ("knee", 45.0)] {
+            let profile = find(name).at_angle(degrees).expect("it goes in");
+            let body = profile.body.as_ref().expect("a body");
+            let told = layers(&profile);
+            assert!(told.len() >= 4, "{name}: {told:?}");
+            for (layer, from_mm) in told {
+                let mut edges = body.pieces.iter().flat_map(|piece| [piece.from_mm, piece.to_mm]);
+                assert!(edges.any(|edge| (edge - from_mm).abs() < 2e-3), "{name}: {layer} at {from_mm} mm");
+            }
+        }
+    }
+
+    #[test]
+    fn another_entry_meets_other_structures() {
+        let at = |around: f64| {
+            find("shoulder-joint").with_keys(
+                &[("entry_deg", 85.0)],
+                &[("along_mm", 30.0), ("around_deg", around), ("turn_deg", -around)],
+            )
+        };
+        let (over, beside) = (at(39.2).expect("it goes in"), at(20.0).expect("it goes in"));
+        let has = |profile: &Profile, name: &str| layers(profile).iter().any(|(own, _)| own == name);
+        assert!(has(&over, "vein") && !has(&beside, "vein"));
+        let vein = layers(&over).iter().position(|(name, _)| name == "vein").expect("it is met") as u8;
+        assert!(over.spared.contains(&vein) && !beside.spared.contains(&vein));
+        // The bursa is the target, and here it is out of the way: it can only be missed.
+        let goal = beside.goal().expect("a target");
+        assert_eq!((goal.name.as_str(), goal.layer), ("bursa", NOT_ON_THE_LINE));
+        assert!(Procedure::find("bursa", &beside).is_ok(), "the scripted hand finds a way");
+    }
+
+    const NOT_ON_THE_LINE: u8 = u8::MAX;
+
+    #[test]
+    fn a_vein_that_is_missed_leaves_fat_and_muscle() {
+        let beside = find("forearm").with_keys(&[], &[("around_deg", 15.0)]).expect("it goes in");
+        let names: Vec<_> = layers(&beside).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["skin", "fat", "muscle"]);
+        let over: Vec<_> = layers(&find("forearm")).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(over, ["skin", "fat", "vein", "far wall", "muscle"]);
+    }
+
+    #[test]
+    fn a_body_that_cannot_be_entered_is_refused_with_its_reason() {
+        let forearm = BUILT_IN.iter().find(|(name, _)| *name == "forearm").expect("it is built in").1;
+        for (right, wrong, hint) in [
+            ("along_mm = 0.0", "along_mm = 300.0", "body.along_mm is 300"),
+            ("along_mm = 0.0", "along_mm = nan", "body.along_mm is NaN"),
+            ("turn_deg = 0.0", "turn_deg = 90.0", "turn the limb"),
+            ("turn_deg = 0.0", "turn_deg = 0.0\nfat_mm = 0.0", "body.fat_mm is 0"),
+            ("tissue = \"fat\"", "tissue = \"fat\"\ndepth_mm = 2.0", "remove depth_mm"),
+            ("tissue = \"muscle\"", "tissue = \"bursa\"", "forces of the muscle"),
+            ("site = \"forearm\"", "site = \"neck\"", "neck"),
+            ("[body]", "[vessel]\nwidth_mm = 3.0\n\n[body]", "remove [vessel]"),
+        ] {
+            let text = forearm.replacen(right, wrong, 1);
+            assert_ne!(text, forearm, "{right} is in the file");
+            let said =
+                Profile::parse(Text { origin: "test.toml".into(), text }).expect_err(wrong).to_string();
+            assert!(said.contains(hint) && said.contains("test.toml") && !said.contains('\n'), "{said}");
+        }
+    }
+}
