@@ -1,11 +1,12 @@
 //! Inputs of the design as excitations of the device, within its limits.
 
 use super::{Asked, in_words};
-use crate::characterise::programme::{Programme, Step, TRAVEL_MM, servo};
+use crate::characterise::programme::{Programme, Step, TRAVEL_MM};
 use crate::characterise::{self, configuration};
 use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use device_setup::servo::servo;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
