@@ -86,9 +86,9 @@ function showBoard({ live, board, needle, reading, fault, crash, timing, frames,
   value("tick", timing?.tick_us && `${timing.tick_us.toFixed(1)} µs`);
   value("lost", `${frames} frames, ${lost_frames} lost; ${lost_samples} samples lost`);
   const lines = events.map(({ t_s, text }) => `${t_s.toFixed(2)} s  ${text}`);
-  if (byId("events").dataset.shown === lines.join("\n")) return;
-  byId("events").dataset.shown = lines.join("\n");
-  byId("events").replaceChildren(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
+  if (byId("happened").dataset.shown === lines.join("\n")) return;
+  byId("happened").dataset.shown = lines.join("\n");
+  byId("happened").replaceChildren(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
 }
 
 function begin(task) {

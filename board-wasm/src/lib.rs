@@ -121,7 +121,7 @@ pub extern "C" fn dfu_begin(count: u32) -> u32 {
 pub extern "C" fn dfu_next() -> u32 {
     UPDATE.with_borrow_mut(|update| {
         let Some(update) = update else { return say(b"") };
-        let next = update.next();
+        let next = update.advance();
         let (doing, share) = update.progress();
         say(serde_json::json!({ "next": next, "doing": doing, "share": share }).to_string().as_bytes())
     })

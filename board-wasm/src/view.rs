@@ -1,4 +1,4 @@
-//! What the page shows of a board: read from every frame that comes, whoever asked for it.
+//! The state of a board for the page: read from every frame that comes, whoever asked for it.
 
 use control_core::controller::Sample;
 use control_core::event::Limits;
@@ -141,6 +141,7 @@ impl View {
         }
     }
 
+    /// Layers are shown counted from 1, the outermost.
     fn happened(&mut self, event: &Event) {
         let text = match event.kind {
             EventKind::Fault { cause } => {
@@ -152,12 +153,14 @@ impl View {
                 "torque on".into()
             }
             EventKind::Stopped => "torque off".into(),
-            EventKind::Contact { layer } => format!("contact with layer {layer}"),
-            EventKind::Puncture { layer } => format!("puncture of layer {layer}"),
-            EventKind::Vessel { layer } => format!("vessel reached in layer {layer}"),
-            EventKind::Exit { layer } => format!("left layer {layer}"),
-            EventKind::Flashback { layer } => format!("blood: in the vessel of layer {layer}"),
-            EventKind::FarWall { layer } => format!("through the far wall of layer {layer}"),
+            EventKind::Contact { layer } => format!("contact with layer {}", u16::from(layer) + 1),
+            EventKind::Puncture { layer } => format!("puncture of layer {}", u16::from(layer) + 1),
+            EventKind::Vessel { layer } => format!("vessel reached in layer {}", u16::from(layer) + 1),
+            EventKind::Exit { layer } => format!("left layer {}", u16::from(layer) + 1),
+            EventKind::Flashback { layer } => {
+                format!("blood: in the vessel of layer {}", u16::from(layer) + 1)
+            }
+            EventKind::FarWall { layer } => format!("through the far wall of layer {}", u16::from(layer) + 1),
             EventKind::NotSaved { cause } => cause.to_string(),
             EventKind::Barrier => "turned further than the tissue allows".into(),
             // They come in the hundreds, and the needle's own line shows the limits.

@@ -16,7 +16,7 @@ use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
-/// What the guide calls the device.
+/// The name of the device in the guide.
 const DEVICE: &str = "the board on this computer's USB";
 /// The first step of all that moves.
 const NEEDLE_OUT: &str = "the roller will move on its own: take the needle out of the device, and keep hands off unless a step asks for them";
@@ -61,7 +61,7 @@ pub struct Work {
     file: Option<String>,
 }
 
-/// What the dialogue and the page both see.
+/// The state that the dialogue and the page share.
 struct Shared {
     guide: GuideState,
     now: Duration,

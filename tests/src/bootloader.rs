@@ -11,7 +11,7 @@ pub const MEMORY: &str = "@Internal Flash  /0x08000000/04*016Kg,01*064Kg,07*128K
 const FLASH_BYTES: usize = 1 << 20;
 /// Bytes of a block.
 const BLOCK: usize = 2_048;
-/// What was in flash before, everywhere.
+/// The content of the flash before, everywhere.
 pub const OLD: u8 = 0x5A;
 
 /// States (USB DFU 1.1, 6.1.2).
@@ -28,7 +28,7 @@ enum State {
     Error = 10,
 }
 
-/// What a download asked for, done at the look that follows.
+/// The job that a download asked for, done at the look that follows.
 #[derive(Clone, Debug)]
 enum Job {
     SetAddress(u32),

@@ -64,7 +64,7 @@ mod tests {
     /// Written and read by different hands: the page checks prefix, target, element and suffix by their place in UM0391.
     #[test]
     fn the_page_of_a_board_reads_the_file() {
-        let bytes: Vec<u8> = (0..5_000_u32).map(|n| (n * 7 >> 3) as u8).collect();
+        let bytes: Vec<u8> = (0..5_000_u32).map(|n| ((n * 7) >> 3) as u8).collect();
         let image = Image::parse(&file("BOARD", 0x0800_4000, &bytes)).expect("it is sound");
         assert_eq!(image, Image { target: "BOARD".into(), start: 0x0800_4000, bytes });
     }

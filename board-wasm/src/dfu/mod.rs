@@ -95,7 +95,7 @@ impl Update {
     }
 
     /// Returns what to do next. An [`Next::Out`], [`Next::In`] or [`Next::Wait`] is answered before the next call.
-    pub fn next(&mut self) -> Next {
+    pub fn advance(&mut self) -> Next {
         match self.dialogue.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(Ok(())) => Next::Done,
             Poll::Ready(Err(failure)) => Next::Failed { why: failure.to_string() },

@@ -29,7 +29,7 @@ struct Bench {
     decoder: Decoder,
     commands: Vec<Command>,
     exchanged: Instant,
-    /// What the page has sent and the device has not received.
+    /// Bytes that the page has sent and the device has not received.
     out: Vec<u8>,
 }
 

@@ -1,4 +1,4 @@
-//! What the page of a real board sends, and when: nothing that gives torque but after a press in the guide of this very connection.
+//! The bytes that the page of a real board sends, and when: nothing that gives torque but after a press in the guide of this very connection.
 
 use board_wasm::session::Session;
 use board_wasm::work::Task;
@@ -19,7 +19,7 @@ use std::time::Duration;
 const EXCHANGE: Duration = Duration::from_millis(1);
 /// Steps of the guide of commissioning, with the one that asks for the needle.
 const STEPS: usize = 6;
-/// What a hand does in each.
+/// The act of a hand in each.
 pub(crate) const ACTS: [Act; STEPS] =
     [Act::HandsOff, Act::Turn(5), Act::Pull(100.0), Act::Tilt(0.0), Act::Tilt(0.8), Act::HandsOff];
 const TASK: Task = Task::Commission { turns: 5, pull_mm: 100.0, counts_per_turn: None };

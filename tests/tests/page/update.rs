@@ -50,7 +50,7 @@ pub(crate) fn carry_out(bootloader: &mut Bootloader, next: &Next) -> Option<Resu
 fn run(bootloader: &mut Bootloader, file: &[u8]) -> Result<(), String> {
     let mut update = Update::new(file, MEMORY).map_err(|failure| failure.to_string())?;
     loop {
-        let next = update.next();
+        let next = update.advance();
         match carry_out(bootloader, &next) {
             Some(answer) => update.answer(answer),
             None => {

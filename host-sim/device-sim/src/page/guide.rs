@@ -1,4 +1,4 @@
-//! What a guide shows and what its page answers: the steps of work that a person and a device do in turns.
+//! The state that a guide shows and the answers of its page: the steps of work that a person and a device do in turns.
 
 use serde::{Deserialize, Serialize};
 
