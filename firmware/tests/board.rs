@@ -119,9 +119,8 @@ mod tests {
         assert!(!readings.enable_line, "the enable line is high");
     }
 
-    /// Cycles of the control law by state, over an insertion and a withdrawal.
-    #[test]
-    fn the_law_takes_its_cycles(mut parts: Parts) {
+    /// The most cycles of the control law by state, over an insertion and a withdrawal; `before` is done before each tick.
+    fn law_cycles(watchdog: &mut impl Watchdog, mut before: impl FnMut()) -> [u32; 8] {
         let Ok(plan) = Plan::new(&Device::commissioned_virtual(), &Patient::default()) else {
             panic!("the default is sound")
         };
@@ -131,19 +130,35 @@ mod tests {
         for tick in 0..20_000_i32 {
             controller.order(Order::Heartbeat);
             let count = if tick < 10_000 { tick / 16 - 60 } else { (20_000 - tick) / 16 - 60 };
+            before();
             let entered = DWT::cycle_count();
             let output = controller.tick(TickInput { count: Counts(count), ..TickInput::default() });
             let cycles = DWT::cycle_count().wrapping_sub(entered);
             if let Some(place) = longest.get_mut(usize::from(output.sample.state)) {
                 *place = cycles.max(*place);
             }
-            parts.watchdog.feed_for_test();
+            watchdog.feed();
         }
-        for (state, cycles) in longest.iter().enumerate() {
-            defmt::println!("state {}: at most {} cycles", state, cycles);
+        longest
+    }
+
+    /// With the tick's code in the flash's cache, and with none of it there: in the image it is somewhere between, for the tick's code is
+    /// more than the cache holds. Prints both.
+    #[test]
+    fn the_law_takes_its_cycles(mut parts: Parts) {
+        let mut flash = parts.store.close().0;
+        let warm = law_cycles(&mut parts.watchdog, || ());
+        let cold = law_cycles(&mut parts.watchdog, || flash.forget_code());
+        for (state, (warm, cold)) in warm.iter().zip(cold).enumerate() {
+            defmt::println!("state {}: at most {} cycles, {} without a cache", state, warm, cold);
         }
-        assert!(longest[State::Elastic as usize] > 100, "it was pressed");
-        assert!(longest.iter().all(|&cycles| cycles < timing::OUTPUT_CYCLES), "later than the latch");
+        let elastic = State::Elastic as usize;
+        assert!(warm[elastic] > 100, "it was pressed");
+        assert!(cold[elastic] > warm[elastic], "the cache was not emptied");
+        assert!(
+            warm.iter().chain(&cold).all(|&cycles| cycles < timing::OUTPUT_CYCLES),
+            "later than the latch"
+        );
     }
 
     /// In sectors that hold nothing else, which are blank again afterwards; the device that is saved is not a commissioned one.

@@ -1,10 +1,11 @@
 //! The flash image on an emulated board, end to end.
 //!
 //! [`board`] runs the image; [`usb_host`] is the PC's end of its cable; [`pc`] is the program on
-//! that PC; [`browser`] looks at its page. The tests in `tests/` say what the device promises. Nothing here is part of the
+//! that PC; [`browser`] looks at its page; [`bootloader`] is the one in ROM. The tests in `tests/` say what the device promises. Nothing here is part of the
 //! product, and nothing of it reaches into the firmware: one image, no feature flag for tests.
 
 pub mod board;
+pub mod bootloader;
 pub mod browser;
 pub mod follow;
 pub mod laws;

@@ -53,11 +53,20 @@ fn crc(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use board_wasm::dfu::file::Image;
 
     /// The check value that every catalogue gives for CRC-32/JAMCRC.
     #[test]
     fn the_checksum_is_jamcrc() {
         assert_eq!(crc(b"123456789"), 0x340B_C6D9);
+    }
+
+    /// Written and read by different hands: the page checks prefix, target, element and suffix by their place in UM0391.
+    #[test]
+    fn the_page_of_a_board_reads_the_file() {
+        let bytes: Vec<u8> = (0..5_000_u32).map(|n| ((n * 7) >> 3) as u8).collect();
+        let image = Image::parse(&file("BOARD", 0x0800_4000, &bytes)).expect("it is sound");
+        assert_eq!(image, Image { target: "BOARD".into(), start: 0x0800_4000, bytes });
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `cargo xtask site`: the whole simulator as one folder without a server: the page, its modules inside it, and the device as
 //! WebAssembly in the place of the WebSocket. A folder opened from a disk may load neither modules nor WebAssembly, so that
-//! both lie in the page as text.
+//! both lie in the page as text. `board.html` beside it is the page of a real board, over WebSerial.
 
 use crate::setup;
 use crate::shell::{self, Failure};
@@ -16,35 +16,62 @@ const CLASS_PAGE: &str = "class.js";
 /// The page, and what takes the place of some of its modules.
 const PAGE: &str = "host-sim/page";
 const IN_PLACE: &str = "site-wasm/page";
-/// The line by which the page starts its modules, and its replacement in the site.
-const STARTS: &str = r#"<script type="module" src="main.js"></script>"#;
+/// The page of a real board, and the modules that it shares with the other pages.
+const BOARD: &str = "board-wasm/page";
+const BOARD_SHARES: [&str; 2] = ["guide_steps.js", "bytes.js"];
 /// Profiles and ticks whose bits are compared: an insertion and withdrawal each.
 const COMPARED: [(&str, &str); 2] = [("adult", "80000"), ("firm-skin", "80000")];
 
 /// Builds the site into `target/site`; its page.
 pub(crate) fn build() -> Result<PathBuf, Failure> {
     let device = wasm::build_crate("site-wasm")?;
+    let board = wasm::build_crate("board-wasm")?;
     let top = shell::top();
-    let mut modules = scripts(&top.join(PAGE))?;
-    modules.extend(scripts(&top.join(IN_PLACE))?);
-    let picture = top.join(PAGE).join("picture.wasm");
-    let mut files = String::from("export const files = {\n");
-    for (name, path) in [("picture.wasm", &picture), ("device.wasm", &device)] {
-        let _ = writeln!(files, "  \"{name}\": \"{}\",", base64(&read(path)?));
-    }
-    files.push_str("};\n");
-    modules.insert("files.js".into(), files);
-    let page = String::from_utf8_lossy(&read(&top.join(PAGE).join("index.html"))?).into_owned();
-    let page = page.replacen(STARTS, &starts(&modules), 1);
-    if page.contains(STARTS) || !page.contains("importmap") {
-        return Err(Failure::new(format!("{PAGE}/index.html does not start main.js as `{STARTS}` does")));
-    }
+    let pages = top.join(PAGE);
     let site = shell::target().join("site");
-    write(&site, "index.html", page.as_bytes())?;
-    for file in ["style.css", "practice.css", "icon.svg"] {
-        write(&site, file, &read(&top.join(PAGE).join(file))?)?;
+    let mut modules = scripts(&pages)?;
+    modules.extend(scripts(&top.join(IN_PLACE))?);
+    let shared = modules.clone().into_iter().filter(|(name, _)| BOARD_SHARES.contains(&name.as_str()));
+    let mut of_board: BTreeMap<String, String> = shared.collect();
+    of_board.extend(scripts(&top.join(BOARD))?);
+    modules.insert(
+        "files.js".into(),
+        binaries(&[("picture.wasm", &pages.join("picture.wasm")), ("device.wasm", &device)])?,
+    );
+    of_board.insert("files.js".into(), binaries(&[("board.wasm", &board)])?);
+    write_page(&site, &pages.join("index.html"), "main.js", &modules)?;
+    write_page(&site, &top.join(BOARD).join("board.html"), "board.js", &of_board)?;
+    for file in ["style.css", "practice.css", "guide.css", "icon.svg"] {
+        write(&site, file, &read(&pages.join(file))?)?;
     }
+    write(&site, "board.css", &read(&top.join(BOARD).join("board.css"))?)?;
     Ok(site.join("index.html"))
+}
+
+/// A module that holds binary files as text.
+fn binaries(files: &[(&str, &Path)]) -> Result<String, Failure> {
+    let mut module = String::from("export const files = {\n");
+    for (name, path) in files {
+        let _ = writeln!(module, "  \"{name}\": \"{}\",", base64(&read(path)?));
+    }
+    module.push_str("};\n");
+    Ok(module)
+}
+
+/// Writes a page with its modules inside it; `first` is the one that it starts.
+fn write_page(
+    site: &Path,
+    page: &Path,
+    first: &str,
+    modules: &BTreeMap<String, String>,
+) -> Result<(), Failure> {
+    let line = format!(r#"<script type="module" src="{first}"></script>"#);
+    let text = String::from_utf8_lossy(&read(page)?).into_owned();
+    if !text.contains(&line) {
+        return Err(Failure::new(format!("{} does not start {first} by `{line}`", page.display())));
+    }
+    let name = page.file_name().unwrap_or_default().to_string_lossy();
+    write(site, &name, text.replacen(&line, &starts(modules, first), 1).as_bytes())
 }
 
 /// Builds it and says where it is.
@@ -52,6 +79,10 @@ pub(crate) fn run() -> Result<(), Failure> {
     let page = build()?;
     println!("{} opens in a browser as it is, or from any web server", page.display());
     println!("another patient: add ?profile=firm-skin to its address");
+    println!(
+        "{} is the page of a real board, in Chrome, Edge or Chromium",
+        page.with_file_name("board.html").display()
+    );
     Ok(())
 }
 
@@ -96,13 +127,13 @@ fn scripts(folder: &Path) -> Result<BTreeMap<String, String>, Failure> {
 }
 
 /// The modules as addresses that hold them, and the start of the first.
-fn starts(modules: &BTreeMap<String, String>) -> String {
+fn starts(modules: &BTreeMap<String, String>, first: &str) -> String {
     let entries: Vec<String> = modules
         .iter()
         .map(|(name, text)| format!("\"{name}\":\"data:text/javascript;base64,{}\"", base64(text.as_bytes())))
         .collect();
     format!(
-        "<script type=\"importmap\">{{\"imports\":{{{}}}}}</script>\n  <script type=\"module\">import \"main.js\";</script>",
+        "<script type=\"importmap\">{{\"imports\":{{{}}}}}</script>\n  <script type=\"module\">import \"{first}\";</script>",
         entries.join(",\n")
     )
 }

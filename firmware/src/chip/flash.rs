@@ -87,6 +87,17 @@ impl Sectors {
         done
     }
 
+    /// Empties both caches, each of which has to be off for that (FLASH_ACR, RM0090 3.9.1): the next code comes from the flash, as it does
+    /// where other tasks have used the cache since.
+    #[allow(dead_code, reason = "the tests of the board call it")]
+    pub(crate) fn forget_code(&mut self) {
+        self.flash.acr().modify(|_, w| w.icen().clear_bit());
+        self.flash.acr().modify(|_, w| w.icrst().set_bit());
+        self.flash.acr().modify(|_, w| w.icrst().clear_bit());
+        self.flash.acr().modify(|_, w| w.icen().set_bit());
+        self.forget_cached();
+    }
+
     /// The data cache may still hold what was there before.
     fn forget_cached(&mut self) {
         self.flash.acr().modify(|_, w| w.dcen().clear_bit());

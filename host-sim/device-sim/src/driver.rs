@@ -17,6 +17,8 @@ use std::time::Duration;
 pub const HEARTBEAT: Duration = Duration::from_millis(50);
 /// An unanswered command is repeated after this.
 pub const REPEAT: Duration = Duration::from_millis(100);
+/// A command that gives torque is not repeated to a device that has sent no samples for this long; it sends a block every 3.2 ms.
+const DOUBT: Duration = Duration::from_millis(50);
 /// A device that sends no samples for this long has started anew or is gone: hello again.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
@@ -73,6 +75,12 @@ struct Pending {
     command: Command,
     bytes: Vec<u8>,
     sent: Duration,
+}
+
+impl Pending {
+    fn gives_torque(&self) -> bool {
+        matches!(self.command, Command::Start | Command::Excite(_))
+    }
 }
 
 impl Driver {
@@ -178,7 +186,10 @@ impl Driver {
         if now.saturating_sub(self.last_samples) > SILENCE {
             self.greet(now);
         }
+        let is_silent = now.saturating_sub(self.last_samples) > DOUBT;
         match &mut self.pending {
+            // It may have started anew and forgotten who asked.
+            Some(pending) if is_silent && pending.gives_torque() => {}
             Some(pending) if now.saturating_sub(pending.sent) >= REPEAT => {
                 pending.sent = now;
                 self.out.extend(&pending.bytes);

@@ -104,22 +104,7 @@ impl Compensate {
             None => Vec::new(),
         };
         let mut lines: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-        lines.extend(outcome.weight_mnm.map(|weight| format!("weight measured={weight:.3} mN·m")));
-        lines.extend(outcome.taken_back.iter().chain(&outcome.left_out).cloned());
-        let (before, after) = (&outcome.before, &outcome.after);
-        let mut compare = |what: &str, before: f64, after: f64| {
-            lines.push(format!("{what} before={:.1} after={:.1} mN rms", before * 1e3, after * 1e3));
-        };
-        compare("insertion", before.insertion, after.insertion);
-        compare("hold", before.hold, after.hold);
-        compare("withdrawal", before.withdrawal, after.withdrawal);
-        compare("all", before.all(), after.all());
-        if outcome.is_compensated {
-            return Ok(lines);
-        }
-        Err(Failure::failed(format_args!(
-            "the device is as it was before: {}; characterise and diagnose again",
-            outcome.taken_back.join("; ")
-        )))
+        lines.extend(outcome.lines());
+        outcome.refusal().map_or(Ok(lines), Err)
     }
 }

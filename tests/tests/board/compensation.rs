@@ -11,7 +11,6 @@ use control_core::units::{Counts, Millimetres, MillimetresPerSecond, Milliradian
 use control_core::{Config, Controller, Device, Order, Patient};
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
-use lab::characterise::programme;
 use lab::compensate::angle;
 use lab::compensate::coefficients::{Found, found};
 use link::Command;
@@ -82,7 +81,7 @@ fn find_angle(board: &mut Board, pc: &mut Pc, found: &Found) -> i32 {
             speed: MillimetresPerSecond(I16F16::from_num(20.0)),
         },
         duration_ms: (2.0 * stroke / 20.0 * 1e3) as u32,
-        servo: programme::servo(found.inertia, 10.0),
+        servo: device_setup::servo::servo(found.inertia, 10.0),
         travel: Millimetres(I16F16::from_num(150)),
         compensated: false,
     };

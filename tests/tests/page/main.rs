@@ -1,6 +1,8 @@
 //! The page, in a real browser.
 
 mod access;
+mod board_page;
+mod board_session;
 mod body;
 mod browser;
 mod graphics;
@@ -9,4 +11,5 @@ mod layout;
 mod needle;
 mod patient;
 mod practice;
+mod update;
 mod views;

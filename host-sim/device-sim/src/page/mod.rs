@@ -2,4 +2,5 @@
 //! reduces 10 kHz to what a picture needs.
 
 pub mod condense;
+pub mod guide;
 pub mod messages;

@@ -3,9 +3,10 @@
 //! must predict instead of repeating.
 
 use control_core::excitation::{Excitation, Servo, Signal};
-use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
+use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use device_setup::servo::servo;
 use diagnosis::rig::Rig;
-use fixed::types::{I8F24, I16F16};
+use fixed::types::I16F16;
 use std::time::Duration;
 
 /// Furthest that the roller turns from where it began, mm along its surface.
@@ -85,18 +86,6 @@ pub fn programmes(rig: &Rig, radius_mm: f64) -> Vec<Programme> {
             ],
         },
     ]
-}
-
-/// A soft servo for an inertia in kg·m² on a roller of this radius.
-pub fn servo(inertia: f64, radius_mm: f64) -> Servo {
-    let radius = radius_mm * 1e-3;
-    // Inertia seen along the surface of the roller, kg; N/m and N·s/m are 1,000 of a N/mm and a N·s/mm.
-    let mass = inertia / (radius * radius);
-    let soft = experiment::Servo::of(mass);
-    Servo {
-        stiffness: Stiffness(I16F16::saturating_from_num(soft.stiffness * 1e-3)),
-        damping: Damping(I8F24::saturating_from_num(soft.damping * 1e-3)),
-    }
 }
 
 /// The quantities that determine the amplitudes.

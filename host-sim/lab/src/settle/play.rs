@@ -2,10 +2,11 @@
 
 use super::{Asked, in_words};
 use crate::characterise;
-use crate::characterise::programme::{Programme, Step, TRAVEL_MM, servo};
+use crate::characterise::programme::{Programme, Step, TRAVEL_MM};
 use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use device_setup::servo::servo;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};

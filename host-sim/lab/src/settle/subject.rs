@@ -5,9 +5,11 @@ use crate::characterise::mechanism::BareDevice;
 use crate::characterise::programme::Programme;
 use crate::characterise::written::{Track, nominal_rig};
 use crate::characterise::{self, News, configuration};
-use crate::commission::bench::{Bench, Line, WireLine};
+use crate::commission::bench::{Line, WireLine};
 use crate::commission::mechanism::VirtualLine;
 use control_core::Config;
+use device_setup::bench::Bench;
+use device_setup::pause::block_on;
 use device_sim::device::{Port, Wire};
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
@@ -38,7 +40,8 @@ impl Subject<'_> {
     /// Its configuration, with a patient that it does not use.
     pub(super) fn config(&mut self) -> Result<Config, Failure> {
         let Self::Real { port, stop } = self else { return Ok(configuration()) };
-        let device = Bench::open(&mut WireLine::new(opened(*port)?, stop))?.device()?;
+        let mut line = WireLine::new(opened(*port)?, stop);
+        let device = block_on(async { Bench::open(&mut line).await?.device().await })?;
         if !device.commissioned {
             return Err(Failure::failed(
                 "the device has not been commissioned; run host-sim commission first",

@@ -35,6 +35,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/class.js", "class.js", SCRIPT),
     asset!("/guide.css", "guide.css", "text/css; charset=utf-8"),
     asset!("/guide.js", "guide.js", SCRIPT),
+    asset!("/guide_steps.js", "guide_steps.js", SCRIPT),
     asset!("/icon.svg", "icon.svg", "image/svg+xml"),
     asset!("/main.js", "main.js", SCRIPT),
     asset!("/link.js", "link.js", SCRIPT),

@@ -1,6 +1,7 @@
 //! A serial device, over a pseudo-terminal pair: the virtual device's bytes behind the far end, unplugged and plugged in again.
 
 mod board;
+mod crashed;
 mod pipe;
 
 use crate::common::{figure, folder, host_sim, text};

@@ -1,0 +1,210 @@
+//! The bytes that the page of a real board sends, and when: nothing that gives torque but after a press in the guide of this very connection.
+
+use board_wasm::session::Session;
+use board_wasm::work::Task;
+use device_sim::device::part::DevicePart;
+use device_sim::library::Text;
+use device_sim::page::guide::GuideAnswer;
+use lab::characterise::mechanism::Wiring;
+use lab::characterise::{self, written};
+use lab::commission::bench::{Act, Line};
+use lab::commission::mechanism::VirtualLine;
+use link::Command;
+use link::codec::Decoder;
+use link::frames::HostFrame;
+use serde_json::Value;
+use std::time::Duration;
+
+/// One exchange of the virtual device.
+const EXCHANGE: Duration = Duration::from_millis(1);
+/// Steps of the guide of commissioning, with the one that asks for the needle.
+const STEPS: usize = 6;
+/// The act of a hand in each.
+pub(crate) const ACTS: [Act; STEPS] =
+    [Act::HandsOff, Act::Turn(5), Act::Pull(100.0), Act::Tilt(0.0), Act::Tilt(0.8), Act::HandsOff];
+const TASK: Task = Task::Commission { turns: 5, pull_mm: 100.0, counts_per_turn: None };
+
+/// A board that nobody has commissioned, with its motor's leads reversed.
+pub(crate) fn uncommissioned() -> VirtualLine {
+    let scale = characterise::scale(&characterise::configuration()).expect("the default scale");
+    let wiring = Wiring { leads_reversed: true, ..Wiring::default() };
+    VirtualLine::new(&written::nominal_rig(&scale), "the nominal rig", wiring, scale.roller_radius_mm)
+        .expect("the nominal rig is sound")
+}
+
+/// A page's connection to a virtual device, without a browser.
+struct Cable {
+    session: Session,
+    line: VirtualLine,
+    now: Duration,
+    heard: Vec<u8>,
+    decoder: Decoder,
+    /// All commands since the connection began.
+    commands: Vec<Command>,
+}
+
+impl Cable {
+    fn new() -> Self {
+        Self {
+            session: Session::default(),
+            line: uncommissioned(),
+            now: Duration::ZERO,
+            heard: Vec::new(),
+            decoder: Decoder::default(),
+            commands: Vec::new(),
+        }
+    }
+
+    fn run(&mut self, time: Duration) {
+        self.run_until(time, |_| false);
+    }
+
+    fn run_until(&mut self, longest: Duration, is_so: impl Fn(&Self) -> bool) {
+        let end = self.now + longest;
+        while self.now < end && !is_so(self) {
+            self.now += EXCHANGE;
+            let out = self.session.exchange(self.now, &self.heard).to_vec();
+            for byte in &out {
+                if let Some(Ok(frame)) = self.decoder.push::<HostFrame>(*byte) {
+                    self.commands.push(frame.command);
+                }
+            }
+            self.heard.clear();
+            self.line.exchange(&out, &mut self.heard).expect("the virtual device is there");
+        }
+    }
+
+    fn messages(&self) -> Vec<Value> {
+        let lines = self.session.tell(self.now);
+        lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+    }
+
+    fn message(&self, kind: &str) -> Value {
+        self.messages().into_iter().find(|message| message["type"] == kind).unwrap_or_default()
+    }
+
+    /// The number of the step that is asked for.
+    fn asked(&self) -> Option<usize> {
+        let steps = self.message("guide")["steps"].as_array().cloned().unwrap_or_default();
+        steps.iter().position(|step| step["stage"] == "asked").map(|place| place + 1)
+    }
+
+    fn begin(&mut self, step: usize) {
+        self.run_until(Duration::from_secs(90), |cable| cable.asked() == Some(step));
+        assert_eq!(self.asked(), Some(step), "{:?}", self.message("guide"));
+        self.session.answer(GuideAnswer::Begin { step });
+        self.line.act(ACTS[step - 1]);
+    }
+
+    /// Commands that may give torque, or change what a later one gives.
+    fn strong(&self) -> Vec<&Command> {
+        let is_mild = |command: &&Command| matches!(command, Command::Hello { .. } | Command::Stop);
+        self.commands.iter().filter(|command| !is_mild(command)).collect()
+    }
+
+    fn gives_torque(&self) -> bool {
+        self.commands.iter().any(|command| matches!(command, Command::Start | Command::Excite(_)))
+    }
+}
+
+#[test]
+fn a_page_by_itself_says_hello_and_stop_only() {
+    let mut cable = Cable::new();
+    cable.run(Duration::from_secs(3));
+    let board = cable.message("board");
+    assert_eq!(board["live"], true, "{board}");
+    assert!(board["needle"]["state"].is_string() && board["board"]["firmware"].is_string(), "{board}");
+    // The board starts anew, or another one is plugged in.
+    cable.line = uncommissioned();
+    cable.run(Duration::from_secs(3));
+    assert_eq!(cable.message("board")["live"], true);
+    assert!(cable.strong().is_empty(), "{:?}", cable.strong());
+    assert!(cable.commands.iter().filter(|command| matches!(command, Command::Hello { .. })).count() >= 2);
+}
+
+#[test]
+fn commissioning_sends_torque_only_after_the_press_of_its_step() {
+    let mut cable = Cable::new();
+    cable.run(Duration::from_millis(200));
+    cable.session.begin(TASK).expect("its numbers are sound");
+    cable.run(Duration::from_secs(2));
+    assert!(cable.strong().is_empty(), "before the first press: {:?}", cable.strong());
+    for step in 1..STEPS {
+        cable.begin(step);
+    }
+    cable.run_until(Duration::from_secs(90), |cable| cable.asked() == Some(STEPS));
+    cable.run(Duration::from_secs(2));
+    assert!(!cable.gives_torque(), "before the last press");
+    assert_eq!(cable.message("guide")["steps"][STEPS - 1]["moves"], true);
+    // A second press on a step before, or on one that is not there, begins nothing.
+    for step in [1, STEPS - 1, STEPS + 1] {
+        cable.session.answer(GuideAnswer::Begin { step });
+    }
+    cable.run(Duration::from_secs(1));
+    assert!(!cable.gives_torque());
+    cable.begin(STEPS);
+    cable.run_until(Duration::from_secs(30), |cable| !cable.message("guide")["end"].is_null());
+    let end = &cable.message("guide")["end"];
+    assert_eq!(end["well"], true, "{end}");
+    assert!(end["lines"].to_string().contains("4000 counts a turn"), "{end}");
+    assert!(end["lines"].to_string().contains("leads reversed"), "{end}");
+    let file = cable.session.file().expect("it ended well").to_owned();
+    let text = Text { origin: "device.toml".into(), text: file };
+    assert!(DevicePart::parse(text).expect("it is read again").device.commissioned);
+    cable.run(EXCHANGE * 5);
+    assert!(matches!(cable.commands.last(), Some(Command::Stop)), "{:?}", cable.commands.last());
+}
+
+#[test]
+fn a_restart_or_a_new_connection_forgets_the_guide() {
+    for is_new_connection in [false, true] {
+        let mut cable = Cable::new();
+        cable.session.begin(TASK).expect("sound");
+        for step in 1..=STEPS {
+            cable.begin(step);
+        }
+        cable.run_until(Duration::from_secs(5), Cable::gives_torque);
+        assert!(cable.gives_torque(), "the pulses have begun");
+        cable.line = uncommissioned();
+        cable.heard.clear();
+        if is_new_connection {
+            (cable.session, cable.decoder) = (Session::default(), Decoder::default());
+        }
+        cable.commands.clear();
+        cable.run(Duration::from_secs(8));
+        assert!(!cable.gives_torque(), "{:?}", cable.commands);
+        let guide = cable.message("guide");
+        if is_new_connection {
+            assert!(guide.is_null(), "{guide}");
+        } else {
+            assert_eq!(guide["end"]["well"], false, "{guide}");
+        }
+    }
+}
+
+#[test]
+fn a_guide_that_is_left_sends_a_stop() {
+    let mut cable = Cable::new();
+    cable.session.begin(TASK).expect("sound");
+    for step in 1..=STEPS {
+        cable.begin(step);
+    }
+    cable.run_until(Duration::from_secs(5), Cable::gives_torque);
+    cable.commands.clear();
+    cable.session.answer(GuideAnswer::Leave);
+    cable.run(Duration::from_millis(100));
+    assert!(cable.commands.contains(&Command::Stop) && !cable.gives_torque(), "{:?}", cable.commands);
+}
+
+#[test]
+fn numbers_that_make_no_sense_are_refused() {
+    for wrong in [
+        Task::Commission { turns: 0, pull_mm: 100.0, counts_per_turn: None },
+        Task::Commission { turns: 5, pull_mm: f64::NAN, counts_per_turn: None },
+        Task::Commission { turns: 5, pull_mm: 100.0, counts_per_turn: Some(3) },
+        Task::Compensate { rig: "nonsense".into(), share: 1.0 },
+    ] {
+        let why = Session::default().begin(wrong.clone()).expect_err("it is refused").to_string();
+        assert!(!why.is_empty() && !why.contains('\n'), "{wrong:?}: {why}");
+    }
+}
