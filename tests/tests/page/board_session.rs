@@ -5,6 +5,7 @@ use board_wasm::work::Task;
 use device_sim::device::part::DevicePart;
 use device_sim::library::Text;
 use device_sim::page::guide::GuideAnswer;
+use diagnosis::rig::Rig;
 use lab::characterise::mechanism::Wiring;
 use lab::characterise::{self, written};
 use lab::commission::bench::{Act, Line};
@@ -13,6 +14,7 @@ use link::Command;
 use link::codec::Decoder;
 use link::frames::HostFrame;
 use serde_json::Value;
+use std::path::Path;
 use std::time::Duration;
 
 /// One exchange of the virtual device.
@@ -45,9 +47,13 @@ struct Cable {
 
 impl Cable {
     fn new() -> Self {
+        Self::to(uncommissioned())
+    }
+
+    fn to(line: VirtualLine) -> Self {
         Self {
             session: Session::default(),
-            line: uncommissioned(),
+            line,
             now: Duration::ZERO,
             heard: Vec::new(),
             decoder: Decoder::default(),
@@ -153,6 +159,53 @@ fn commissioning_sends_torque_only_after_the_press_of_its_step() {
     assert!(DevicePart::parse(text).expect("it is read again").device.commissioned);
     cable.run(EXCHANGE * 5);
     assert!(matches!(cable.commands.last(), Some(Command::Stop)), "{:?}", cable.commands.last());
+}
+
+fn fixture(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name);
+    std::fs::read_to_string(path).expect("a fixture")
+}
+
+/// Force on a hand in a line such as `all before=102.8 after=13.4 mN rms`.
+fn felt(lines: &Value, when: &str) -> f64 {
+    let all = lines.as_array().expect("lines").iter().filter_map(Value::as_str);
+    let line = all.into_iter().find(|line| line.starts_with("all ")).expect("the sum of all phases");
+    let number = line.split(' ').find_map(|word| word.strip_prefix(when)?.strip_prefix('='));
+    number.expect("a number").parse().expect("a number")
+}
+
+#[test]
+fn compensation_leaves_a_quarter_of_the_mechanism_and_waits_for_each_press() {
+    let hidden = Rig::parse(&fixture("hidden.toml"), "hidden.toml").expect("a rig");
+    let mut cable = Cable::to(VirtualLine::commissioned(&hidden, "hidden.toml", 10.0).expect("a device"));
+    cable.run(Duration::from_millis(200));
+    let task = Task::Compensate { rig: fixture("hidden-found.toml"), share: 1.0 };
+    cable.session.begin(task).expect("its numbers are sound");
+    let mut pressed = 0;
+    let end = loop {
+        cable.run_until(Duration::from_secs(180), |cable| {
+            cable.asked().is_some() || !cable.message("guide")["end"].is_null()
+        });
+        let guide = cable.message("guide");
+        if !guide["end"].is_null() {
+            break guide["end"].clone();
+        }
+        let step = cable.asked().expect("it asks, or it ends");
+        let text = guide["steps"][step - 1]["text"].as_str().unwrap_or_default().to_owned();
+        // Nothing moves while nobody presses.
+        cable.commands.clear();
+        cable.run(Duration::from_secs(1));
+        assert!(!cable.gives_torque(), "before the press of: {text}");
+        cable.session.answer(GuideAnswer::Begin { step });
+        if text.contains("point the device down") {
+            cable.line.act(Act::Tilt(0.5));
+        }
+        pressed += 1;
+    };
+    assert_eq!(end["well"], true, "{end}");
+    assert!(pressed >= 3, "each step has its press: {pressed}");
+    let (before, after) = (felt(&end["lines"], "before"), felt(&end["lines"], "after"));
+    assert!(before > 80.0 && after <= before / 4.0, "{after} after {before} mN");
 }
 
 #[test]
