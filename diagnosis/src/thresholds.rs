@@ -69,10 +69,6 @@ pub(crate) const HARDLY_ANOTHER_SIZE: Range<f64> = 0.85..1.18;
 /// Part of the held-out force error, root mean square, that an effect must take off to be named, however sure it is: the simulation is
 /// right to that part without it. A third generator lost 2 of 89 right names and 2 of 16 wrong ones by it, two of three named nulls.
 pub(crate) const MATERIAL: f64 = 0.05;
-/// Part of the force that moves the axis, root mean square, that an effect must be to be named: no command and no gain is known to better.
-/// Of 66 right names on the second generator the least was 0.27 %; on recordings of which nothing is missing, at 4 kHz, what friction's
-/// rise at a stop leaves was 0.1 %.
-pub(crate) const MATERIAL_OF_FORCE: f64 = 0.002;
 /// Log-odds that a name loses where the patched simulation follows the motion less well in windows of half a second or less, and the
 /// factor between the errors from which it does. On machines six of six wrong names did, on a generator 19 of 89 right ones: it is
 /// weighed, and takes no name.

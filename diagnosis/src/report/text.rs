@@ -2,9 +2,7 @@
 
 use crate::numerics::bootstrap::Gain;
 use crate::pipeline::diagnosis::Reason;
-use crate::thresholds::{
-    CERTAIN_Z, LEAST_SHARE, MATERIAL, MATERIAL_OF_FORCE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE,
-};
+use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::rejection::{Rather, Rejection, Weakness};
 
 /// Says why an effect is not named, as a clause.
@@ -42,11 +40,6 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             "it takes {:.1} % off the held-out force error, less than the {:.0} % that make it material",
             100.0 * part.max(0.0),
             100.0 * MATERIAL
-        ),
-        Rejection::SlightForce { part } => format!(
-            "it is {:.2} % of the force that moves the axis, less than the {:.1} % that make it material",
-            100.0 * part,
-            100.0 * MATERIAL_OF_FORCE
         ),
         Rejection::NotPeriodic => {
             "its orders follow one another without a gap, as at places along the travel, not at teeth or poles"

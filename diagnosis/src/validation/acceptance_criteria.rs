@@ -30,8 +30,6 @@ pub(crate) struct EffectEvidence {
     pub(crate) share: f64,
     /// Part of the held-out force error, root mean square, that it takes off.
     pub(crate) off_force: f64,
-    /// The held-out force, root mean square, that it explains, over the force that moves the axis.
-    pub(crate) of_force: f64,
     /// True if one of its values is at a bound.
     pub(crate) at_bound: bool,
     /// True if its waves, if it has any, are those of teeth or poles.
@@ -214,7 +212,6 @@ mod tests {
             fit: gain(900.0, 600.0, 9.0),
             force: gain(0.9, 0.6, 5.0),
             off_force: 0.5,
-            of_force: 0.1,
             share: 0.9,
             at_bound: false,
             is_comb: true,

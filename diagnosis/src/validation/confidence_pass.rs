@@ -11,9 +11,7 @@ use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{
-    BEHIND_Z, LEAVES_MUCH, MATERIAL, MATERIAL_OF_FORCE, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD,
-};
+use crate::thresholds::{BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
@@ -183,9 +181,8 @@ impl WeighedModel {
 
 /// Returns why the simulation is right without an effect, however sure it is; none if it is not.
 fn immaterial(found: &EffectEvidence) -> Option<Rejection> {
-    let EffectEvidence { off_force, of_force, .. } = *found;
-    let of_error = (off_force < MATERIAL).then_some(Rejection::Immaterial { part: off_force });
-    of_error.or_else(|| (of_force < MATERIAL_OF_FORCE).then_some(Rejection::SlightForce { part: of_force }))
+    let part = found.off_force;
+    (part < MATERIAL).then_some(Rejection::Immaterial { part })
 }
 
 /// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at

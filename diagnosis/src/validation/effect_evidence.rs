@@ -19,7 +19,7 @@ use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::holdout_likelihood::{self, HoldoutFit, evaluate_all};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
-use crate::validation::residuals::{above, drive_force, forces, relative_gain};
+use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
 
 /// Least part of a refit's mean square that counts as above the noise: the noise itself is not known exactly.
@@ -52,8 +52,6 @@ struct JudgedModel<'a> {
     left: LeftForce,
     /// Mean square of the force that the null leaves beyond the noise, on fitted and on held-out recordings.
     explainable: [f64; 2],
-    /// The force that moves the axis on held-out recordings, root mean square, N·m or N.
-    force_rms: f64,
 }
 
 /// Force that a model leaves, per recording and block.
@@ -92,7 +90,6 @@ impl<'a> JudgedModel<'a> {
                 explainable(&by_null.fitted, context.tracks),
                 explainable(&by_null.held_out, shown),
             ],
-            force_rms: estimator.rms(&drive_force(context.nominal, &estimator, shown), shown),
             estimator,
         }
     }
@@ -120,7 +117,6 @@ impl<'a> JudgedModel<'a> {
             force: relative_gain(estimator, shown, &less.held_out, &left.held_out),
             share: self.share(&less),
             off_force: self.off_force(&less),
-            of_force: self.of_force(&less),
             at_bound: self.is_at_bound(&effect, i),
             is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
@@ -148,13 +144,6 @@ impl<'a> JudgedModel<'a> {
     fn off_force(&self, less: &LeftForce) -> f64 {
         let rms = |left: &LeftForce| self.estimator.rms(&left.held_out, self.shown);
         1.0 - rms(&self.left) / rms(less).max(1e-300)
-    }
-
-    /// The held-out force, root mean square, that the model explains and one that leaves `less` does not, over the force that moves
-    /// the axis.
-    fn of_force(&self, less: &LeftForce) -> f64 {
-        let square = |left: &LeftForce| self.estimator.rms(&left.held_out, self.shown).powi(2);
-        (square(less) - square(&self.left)).max(0.0).sqrt() / self.force_rms.max(1e-300)
     }
 
     /// True if a value of effect `i` is at a bound.

@@ -25,8 +25,6 @@ pub(crate) enum Rejection {
     SmallAndUnsure { share: f64, least: f64, z: f64 },
     /// The effect takes so small a part off the held-out force error that the simulation is right without it.
     Immaterial { part: f64 },
-    /// The effect is so small a part of the force that moves the axis that the simulation is right without it.
-    SlightForce { part: f64 },
     /// The waves are not those of teeth or poles.
     NotPeriodic,
     /// A fitted value reached its limit.

@@ -97,7 +97,11 @@ impl Settle {
             }
             Some(path) => {
                 let rig = Rig::read(path).map_err(Failure::input)?;
-                self.on(&mut Subject::Virtual(Plant { rig, file: path.display().to_string() }), consent, stop)
+                self.on(
+                    &mut Subject::Virtual(Box::new(Plant { rig, file: path.display().to_string() })),
+                    consent,
+                    stop,
+                )
             }
             None => {
                 let mut port = SerialPort::find(&self.device)?;

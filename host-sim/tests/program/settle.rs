@@ -28,7 +28,7 @@ fn settings(out: &Path, motion_s: f64, compensate: bool) -> Settings {
 #[test]
 fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     let out = folder("settle-feel");
-    let mut subject = Subject::Virtual(Plant { rig: hidden(), file: "hidden.toml".into() });
+    let mut subject = Subject::Virtual(Box::new(Plant { rig: hidden(), file: "hidden.toml".into() }));
     let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
     let mut steps = 0;
     let settled = settle(&mut subject, &rig, &settings(&out, 40.0, true), |progress| {
@@ -152,7 +152,7 @@ fn a_person_ends_it_and_the_torque_goes() {
 #[test]
 fn a_person_refuses_the_first_movement() {
     let out = folder("settle-refused");
-    let mut subject = Subject::Virtual(Plant { rig: hidden(), file: "hidden.toml".into() });
+    let mut subject = Subject::Virtual(Box::new(Plant { rig: hidden(), file: "hidden.toml".into() }));
     let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
     let refused = settle(&mut subject, &rig, &settings(&out, 9.0, false), |progress| match progress {
         Progress::Asked(..) => Err(Failure::failed("not now")),

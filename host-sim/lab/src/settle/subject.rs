@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 /// The device that settles its diagnosis.
 pub enum Subject<'a> {
     /// A virtual one.
-    Virtual(Plant),
+    Virtual(Box<Plant>),
     /// A real one, whose torque `stop` takes away.
     Real {
         /// The way to it.
