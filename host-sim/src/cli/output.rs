@@ -28,6 +28,15 @@ pub(crate) fn page(what: &str, url: &str) {
     }
 }
 
+/// Prints the address of a page for other computers, and the same as a QR code for a camera.
+pub(crate) fn page_for_others(url: &str) {
+    note!("for tablets and phones: {url}");
+    // An address always fits.
+    if let Ok(code) = qrcode::QrCode::new(url) {
+        note!("{}", code.render::<qrcode::render::unicode::Dense1x2>().build());
+    }
+}
+
 /// Asks the system for its browser. Where there is none the address that was printed remains.
 fn open(url: &str) {
     let mut command = if cfg!(target_os = "windows") {

@@ -24,6 +24,7 @@ use server::outlets::Outlets;
 use server::pace::Pace;
 use server::station::{Outcome, Station};
 use server::visualizer;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -78,8 +79,13 @@ pub(crate) struct Run {
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
     /// Port of the page on this computer; 0 for any free port
-    #[arg(long, default_value_t = 8710, value_name = "N")]
+    #[arg(long, default_value_t = PORT, value_name = "N")]
     port: u16,
+    /// Show the page to other computers, tablets and phones too: an address of this one (0.0.0.0: all of them), and a port if
+    /// not 8710. They need the token in the address that is printed, with its QR code. Use it in a network that you trust: whoever
+    /// has the token moves the needle, and nothing is encrypted
+    #[arg(long, value_name = "ADDRESS[:PORT]", value_parser = address, conflicts_with_all = ["port", "headless"])]
+    listen: Option<SocketAddr>,
     #[command(flatten)]
     streams: StreamFlags,
     #[command(flatten)]
@@ -107,6 +113,10 @@ impl From<ModelName> for Model {
 }
 
 impl Run {
+    fn address(&self) -> SocketAddr {
+        self.listen.unwrap_or_else(|| (Ipv4Addr::LOCALHOST, self.port).into())
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         let seconds = self.check()?;
         let is_virtual = self.device == "virtual";
@@ -132,7 +142,7 @@ impl Run {
         let _streams = self.streams.serve(&session)?;
         let _class = self.class.join(&session, device)?;
         let looks = (!self.headless).then(|| session.subscribe());
-        let _server = if self.headless { None } else { Some(serve_for_practice(session, self.port)?) };
+        let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
         let setup = Setup {
             program: recording::version::program(),
             source: self.device.clone(),
@@ -241,6 +251,16 @@ impl Run {
     }
 }
 
+/// Port of the page.
+const PORT: u16 = 8710;
+
+/// Reads an address with or without a port.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let with_port = || text.parse::<SocketAddr>().ok();
+    let without = || Some(SocketAddr::new(text.parse::<IpAddr>().ok()?, PORT));
+    with_port().or_else(without).ok_or_else(|| "it is no address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
+}
+
 /// Serves the page and prints its address.
 pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
     let server = visualizer::serve(session, port).map_err(Failure::failed)?;
@@ -249,13 +269,19 @@ pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, F
 }
 
 /// The same with the debrief of what is recorded in the page.
-fn serve_for_practice(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
+fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Failure> {
     let write: visualizer::Debrief = Arc::new(|file| {
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
         debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
     });
-    let server = visualizer::serve_with_debrief(session, port, write).map_err(Failure::failed)?;
-    output::page("visualizer", &server.url());
+    let server = visualizer::serve_with_debrief(session, address, write).map_err(Failure::failed)?;
+    // A page on one address of the network is not on 127.0.0.1.
+    if address.ip().is_loopback() || address.ip().is_unspecified() {
+        output::page("visualizer", &server.url());
+    }
+    if let Some(url) = server.url_for_others() {
+        output::page_for_others(&url);
+    }
     Ok(server)
 }
 
@@ -268,4 +294,17 @@ pub(crate) fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
         })?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_may_leave_out_its_port() {
+        assert_eq!(address("0.0.0.0"), Ok("0.0.0.0:8710".parse().unwrap()));
+        assert_eq!(address("192.168.1.20:9000"), Ok("192.168.1.20:9000".parse().unwrap()));
+        assert_eq!(address("::1"), Ok("[::1]:8710".parse().unwrap()));
+        assert!(address("tablet").is_err() && address("10.0.0.1:99999").is_err());
+    }
 }

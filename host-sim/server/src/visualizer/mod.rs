@@ -10,6 +10,7 @@
 mod assets;
 mod connection;
 mod debrief;
+mod gate;
 mod server;
 mod watched;
 

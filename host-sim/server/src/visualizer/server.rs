@@ -1,19 +1,21 @@
-//! Serves the page on this computer only.
+//! Serves the page: on this computer only, or to a network and with a token.
 
 use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
 use super::connection;
 use super::debrief::{self, Debrief};
+use super::gate::{self, Gate, Peer};
 use super::watched::{self, Said, Watched, Watches};
 use crate::bounded_listener::BoundedListener;
 use axum::Router;
 use axum::extract::{State, WebSocketUpgrade};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::header;
+use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use device_sim::session::Session;
 use std::fmt;
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
@@ -29,13 +31,18 @@ const MOST_CONNECTIONS: usize = 64;
 pub enum ServeError {
     /// Something else listens there.
     PortInUse {
-        /// The port.
-        port: u16,
+        /// The address.
+        address: SocketAddr,
+    },
+    /// This computer does not have the address.
+    NoSuchAddress {
+        /// The address.
+        address: SocketAddr,
     },
     /// Any other reason.
     Io {
-        /// The port.
-        port: u16,
+        /// The address.
+        address: SocketAddr,
         /// The system's error.
         error: io::Error,
     },
@@ -44,15 +51,28 @@ pub enum ServeError {
 impl fmt::Display for ServeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PortInUse { port } => write!(
+            Self::PortInUse { address } => write!(
                 f,
-                "port {port} on 127.0.0.1 is in use; stop the program that uses it or choose another port with --port"
+                "port {} on {} is in use; stop the program that uses it or choose another port with {}",
+                address.port(),
+                address.ip(),
+                option(address)
             ),
-            Self::Io { port, error } => {
-                write!(f, "cannot serve the page on 127.0.0.1:{port}: {error}; try another port with --port")
+            Self::NoSuchAddress { address } => write!(
+                f,
+                "this computer has no address {}; give --listen one of its own, or 0.0.0.0 for all of them",
+                address.ip()
+            ),
+            Self::Io { address, error } => {
+                write!(f, "cannot serve the page on {address}: {error}; try another port with {}", option(address))
             }
         }
     }
+}
+
+/// The option that says where the page is served.
+fn option(address: &SocketAddr) -> &'static str {
+    if address.ip().is_loopback() { "--port" } else { "--listen ADDRESS:PORT" }
 }
 
 impl std::error::Error for ServeError {}
@@ -69,6 +89,8 @@ pub(super) struct Shared {
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
+    /// What other computers have to know.
+    token: Option<String>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -76,7 +98,20 @@ pub struct Server {
 impl Server {
     /// Returns the page's address.
     pub fn url(&self) -> String {
-        format!("http://{}/", self.address)
+        let mut address = self.address;
+        if address.ip().is_unspecified() {
+            address.set_ip(Ipv4Addr::LOCALHOST.into());
+        }
+        format!("http://{address}/")
+    }
+
+    /// Returns the page's address for other computers, with its token; none where it is served to this one only.
+    pub fn url_for_others(&self) -> Option<String> {
+        let mut address = self.address;
+        if address.ip().is_unspecified() {
+            address.set_ip(own_address().unwrap_or(address.ip()));
+        }
+        self.token.as_ref().map(|token| gate::address_with(&format!("http://{address}/"), token))
     }
 
     /// The port, which the system chose where 0 was asked for.
@@ -104,37 +139,55 @@ impl Drop for Server {
     }
 }
 
+/// The address by which this computer is known in its network: the one that it would send from. Nothing is sent.
+fn own_address() -> Option<IpAddr> {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+    // An address for documentation (RFC 5737), which nobody has.
+    socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9)).ok()?;
+    Some(socket.local_addr().ok()?.ip())
+}
+
+fn local(port: u16) -> SocketAddr {
+    (Ipv4Addr::LOCALHOST, port).into()
+}
+
 /// Serves the page of `session` at `port` of 127.0.0.1 (0: any free one) on a thread of its own.
 pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
     let shared = Shared { session, person: Arc::default() };
-    start(port, &DEVICE_PAGE, Router::new().route("/live", get(live).with_state(shared)))
+    start(local(port), &DEVICE_PAGE, Router::new().route("/live", get(live).with_state(shared)))
 }
 
-/// The same with a debrief of the last recording, which `write` makes of its file, at `/debrief`.
-pub fn serve_with_debrief(session: Session, port: u16, write: Debrief) -> Result<Server, ServeError> {
+/// The same at any address, with a debrief of the last recording, which `write` makes of its file, at `/debrief`. Other computers need
+/// the token of [`Server::url_for_others`].
+pub fn serve_with_debrief(session: Session, address: SocketAddr, write: Debrief) -> Result<Server, ServeError> {
     let router = debrief::router(session.clone(), write);
     let shared = Shared { session, person: Arc::default() };
-    start(port, &DEVICE_PAGE, router.route("/live", get(live).with_state(shared)))
+    start(address, &DEVICE_PAGE, router.route("/live", get(live).with_state(shared)))
 }
 
 /// Serves a page of a class, which only looks at what `watches` give, as [`serve`] does.
 pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> {
     let live = get(watched::live).with_state(Watched { watches, said: None });
-    start(port, &CLASS_PAGE, Router::new().route("/live", live))
+    start(local(port), &CLASS_PAGE, Router::new().route("/live", live))
 }
 
 /// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes, as [`serve`] does.
 pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
     let live = get(watched::live).with_state(Watched { watches, said: Some(said) });
-    start(port, &GUIDE_PAGE, Router::new().route("/live", live))
+    start(local(port), &GUIDE_PAGE, Router::new().route("/live", live))
 }
 
-fn start(port: u16, page: &'static Asset, router: Router) -> Result<Server, ServeError> {
+fn start(wanted: SocketAddr, page: &'static Asset, router: Router) -> Result<Server, ServeError> {
     let failed = |error: io::Error| match error.kind() {
-        io::ErrorKind::AddrInUse => ServeError::PortInUse { port },
-        _ => ServeError::Io { port, error },
+        io::ErrorKind::AddrInUse => ServeError::PortInUse { address: wanted },
+        io::ErrorKind::AddrNotAvailable => ServeError::NoSuchAddress { address: wanted },
+        _ => ServeError::Io { address: wanted, error },
     };
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
+    let (gate, token) = match wanted.ip().is_loopback() {
+        true => (Gate::default(), None),
+        false => Gate::with_token().map(|(gate, token)| (gate, Some(token))).map_err(|e| failed(e.into()))?,
+    };
+    let listener = TcpListener::bind(wanted).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
@@ -142,7 +195,7 @@ fn start(port: u16, page: &'static Asset, router: Router) -> Result<Server, Serv
     let run = move || {
         runtime.block_on(async {
             tokio::select! {
-                () = listen(listener, page, router) => {}
+                () = listen(listener, page, router, gate) => {}
                 _ = stopped => {}
             }
         });
@@ -150,16 +203,18 @@ fn start(port: u16, page: &'static Asset, router: Router) -> Result<Server, Serv
         runtime.shutdown_background();
     };
     let thread = std::thread::Builder::new().name("page".into()).spawn(run).map_err(failed)?;
-    Ok(Server { address, stop: Some(stop), thread: Some(thread) })
+    Ok(Server { address, token, stop: Some(stop), thread: Some(thread) })
 }
 
-async fn listen(listener: TcpListener, page: &'static Asset, mut router: Router) {
+async fn listen(listener: TcpListener, page: &'static Asset, mut router: Router, gate: Gate) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
     for asset in std::iter::once(page).chain(ASSETS) {
         router = router.route(asset.path, get(move || async move { file(asset) }));
     }
+    let guarded = router.layer(middleware::from_fn_with_state(gate, gate::pass));
+    let service = guarded.into_make_service_with_connect_info::<Peer>();
     // Ends only with its future.
-    let _ = axum::serve(BoundedListener::new(listener, MOST_CONNECTIONS), router).await;
+    let _ = axum::serve(BoundedListener::new(listener, MOST_CONNECTIONS), service).await;
 }
 
 fn file(asset: &'static Asset) -> Response {
@@ -174,25 +229,11 @@ fn file(asset: &'static Asset) -> Response {
     (headers, asset.body).into_response()
 }
 
-async fn live(State(shared): State<Shared>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
-    if !is_own_page(&headers) {
-        return (StatusCode::FORBIDDEN, "only the page of this program may move the needle").into_response();
-    }
+async fn live(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
     upgrade
         .max_message_size(LONGEST_MESSAGE)
         .max_frame_size(LONGEST_MESSAGE)
         .on_upgrade(move |socket| connection::run(socket, shared))
-}
-
-/// Any site that a person visits may open a WebSocket to 127.0.0.1 and would drive the motor: the browser tells where the
-/// script came from, and that has to be here.
-pub(super) fn is_own_page(headers: &HeaderMap) -> bool {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let Some(host) = text(header::HOST) else { return false };
-    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-    let local = matches!(name, "127.0.0.1" | "localhost" | "[::1]");
-    // Programs that are no browser send no origin.
-    local && text(header::ORIGIN).is_none_or(|origin| origin.strip_prefix("http://") == Some(host))
 }
 
 #[cfg(test)]
@@ -202,34 +243,61 @@ mod tests {
     use std::net::TcpStream;
     use std::time::{Duration, Instant};
 
-    fn headers(host: &str, origin: Option<&str>) -> HeaderMap {
-        let mut headers = HeaderMap::new();
-        headers.insert(header::HOST, host.parse().unwrap());
-        if let Some(origin) = origin {
-            headers.insert(header::ORIGIN, origin.parse().unwrap());
-        }
-        headers
-    }
-
-    #[test]
-    fn only_the_own_page_may_connect() {
-        assert!(is_own_page(&headers("127.0.0.1:8710", Some("http://127.0.0.1:8710"))));
-        assert!(is_own_page(&headers("localhost:9000", Some("http://localhost:9000"))));
-        assert!(is_own_page(&headers("127.0.0.1:8710", None)));
-        assert!(!is_own_page(&headers("127.0.0.1:8710", Some("http://example.org"))));
-        assert!(!is_own_page(&headers("127.0.0.1:8710", Some("null"))));
-        assert!(!is_own_page(&headers("example.org:8710", Some("http://example.org:8710"))));
-    }
-
     #[test]
     fn a_port_in_use_is_one_clear_line() {
         let taken = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let port = taken.local_addr().unwrap().port();
         let (session, _publisher) = device_sim::session::open(super::super::test_scene());
         let error = serve(session, port).unwrap_err();
-        assert!(matches!(error, ServeError::PortInUse { port: p } if p == port));
+        assert!(matches!(error, ServeError::PortInUse { address } if address.port() == port));
         assert_eq!(error.to_string().lines().count(), 1);
         assert!(error.to_string().contains(&port.to_string()));
+    }
+
+    /// The status and the head of the answer to a request to this computer's address `to`.
+    fn answer(to: SocketAddr, path: &str, cookie: &str) -> String {
+        let mut stream = TcpStream::connect(to).unwrap();
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: {to}\r\n{cookie}Connection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut head = vec![0; 400];
+        let count = stream.read(&mut head).unwrap();
+        String::from_utf8_lossy(&head[..count]).into_owned()
+    }
+
+    #[test]
+    fn another_computer_needs_the_token_and_this_one_does_not() {
+        // Without a network there is nobody to keep out.
+        let Some(own) = own_address().filter(|address| !address.is_loopback()) else { return };
+        let (session, _publisher) = device_sim::session::open(super::super::test_scene());
+        let write: Debrief = Arc::new(|_| Ok(String::new()));
+        let all = (Ipv4Addr::UNSPECIFIED, 0).into();
+        let server = serve_with_debrief(session, all, write).unwrap();
+        let from_outside = SocketAddr::from((own, server.port()));
+        for path in ["/", "/main.js", "/live", "/debrief", "/?token=", "/?token=0123456789abcdef0123456789abcdef"] {
+            assert!(answer(from_outside, path, "").starts_with("HTTP/1.1 403"), "{path}");
+        }
+        let url = server.url_for_others().unwrap();
+        let path = url.strip_prefix(&format!("http://{from_outside}")).unwrap();
+        let head = answer(from_outside, path, "");
+        assert!(head.starts_with("HTTP/1.1 303"), "{head}");
+        let cookie = head.lines().find_map(|line| line.strip_prefix("set-cookie: ")).unwrap();
+        assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+        let cookie = format!("Cookie: {}\r\n", cookie.split(';').next().unwrap());
+        assert!(answer(from_outside, "/", &cookie).starts_with("HTTP/1.1 200"));
+        assert!(answer(from_outside, "/debrief", &cookie).starts_with("HTTP/1.1 404"), "nothing was recorded");
+        let strange = format!("{cookie}Origin: http://example.org\r\n");
+        assert!(answer(from_outside, "/live", &strange).starts_with("HTTP/1.1 403"));
+        assert!(answer(local(server.port()), "/", "").starts_with("HTTP/1.1 200"), "{}", server.url());
+    }
+
+    #[test]
+    fn an_address_of_another_computer_is_one_clear_line() {
+        let (session, _publisher) = device_sim::session::open(super::super::test_scene());
+        let write: Debrief = Arc::new(|_| Ok(String::new()));
+        let error = serve_with_debrief(session, "192.0.2.7:0".parse().unwrap(), write).unwrap_err();
+        assert!(matches!(error, ServeError::NoSuchAddress { .. }), "{error}");
+        assert!(error.to_string().contains("192.0.2.7") && error.to_string().contains("--listen"), "{error}");
     }
 
     /// A WebSocket by hand: the upgrade, then nothing is read any more.

@@ -1,10 +1,8 @@
 //! A page that looks: it is sent a text whenever there is one. What it says goes to whoever listens, which is nobody for a class.
 
-use super::server::is_own_page;
 use axum::extract::ws::{Message, WebSocket};
 use axum::extract::{State, WebSocketUpgrade};
-use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, timeout};
@@ -33,12 +31,8 @@ const LONGEST_MESSAGE: usize = 1_024;
 
 pub(super) async fn live(
     State(watched): State<Watched>,
-    headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    if !is_own_page(&headers) {
-        return (StatusCode::FORBIDDEN, "only the page of this program may look and agree").into_response();
-    }
     upgrade
         .max_message_size(LONGEST_MESSAGE)
         .max_frame_size(LONGEST_MESSAGE)
