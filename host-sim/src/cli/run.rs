@@ -258,7 +258,9 @@ const PORT: u16 = 8710;
 fn address(text: &str) -> Result<SocketAddr, String> {
     let with_port = || text.parse::<SocketAddr>().ok();
     let without = || Some(SocketAddr::new(text.parse::<IpAddr>().ok()?, PORT));
-    with_port().or_else(without).ok_or_else(|| "it is no address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
+    with_port()
+        .or_else(without)
+        .ok_or_else(|| "it is no address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
 }
 
 /// Serves the page and prints its address.

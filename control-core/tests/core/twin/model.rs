@@ -28,6 +28,10 @@ pub(crate) struct Twin {
     squared: f64,
     /// The largest torque that the heat allowed when it was last asked.
     allowed: f64,
+    /// What the torque that is allowed last changed by, where the core may not have asked for it yet; zero elsewhere.
+    unasked: f64,
+    /// Tick of the last contact, puncture or exit.
+    transition: u32,
     /// The error of the heat by rounded forces: half of the last place of each wall, of friction and of damping.
     heat_doubt: f64,
     /// A wall gave way in this tick, or in one since which a layer was touched in each.
@@ -66,6 +70,8 @@ impl Twin {
             heat: 0.0,
             squared: 0.0,
             allowed: f64::MAX,
+            unasked: 0.0,
+            transition: 0,
             heat_doubt: 0.0,
             springing_back: false,
             ticks: 0,
@@ -93,18 +99,21 @@ impl Twin {
         let largest = self.allowed.min(self.config.device.limits.torque.0.to_num());
         let wanted = (-force * device.roller_radius.0.to_num::<f64>()).clamp(-largest, largest);
         self.ticks += 1;
+        if told.transitions != Transitions::default() {
+            self.transition = self.ticks;
+        }
         let faded = wanted * (f64::from(self.ticks) / (f64::from(limits.fade_in_ms) * 10.0)).min(1.0);
         let slew = limits.slew_per_tick.0.to_num::<f64>();
         self.given = faded.clamp(self.given - slew, self.given + slew);
         let seconds = f64::from(limits.winding_time_s);
-        // In one tick of eight each, as the controller does.
+        // The winding warms in one tick of eight, and is asked what it allows in one of sixteen, as in the controller.
         self.squared += self.given * self.given;
-        match self.ticks % 8 {
-            0 => {
+        match self.ticks % 16 {
+            0 | 8 => {
                 let mean = std::mem::take(&mut self.squared) / 8.0;
                 self.heat += (mean - self.heat) * 8.0 / (seconds * 10_000.0);
             }
-            2 => self.allowed = self.largest_torque(),
+            2 => self.ask_what_is_allowed(),
             _ => {}
         }
         let lost = 0.5 / 65_536.0 * (self.layers.len() + 2) as f64 * device.roller_radius.0.to_num::<f64>();
@@ -114,17 +123,26 @@ impl Twin {
         (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-furthest, furthest)
     }
 
+    /// A tick in which the core meets a layer or leaves it has no time to ask, and the next occasion is sixteen ticks later.
+    fn ask_what_is_allowed(&mut self) {
+        let most = self.config.device.limits.torque.0.to_num::<f64>();
+        let before = self.allowed.min(most);
+        self.allowed = self.largest_torque();
+        let is_busy = self.transition > 0 && self.ticks - self.transition < 32;
+        self.unasked = if is_busy { (before - self.allowed).abs() } else { 0.0 };
+    }
+
     /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat limits. The limit falls over a
     /// fifth of the heat, so that where a weak motor hangs on a strong amplifier the last places of long ago show.
     pub(crate) fn steps_of_heat(&self) -> f64 {
         let (most, largest) = (self.config.device.limits.torque.0.to_num::<f64>(), self.allowed);
-        if largest >= most {
+        if largest >= most && self.unasked == 0.0 {
             return 0.0;
         }
         let continuous = self.config.device.limits.continuous_torque.0.to_num::<f64>();
         let device = self.config.device;
         let steps = f64::from(device.dac.span()) / device.full_scale_torque.0.to_num::<f64>();
-        self.heat_doubt * (most - continuous) / (continuous * continuous / 5.0) * steps
+        (self.heat_doubt * (most - continuous) / (continuous * continuous / 5.0) + self.unasked) * steps
     }
 
     /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.

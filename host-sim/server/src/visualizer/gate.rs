@@ -41,7 +41,8 @@ impl Gate {
     fn knows(&self, said: Option<&str>) -> bool {
         // Both are public in length; every letter is looked at, so that the time says nothing of where they differ.
         let same = |token: &str, said: &str| {
-            token.len() == said.len() && token.bytes().zip(said.bytes()).fold(0, |all, (a, b)| all | (a ^ b)) == 0
+            token.len() == said.len()
+                && token.bytes().zip(said.bytes()).fold(0, |all, (a, b)| all | (a ^ b)) == 0
         };
         matches!((&self.token, said), (Some(token), Some(said)) if same(token, said))
     }

@@ -64,7 +64,11 @@ impl fmt::Display for ServeError {
                 address.ip()
             ),
             Self::Io { address, error } => {
-                write!(f, "cannot serve the page on {address}: {error}; try another port with {}", option(address))
+                write!(
+                    f,
+                    "cannot serve the page on {address}: {error}; try another port with {}",
+                    option(address)
+                )
             }
         }
     }
@@ -159,7 +163,11 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
 
 /// The same at any address, with a debrief of the last recording, which `write` makes of its file, at `/debrief`. Other computers need
 /// the token of [`Server::url_for_others`].
-pub fn serve_with_debrief(session: Session, address: SocketAddr, write: Debrief) -> Result<Server, ServeError> {
+pub fn serve_with_debrief(
+    session: Session,
+    address: SocketAddr,
+    write: Debrief,
+) -> Result<Server, ServeError> {
     let router = debrief::router(session.clone(), write);
     let shared = Shared { session, person: Arc::default() };
     start(address, &DEVICE_PAGE, router.route("/live", get(live).with_state(shared)))
@@ -257,8 +265,7 @@ mod tests {
     /// The status and the head of the answer to a request to this computer's address `to`.
     fn answer(to: SocketAddr, path: &str, cookie: &str) -> String {
         let mut stream = TcpStream::connect(to).unwrap();
-        let request =
-            format!("GET {path} HTTP/1.1\r\nHost: {to}\r\n{cookie}Connection: close\r\n\r\n");
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {to}\r\n{cookie}Connection: close\r\n\r\n");
         stream.write_all(request.as_bytes()).unwrap();
         let mut head = vec![0; 400];
         let count = stream.read(&mut head).unwrap();
@@ -274,7 +281,9 @@ mod tests {
         let all = (Ipv4Addr::UNSPECIFIED, 0).into();
         let server = serve_with_debrief(session, all, write).unwrap();
         let from_outside = SocketAddr::from((own, server.port()));
-        for path in ["/", "/main.js", "/live", "/debrief", "/?token=", "/?token=0123456789abcdef0123456789abcdef"] {
+        for path in
+            ["/", "/main.js", "/live", "/debrief", "/?token=", "/?token=0123456789abcdef0123456789abcdef"]
+        {
             assert!(answer(from_outside, path, "").starts_with("HTTP/1.1 403"), "{path}");
         }
         let url = server.url_for_others().unwrap();
@@ -285,7 +294,10 @@ mod tests {
         assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
         let cookie = format!("Cookie: {}\r\n", cookie.split(';').next().unwrap());
         assert!(answer(from_outside, "/", &cookie).starts_with("HTTP/1.1 200"));
-        assert!(answer(from_outside, "/debrief", &cookie).starts_with("HTTP/1.1 404"), "nothing was recorded");
+        assert!(
+            answer(from_outside, "/debrief", &cookie).starts_with("HTTP/1.1 404"),
+            "nothing was recorded"
+        );
         let strange = format!("{cookie}Origin: http://example.org\r\n");
         assert!(answer(from_outside, "/live", &strange).starts_with("HTTP/1.1 403"));
         assert!(answer(local(server.port()), "/", "").starts_with("HTTP/1.1 200"), "{}", server.url());

@@ -29,10 +29,7 @@ const SEND_TIMEOUT: Duration = Duration::from_secs(10);
 /// Longest message that is read, in bytes.
 const LONGEST_MESSAGE: usize = 1_024;
 
-pub(super) async fn live(
-    State(watched): State<Watched>,
-    upgrade: WebSocketUpgrade,
-) -> Response {
+pub(super) async fn live(State(watched): State<Watched>, upgrade: WebSocketUpgrade) -> Response {
     upgrade
         .max_message_size(LONGEST_MESSAGE)
         .max_frame_size(LONGEST_MESSAGE)
