@@ -1,9 +1,9 @@
-//! Makes what a lab downloads: both boards' images and a program for the PC, each with the commit it was built from.
+//! Makes what a lab downloads: both boards' images, a program for the PC and a Python package, each with the commit it was built from.
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;
 use crate::shell::{self, Failure};
-use crate::{dfu, firmware};
+use crate::{dfu, firmware, python, setup};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -26,6 +26,7 @@ pub(crate) fn run() -> Result<(), Failure> {
         made.extend(images(board, &folder)?);
     }
     made.push(program(&folder)?);
+    made.push(wheel(&folder)?);
     println!("built from {build}:");
     for (name, bytes) in made {
         println!("  {:>9} bytes  {}", bytes, folder.join(name).display());
@@ -62,6 +63,15 @@ fn images(board: &Board, folder: &Path) -> Result<Vec<(String, usize)>, Failure>
     let dfu = dfu::file(board.title, start, &bin);
     let files = [("elf", elf), ("bin", bin), ("dfu", dfu)];
     files.into_iter().map(|(ending, bytes)| write(folder, format!("{name}.{ending}"), &bytes)).collect()
+}
+
+/// Builds the Python package. Returns its name and size.
+fn wheel(folder: &Path) -> Result<(String, usize), Failure> {
+    let python = setup::python(&["maturin==1.16.0"])?;
+    let wheel = python::wheel(&python, folder)?;
+    let bytes = fs::metadata(&wheel).map_err(|error| unreadable(&wheel, &error))?.len();
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok((name, usize::try_from(bytes).unwrap_or(usize::MAX)))
 }
 
 /// Builds the program for the PC and writes it without its symbols. Returns its name and size.

@@ -12,6 +12,7 @@ mod elf;
 mod firmware;
 mod flash;
 mod mutants;
+mod python;
 mod rows;
 mod setup;
 mod shell;

@@ -7,7 +7,7 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
 use crate::test::Step;
-use crate::{board_test, firmware, mutants, site, wasm, words};
+use crate::{board_test, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -158,8 +158,17 @@ fn browser() -> Result<(), Failure> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 6] =
-    ["pyigtl==0.3.4", "websockets==17.4", "mujoco==4.0.0", "mcap==1.6.0", "numpy==2.4.6", "scipy==1.17.1"];
+const CLIENTS: [&str; 9] = [
+    "pyigtl==0.3.4",
+    "websockets==17.4",
+    "mujoco==4.0.0",
+    "mcap==1.6.0",
+    "numpy==2.4.6",
+    "scipy==1.17.1",
+    "pandas==3.1.1",
+    "pytest==9.2.0",
+    "maturin==1.16.0",
+];
 
 fn clients() -> Result<(), Failure> {
     let python = setup::python(&CLIENTS)?;
@@ -170,7 +179,14 @@ fn clients() -> Result<(), Failure> {
     for script in scripts.chain([PathBuf::from("tests/independent/run.py")]) {
         shell::run(Command::new(&python).arg(shell::top().join(script)).arg(&program))?;
     }
-    Ok(())
+    let wheel = python::wheel(&python, &shell::target().join("wheels"))?;
+    shell::run(
+        Command::new(&python)
+            .args(["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"])
+            .arg(wheel),
+    )?;
+    let tests = shell::top().join("python/tests");
+    shell::run(Command::new(&python).args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(tests))
 }
 
 fn fuzz() -> Result<(), Failure> {

@@ -17,7 +17,7 @@ impl Outcome {
             ("nominal-rig.toml", self.nominal_rig.to_toml()),
             ("refit-rig.toml", self.refit_rig.to_toml()),
             ("patched-rig.toml", self.patched_rig.to_toml()),
-            ("report.html", html::page(self)),
+            ("report.html", self.html()),
             ("diagnosis.json", json + "\n"),
         ];
         let contenders = dir.join("contenders");
@@ -37,6 +37,11 @@ impl Outcome {
             std::fs::rename(&half, dir.join(name))?;
         }
         Ok(())
+    }
+
+    /// Returns the report as a page, `report.html`.
+    pub fn html(&self) -> String {
+        html::page(self)
     }
 
     fn residuals_csv(&self) -> String {

@@ -1,0 +1,131 @@
+//! The diagnosis for Python. Rigs come as TOML and recordings as CSV, in the forms of `docs/recordings.md`, so that Python and the command
+//! line refuse the same things with the same sentences; the Python side turns frames and files into them. Nothing here computes.
+
+use diagnosis::recording::Recording;
+use diagnosis::rig::Rig;
+use diagnosis::simulation::replay::Beside;
+use diagnosis::{Outcome, diagnose_recordings};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use recording::import;
+use std::path::PathBuf;
+
+create_exception!(
+    _native,
+    InputError,
+    PyValueError,
+    "What cannot be used, where it is, and what to do about it."
+);
+
+/// A recording's name, and its text as CSV.
+type Named = (String, String);
+
+fn refused(why: impl std::fmt::Display) -> PyErr {
+    InputError::new_err(why.to_string())
+}
+
+fn rig_of((name, text): &Named) -> PyResult<Rig> {
+    Rig::parse(text, name).map_err(refused)
+}
+
+fn recordings(all: &[Named]) -> PyResult<Vec<Recording>> {
+    all.iter().map(|(name, text)| Recording::parse(text, name).map_err(refused)).collect()
+}
+
+/// A finished diagnosis.
+#[pyclass(frozen)]
+struct Diagnosis {
+    outcome: Outcome,
+}
+
+#[pymethods]
+impl Diagnosis {
+    /// The report as JSON, as in diagnosis.json.
+    fn json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.outcome.report).map_err(refused)
+    }
+
+    /// The report as a page.
+    fn html(&self) -> String {
+        self.outcome.html()
+    }
+
+    /// What the command line prints.
+    fn summary(&self) -> String {
+        self.outcome.summary()
+    }
+
+    /// The nominal, the refitted and the patched rig, as TOML.
+    fn rigs(&self) -> (String, String, String) {
+        let Outcome { nominal_rig, refit_rig, patched_rig, .. } = &self.outcome;
+        (nominal_rig.to_toml(), refit_rig.to_toml(), patched_rig.to_toml())
+    }
+
+    /// Writes the folder that `host-sim diagnose --out` writes.
+    fn save(&self, folder: PathBuf) -> PyResult<()> {
+        self.outcome.write(&folder).map_err(|cause| {
+            PyOSError::new_err(format!(
+                "{}: the report cannot be written ({cause}); choose another folder",
+                folder.display()
+            ))
+        })
+    }
+}
+
+/// Diagnoses recordings of a rig; other Python threads run meanwhile.
+#[pyfunction]
+fn diagnose(py: Python, rig: Named, fit: Vec<Named>, holdout: Vec<Named>) -> PyResult<Diagnosis> {
+    py.detach(|| {
+        let rig = rig_of(&rig)?;
+        let (fit, holdout) = (recordings(&fit)?, recordings(&holdout)?);
+        if fit.is_empty() || holdout.is_empty() {
+            return Err(refused("at least one recording to fit and one to hold out are needed"));
+        }
+        let outcome = diagnose_recordings(&rig, &fit, &holdout, &|_, _| {}).map_err(refused)?;
+        Ok(Diagnosis { outcome })
+    })
+}
+
+/// Runs a rig under a recording's command: position and velocity from its first row to its last.
+#[pyfunction]
+fn simulate(py: Python, rig: Named, recording: Named) -> PyResult<(Vec<f64>, Vec<f64>)> {
+    py.detach(|| {
+        let rig = rig_of(&rig)?;
+        let recording = Recording::parse(&recording.1, &recording.0).map_err(refused)?;
+        let run = Beside::new(&recording, &rig).free_run(&rig);
+        Ok((run.position, run.velocity))
+    })
+}
+
+/// Turns files as people have them into a folder of a rig and recordings. Returns the rig's path, the recordings' paths and what was
+/// assumed, changed or left out.
+#[pyfunction]
+fn import_recording(
+    py: Python,
+    files: Vec<PathBuf>,
+    out: PathBuf,
+    columns: Vec<String>,
+    counts_per_turn: Option<f64>,
+) -> PyResult<(PathBuf, Vec<PathBuf>, Vec<String>)> {
+    py.detach(|| {
+        let columns = columns
+            .iter()
+            .map(|text| import::choice(text))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(refused)?;
+        let request = import::Request { files, columns, counts_per_turn, out, ..import::Request::default() };
+        let imported = import::import(&request).map_err(refused)?;
+        let paths = imported.recordings.into_iter().map(|one| one.path).collect();
+        Ok((imported.rig, paths, imported.notes))
+    })
+}
+
+#[pymodule]
+fn _native(module: &Bound<PyModule>) -> PyResult<()> {
+    module.add("InputError", module.py().get_type::<InputError>())?;
+    module.add_class::<Diagnosis>()?;
+    module.add_function(wrap_pyfunction!(diagnose, module)?)?;
+    module.add_function(wrap_pyfunction!(simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(import_recording, module)?)
+}
