@@ -10,7 +10,7 @@ pub use scene::{
 };
 pub use told::{
     Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
-    RecordingStatus, ReplayStatus,
+    RecordingStatus, ReplayStatus, TaskDone,
 };
 
 use control_core::controller::Sample;
@@ -57,6 +57,7 @@ struct HubState {
     timing: Option<Timing>,
     last_pose: Option<Pose>,
     events: VecDeque<Happening>,
+    tasks: VecDeque<TaskDone>,
     link: LinkStatus,
     jumps: u64,
     patient: Option<PatientStatus>,
@@ -74,6 +75,7 @@ struct Buffer {
     samples: VecDeque<(u64, Sample)>,
     poses: VecDeque<Pose>,
     events: VecDeque<Happening>,
+    tasks: VecDeque<TaskDone>,
     timing: Option<Timing>,
     skipped_samples: u64,
     jumps: u64,
@@ -118,6 +120,7 @@ impl Session {
             hello: state.hello.clone(),
             timing: state.timing,
             events: state.events.clone(),
+            tasks: state.tasks.clone(),
             jumps: state.jumps,
             ..Buffer::default()
         }));
@@ -157,6 +160,7 @@ impl Subscription {
             samples: taken.samples.into(),
             poses: taken.poses.into(),
             events: taken.events.into(),
+            tasks: taken.tasks.into(),
             timing: taken.timing,
             link,
             skipped_samples: taken.skipped_samples,
@@ -230,6 +234,7 @@ impl Publisher {
         {
             let mut state = lock(&self.hub.state);
             state.events = happenings.clone();
+            state.tasks.clear();
             state.last_pose = poses.last().copied();
             state.jumps += 1;
         }
@@ -238,16 +243,22 @@ impl Publisher {
             buffer.samples = samples.iter().copied().collect();
             buffer.poses = poses.iter().copied().collect();
             buffer.events = happenings.clone();
+            buffer.tasks.clear();
         });
     }
 
     /// Another tissue is simulated from now on: what happened to the old one is no longer shown.
     pub fn scene(&self, scene: &Scene) {
         *lock(&self.hub.scene) = scene.clone();
-        lock(&self.hub.state).events.clear();
+        {
+            let mut state = lock(&self.hub.state);
+            state.events.clear();
+            state.tasks.clear();
+        }
         self.each(|buffer| {
             buffer.scene = Some(scene.clone());
             buffer.events.clear();
+            buffer.tasks.clear();
         });
     }
 
@@ -267,6 +278,14 @@ impl Publisher {
     pub fn attempt(&self, attempt: &Value) {
         lock(&self.hub.state).attempts.push(attempt.clone());
         self.each(|buffer| buffer.attempts.push(attempt.clone()));
+    }
+
+    /// A task that was done.
+    pub fn task(&self, task: &TaskDone) {
+        append(&mut lock(&self.hub.state).tasks, std::slice::from_ref(task), WAITING_EVENTS);
+        self.each(|buffer| {
+            append(&mut buffer.tasks, std::slice::from_ref(task), WAITING_EVENTS);
+        });
     }
 
     /// Times of the stages.
