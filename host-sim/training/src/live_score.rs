@@ -15,6 +15,8 @@ use recording::messages::Hello;
 const OUTSIDE: usize = TICK_HZ as usize / 2;
 /// An insertion that takes longer than five minutes is left to the recording.
 const LONGEST: usize = 300 * TICK_HZ as usize;
+/// Tasks kept of an insertion and of the time before it; a page may tell of any number.
+const MOST_TASKS: usize = 1_000;
 
 /// The insertion in progress.
 #[derive(Debug, Default)]
@@ -63,6 +65,8 @@ impl LiveScore {
         let first = stretch.first_tick;
         stretch.events.extend(batch.events.iter().map(|h| h.event).filter(|event| event.tick >= first));
         stretch.tasks.extend(batch.tasks.iter().cloned());
+        let excess = stretch.tasks.len().saturating_sub(MOST_TASKS);
+        stretch.tasks.drain(..excess);
         self.ended(see);
     }
 
