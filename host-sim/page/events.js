@@ -1,6 +1,7 @@
 // What has happened, in words, newest first.
 
 import { number } from "./panel.js";
+import { taskWords } from "./tasks.js";
 
 const LONGEST_LIST = 80;
 
@@ -26,6 +27,7 @@ export function words(event, layers) {
     case "in_track": return `Through ${article(name)} in the needle's own track`;
     case "barrier": return "Turned further than the tissue allows";
     case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
+    case "task": return taskWords(event.name);
     case "exit": return `Needle out of ${article(name)}`;
     case "fault": return `Fault, torque off: ${event.cause}`;
     case "not_saved": return capital(event.cause);

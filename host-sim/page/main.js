@@ -63,6 +63,10 @@ const receive = {
   practice(message) {
     practice.goal(message);
   },
+  task(message) {
+    practice.tasks.done(message.name);
+    events.add({ ...message, kind: "task" }, scene.layers);
+  },
   attempt(message) {
     practice.ended(message);
   },

@@ -3,6 +3,7 @@
 
 import { LearningCurve } from "./learning_curve.js";
 import { number } from "./panel.js";
+import { mistakes, Tasks } from "./tasks.js";
 
 const byId = (id) => document.getElementById(id);
 /** Columns of the list: their heading, the name of the figure, its digits. */
@@ -30,6 +31,7 @@ export class Practice {
     this.attempts = [];
     this.patient = null;
     this.touchedAt = NaN;
+    this.tasks = new Tasks(link);
     this.curve = new LearningCurve(byId("curve"), colours);
     this.record = byId("record");
     this.name = byId("record-name");
@@ -72,6 +74,7 @@ export class Practice {
     this.patient = message.patient;
     byId("goal").textContent = `${message.goal}.`;
     this.targets = message.targets ?? {};
+    this.tasks.follow(message.tasks ?? []);
     this.head();
     this.list();
   }
@@ -80,6 +83,7 @@ export class Practice {
   ended(attempt) {
     if (attempt.number === 1) this.attempts.length = 0;
     this.attempts.push(attempt);
+    this.tasks.forget();
     if (attempt.by_person) this.say(attempt);
     this.list();
     this.curve.draw(this.attempts.filter((one) => one.by_person));
@@ -91,7 +95,9 @@ export class Practice {
     const measured = `${number(figures.time_s, 1)} s, ${number(figures.peak_force_n, 2)} N`;
     verdict.dataset.tone = attempt.reached ? "good" : "bad";
     const what = attempt.reached ? "Goal reached" : `Not reached: ${attempt.missing.join("; ")}`;
-    verdict.textContent = `Attempt ${attempt.number}. ${what}. ${measured}.`;
+    const others = mistakes(figures.tasks);
+    const also = others ? ` Not critical: ${others}.` : "";
+    verdict.textContent = `Attempt ${attempt.number}. ${what}. ${measured}.${also}`;
   }
 
   /** The best insertion into this patient: reached, and the quickest; a person's where there is one, else the scripted hand's. */

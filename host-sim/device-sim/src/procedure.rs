@@ -2,12 +2,15 @@
 //! follow the minimum-jerk path `s = 10τ³ − 15τ⁴ + 6τ⁵` (Flash and Hogan 1985, doi:10.1523/JNEUROSCI.05-07-01688.1985), or go at
 //! an even speed, as a stage does that measures insertion forces.
 
+pub mod task;
+
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::plant::hand::Grip;
 use crate::profile::{Profile, TissueName, puncture_path_mm};
 use control_core::config::Tissue;
 use serde::Deserialize;
+use task::Task;
 
 /// The procedures that come with the program.
 pub const BUILT_IN: [(&str, &str); 7] = [
@@ -38,6 +41,8 @@ pub struct Procedure {
     pub entry_rad: Option<f64>,
     /// One round, s.
     pub round_s: f64,
+    /// The tasks that it asks for, in their order.
+    pub tasks: Vec<Task>,
     moves: Vec<Move>,
 }
 
@@ -61,6 +66,8 @@ struct Move {
     from_rad: f64,
     to_rad: f64,
     is_even: bool,
+    /// The task that the scripted hand does when the move begins, by its number.
+    task: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -72,6 +79,8 @@ struct File {
     entry_deg: Option<f64>,
     hand: HandFile,
     step: Vec<Step>,
+    #[serde(default)]
+    task: Vec<Task>,
 }
 
 #[derive(Deserialize)]
@@ -97,6 +106,8 @@ struct Step {
     by_mm: f64,
     /// Steeper than at the beginning by so much at the end of the step; without it, as before.
     turned_deg: Option<f64>,
+    /// The task that the hand does when the step begins.
+    task: Option<String>,
 }
 
 impl Procedure {
@@ -114,11 +125,22 @@ impl Procedure {
         file.resolve(profile).map_err(|what| Failure::input(format_args!("{}: {what}", source.origin)))
     }
 
+    /// Returns the number of the step that is going on `seconds` into the procedure.
+    pub fn step_at(&self, seconds: f64) -> usize {
+        let in_round = seconds.max(0.0) % self.round_s;
+        self.moves.partition_point(|m| m.begin_s <= in_round).saturating_sub(1)
+    }
+
+    /// Returns the name of the task that the scripted hand does when a step begins.
+    pub fn task_of(&self, step: usize) -> Option<&str> {
+        let task = self.moves.get(step)?.task?;
+        Some(self.tasks.get(task)?.name.as_str())
+    }
+
     /// Where the hand wants the needle `seconds` into the procedure. Rounds repeat.
     pub fn target(&self, seconds: f64) -> Target {
         let in_round = seconds.max(0.0) % self.round_s;
-        let current = self.moves.partition_point(|m| m.begin_s <= in_round).saturating_sub(1);
-        let m = &self.moves[current];
+        let m = &self.moves[self.step_at(seconds)];
         let share = ((in_round - m.begin_s) / m.seconds).clamp(0.0, 1.0);
         let path = share * share * share * (10.0 + share * (6.0 * share - 15.0));
         let rate = 30.0 * share * share * (1.0 - share) * (1.0 - share) / m.seconds;
@@ -130,6 +152,15 @@ impl Procedure {
             turned_rad: m.from_rad + (m.to_rad - m.from_rad) * path,
         }
     }
+}
+
+/// Checks that a step can be done by the tasks listed; returns the number of its task.
+fn number_of(task: Option<&String>, step: &str, tasks: &[Task]) -> Result<Option<usize>, String> {
+    let Some(name) = task else { return Ok(None) };
+    let found = tasks.iter().position(|task| task.name == *name);
+    found.map(Some).ok_or_else(|| {
+        format!("step \"{step}\" does task \"{name}\", which is not listed; add a [[task]] with that name")
+    })
 }
 
 /// The procedure of a name like `insertion-5mms-60deg`; none for another name.
@@ -157,6 +188,7 @@ impl File {
         within("stiffness_n_per_mm", self.hand.stiffness_n_per_mm, 0.05, 10.0)?;
         within("damping_n_s_per_mm", self.hand.damping_n_s_per_mm, 0.0, 0.1)?;
         within("tremor_mm", self.hand.tremor_mm, 0.0, 2.0)?;
+        task::check(&self.task)?;
         let entry_rad = self.entry_deg.map_or(profile.entry_rad, f64::to_radians);
         let (mut moves, mut at, mut turned_deg, mut begin_s) = (Vec::new(), self.start_mm, 0.0, 0.0);
         for step in &self.step {
@@ -169,7 +201,8 @@ impl File {
             // Faster than a hand goes, and than the grip of the roller can follow.
             within(&format!("mm/s of step \"{}\"", step.name), (to_mm - at).abs() / seconds, 0.0, 500.0)?;
             let (from_rad, to_rad) = (f64::to_radians(turned_deg), to_deg.to_radians());
-            moves.push(Move { begin_s, seconds, from_mm: at, to_mm, from_rad, to_rad, is_even });
+            let task = number_of(step.task.as_ref(), &step.name, &self.task)?;
+            moves.push(Move { begin_s, seconds, from_mm: at, to_mm, from_rad, to_rad, is_even, task });
             begin_s += seconds;
             (at, turned_deg) = (to_mm, to_deg);
         }
@@ -191,6 +224,7 @@ impl File {
             start_mm: self.start_mm,
             entry_rad: self.entry_deg.map(f64::to_radians),
             round_s: begin_s,
+            tasks: self.task.clone(),
             moves,
         })
     }
@@ -320,6 +354,12 @@ mod tests {
             (good.replace("seconds = 2.0", "speed_mm_s = -3.0"), "speed_mm_s"),
             (good.replace("seconds = 1.5", "seconds = 1.5\nturned_deg = 5.0"), "turned_deg = 0"),
             (good.replace("seconds = 2.0", "seconds = 2.0\nturned_deg = 500.0"), "turned_deg"),
+            (good.replace("task = \"tourniquet_on\"", "task = \"dance\""), "[[task]]"),
+            (good.replace("name = \"tourniquet_off\"", "name = \"tourniquet_on\""), "listed twice"),
+            (good.replace("name = \"tourniquet_off\"", "name = \"Off!\""), "Off!"),
+            (good.replace("tip = \"outside\"", "tip = \"inside\""), "inside"),
+            (good.replacen("critical = [", "critical = [\"late\", ", 1), "late"),
+            (good.replacen("source = \"", "source = \"\" #", 1), "source"),
         ] {
             let source = Text { origin: "p.toml".into(), text: wrong };
             let said = Procedure::parse(&source, &adult()).expect_err(hint).to_string();

@@ -7,6 +7,7 @@ use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
 use device_sim::plant::{GRAVITY, PlantConfig};
+use device_sim::session::TaskDone;
 use diagnosis::rig::{Actuator, Encoder, Kind, Model, Rig, Uncertainty};
 use link::frames::Event;
 use std::fmt::Write as _;
@@ -26,6 +27,8 @@ pub struct Stretch {
     pub events: Vec<Event>,
     /// The places of the ultrasound probe while the page showed its image.
     pub probes: Vec<Probe>,
+    /// The tasks that were done, from the end of the stretch before.
+    pub tasks: Vec<TaskDone>,
     /// The setup before them, if a new one was made; `None` for the recording's own.
     pub setup: Option<Setup>,
 }
@@ -44,6 +47,7 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let (mut all, mut hello): (Vec<Stretch>, Option<Hello>) = (Vec::new(), None);
     // An event is told before the block of samples that it happened in.
     let mut told = Vec::new();
+    let mut tasks = Vec::new();
     let mut setup: Option<&Setup> = None;
     for message in &recording.messages {
         match message {
@@ -51,13 +55,16 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
                 hello = Some(new.clone());
                 // What a device told of samples that never came is forgotten with them.
                 told.clear();
+                tasks.clear();
             }
             Message::Event(event) => told.push(*event),
             Message::Setup(new) => setup = Some(new),
             Message::Probe(probe) => all.last_mut().into_iter().for_each(|last| last.probes.push(*probe)),
+            Message::Task(task) => tasks.push(task.clone()),
             Message::Samples(block) => {
                 let Some(hello) = &hello else { continue };
                 extend(&mut all, (hello, setup), block, &mut told);
+                take_tasks(&mut all, &mut tasks);
             }
             _ => {}
         }
@@ -82,6 +89,7 @@ fn extend(
             events: Vec::new(),
             setup: setup.cloned(),
             probes: Vec::new(),
+            tasks: Vec::new(),
         });
     }
     if let Some(last) = all.last_mut() {
@@ -91,6 +99,13 @@ fn extend(
         last.events.extend(told.iter().filter(|e| (first..end).contains(&e.tick)));
         told.retain(|event| event.tick >= end);
     }
+}
+
+/// Gives the last stretch the tasks that were done until its end.
+fn take_tasks(all: &mut [Stretch], tasks: &mut Vec<TaskDone>) {
+    let Some(last) = all.last_mut() else { return };
+    let end = last.end_tick();
+    last.tasks.extend(tasks.extract_if(.., |task| task.tick < end));
 }
 
 impl Stretch {

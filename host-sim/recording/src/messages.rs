@@ -4,14 +4,15 @@ use control_core::config::DacWidth;
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
-use device_sim::session::ProbeView;
+use device_sim::procedure::task::Task;
+use device_sim::session::{ProbeView, TaskDone};
 use fixed::types::{I2F30, I16F16};
 use link::build::Build;
 use link::frames;
 use serde::{Deserialize, Serialize};
 
 /// Topic and JSON schema of every channel.
-pub const CHANNELS: [(&str, &str, &str); 7] = [
+pub const CHANNELS: [(&str, &str, &str); 8] = [
     ("/setup", "Setup", include_str!("schemas/setup.json")),
     ("/hello", "Hello", include_str!("schemas/hello.json")),
     ("/samples", "Samples", include_str!("schemas/samples.json")),
@@ -19,6 +20,7 @@ pub const CHANNELS: [(&str, &str, &str); 7] = [
     ("/event", "Event", include_str!("schemas/event.json")),
     ("/link", "Link", include_str!("schemas/link.json")),
     ("/probe", "Probe", include_str!("schemas/probe.json")),
+    ("/task", "Task", include_str!("schemas/task.json")),
 ];
 
 /// The setup before anything moved.
@@ -37,6 +39,9 @@ pub struct Setup {
     /// The device's part as it was given, which the configuration can be made from again; none where it was the device's own.
     #[serde(default)]
     pub device_toml: Option<String>,
+    /// The tasks that the procedure asks for; none in a recording from before they were told.
+    #[serde(default)]
+    pub tasks: Vec<Task>,
 }
 
 /// The device's identity and scale.
@@ -151,6 +156,7 @@ pub enum Message {
     Event(frames::Event),
     Link(Link),
     Probe(Probe),
+    Task(TaskDone),
 }
 
 impl Message {
@@ -161,6 +167,7 @@ impl Message {
             Message::Pose(pose) => Some(pose.tick),
             Message::Event(event) => Some(event.tick),
             Message::Probe(probe) => Some(probe.tick),
+            Message::Task(task) => Some(task.tick),
             Message::Hello(_) | Message::Link(_) | Message::Setup(_) => None,
         }
     }

@@ -112,6 +112,7 @@ fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
         "/pose" => serde_json::from_slice(json).map(Message::Pose),
         "/event" => serde_json::from_slice(json).map(Message::Event),
         "/link" => serde_json::from_slice(json).map(Message::Link),
+        "/task" => serde_json::from_slice(json).map(Message::Task),
         "/probe" => serde_json::from_slice(json).map(Message::Probe),
         _ => return Ok(None),
     };

@@ -5,7 +5,7 @@ use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
-use device_sim::session::ProbeView;
+use device_sim::session::{ProbeView, TaskDone};
 use link::frames;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
@@ -133,6 +133,11 @@ impl<W: Write + Seek> Recorder<W> {
     /// The place of the ultrasound probe.
     pub fn probe(&mut self, view: ProbeView) -> Result<(), Failure> {
         self.put(6, &Probe { tick: self.tick, view })
+    }
+
+    /// A task of the procedure that was done.
+    pub fn task(&mut self, task: &TaskDone) -> Result<(), Failure> {
+        self.put(7, task)
     }
 
     /// Bytes on their way to the disk so far.

@@ -75,7 +75,7 @@ impl Trace {
 
     /// Largest force across the needle that would have held its direction, N; none without a fixture.
     pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
-        let judge = Judge::new(profile, self.stretch.first_tick);
+        let judge = Judge::new(profile, &[], self.stretch.first_tick);
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
     }
 
@@ -92,7 +92,7 @@ impl Trace {
 
     /// What became of the patient's target in the first insertion.
     pub(super) fn target(&self, profile: &Profile) -> Option<Reached> {
-        let judge = Judge::new(profile, self.stretch.first_tick);
+        let judge = Judge::new(profile, &[], self.stretch.first_tick);
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
     }
 

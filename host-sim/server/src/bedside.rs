@@ -75,6 +75,9 @@ impl Bedside {
         self.setup.profile_toml = profile.source.text.clone();
         self.setup.profile_origin = profile.source.origin.clone();
         self.profile = profile;
+        // Where no hand is simulated, the patient's own procedure says what a person has to do.
+        let own = || Procedure::find(&self.profile.procedure, &self.profile).ok();
+        self.setup.tasks = self.procedure().or_else(own).map_or_else(Vec::new, |procedure| procedure.tasks);
         if let Some(procedure) = self.procedure() {
             self.setup.procedure = Some(procedure.name);
         }
@@ -113,6 +116,7 @@ impl Bedside {
             names: profile::BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect(),
             // What has been parsed as a profile is TOML, and TOML is JSON but for its dates.
             profile: toml::from_str(&self.profile.source.text).unwrap_or_default(),
+            tasks: self.setup.tasks.clone(),
             answer,
         }
     }
@@ -137,6 +141,7 @@ mod tests {
             profile_origin: String::new(),
             procedure: Some("venepuncture".into()),
             device_toml: None,
+            tasks: Vec::new(),
         };
         Bedside::new(profile, Source::Virtual, Some("venepuncture".into()), setup)
     }

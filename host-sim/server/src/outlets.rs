@@ -3,7 +3,7 @@
 use crate::live_gains::LiveGains;
 use device_sim::driver::Driver;
 use device_sim::failure::Failure;
-use device_sim::session::{LinkStatus, ProbeView, Publisher, RecordingStatus};
+use device_sim::session::{LinkStatus, ProbeView, Publisher, RecordingStatus, TaskDone};
 use link::frames::{self, DeviceFrame};
 use recording::messages::{Hello, Setup};
 use recording::tally::Tally;
@@ -29,6 +29,8 @@ pub struct Outlets {
     recorded: Option<String>,
     /// Why there is no recording, where a person has asked for one in vain.
     complaint: Option<String>,
+    /// Tick after the newest sample.
+    tick: u64,
 }
 
 impl Outlets {
@@ -43,6 +45,7 @@ impl Outlets {
             hello: None,
             recorded: None,
             complaint: None,
+            tick: 0,
         }
     }
 
@@ -67,6 +70,7 @@ impl Outlets {
             }
             DeviceFrame::Samples(block) => {
                 let taken = self.tally.samples(&block.samples);
+                self.tick = block.first_tick + taken.len() as u64;
                 self.publisher.samples(block.first_tick, taken);
                 self.recorder.as_mut().map_or(Ok(()), |r| r.samples(block.first_tick, taken))
             }
@@ -109,6 +113,18 @@ impl Outlets {
     /// Writes where the probe is, if a recording is going on.
     pub(crate) fn probe(&mut self, view: ProbeView) {
         let written = self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.probe(view));
+        self.written(written);
+    }
+
+    /// Tells pages and recording that a task of the procedure has been done.
+    pub(crate) fn task(&mut self, name: String) {
+        let task = TaskDone { tick: self.tick, name };
+        self.publisher.task(&task);
+        let written = self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.task(&task));
+        self.written(written);
+    }
+
+    fn written(&mut self, written: Result<(), Failure>) {
         if let Err(failure) = written {
             self.recorder = None;
             self.failure = Some(failure);

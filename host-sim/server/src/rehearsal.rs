@@ -28,6 +28,7 @@ pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Re
         profile_origin: profile.source.origin.clone(),
         procedure: Some(procedure.name.clone()),
         device_toml: None,
+        tasks: procedure.tasks.clone(),
     };
     let recorder = Recorder::create(file, &setup)?;
     let ticks = (procedure.round_s * f64::from(TICK_HZ)).ceil() as u64;

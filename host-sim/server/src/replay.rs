@@ -127,7 +127,8 @@ impl<'a> Replay<'a> {
                 | Message::Link(_)
                 | Message::Setup(_)
                 | Message::Hello(_)
-                | Message::Probe(_) => {}
+                | Message::Probe(_)
+                | Message::Task(_) => {}
             }
         }
         let mut events = Vec::new();
@@ -176,6 +177,7 @@ impl<'a> Replay<'a> {
                 status.lost_samples = link.lost_samples;
                 status.garbage = link.garbage;
             }),
+            Message::Task(task) => self.publisher.task(task),
             Message::Setup(_) | Message::Probe(_) => {}
         }
     }

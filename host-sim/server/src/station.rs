@@ -90,8 +90,10 @@ impl<'a> Station<'a> {
 
     /// Insertions are judged while somebody looks.
     pub fn with_practice(mut self, subscription: Subscription) -> Self {
-        let profile = self.bedside.as_ref().map(Bedside::profile);
-        self.practice = profile.map(|profile| Practice::new(subscription, profile, &self.outlets.publisher));
+        self.practice = self.bedside.as_ref().map(|bedside| {
+            let tasks = &bedside.setup().tasks;
+            Practice::new(subscription, bedside.profile(), tasks, &self.outlets.publisher)
+        });
         self
     }
 
@@ -118,6 +120,7 @@ impl<'a> Station<'a> {
                 |frame| device.transmit(frame),
                 |bytes| self.driver.receive(now, bytes, |frame| self.outlets.frame(frame)),
             );
+            device.take_done().into_iter().for_each(|name| self.outlets.task(name));
             if let Some(taken) = self.patient_answer() {
                 let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
                 procedure.into_iter().for_each(|procedure| device.follow(procedure));
@@ -266,6 +269,7 @@ impl<'a> Station<'a> {
             }
             Control::EndRecording => self.outlets.end_recording(&self.driver),
             Control::Probe(view) => self.outlets.probe(view),
+            Control::Task { name } => self.task(name),
             Control::Start => self.driver.request(Request::Start),
             Control::Stop => {
                 self.person_starts = true;
@@ -279,6 +283,14 @@ impl<'a> Station<'a> {
                 }
             }
             other => hand(other),
+        }
+    }
+
+    /// A person has done a task; one that the procedure does not ask for is not noted.
+    fn task(&mut self, name: String) {
+        let tasks = self.bedside.as_ref().map_or(&[][..], |bedside| &bedside.setup().tasks);
+        if tasks.iter().any(|task| task.name == name) {
+            self.outlets.task(name);
         }
     }
 
@@ -301,7 +313,7 @@ impl<'a> Station<'a> {
         if taken {
             self.outlets.publisher.scene(&bedside.scene());
             if let Some(practice) = &mut self.practice {
-                practice.patient(bedside.profile(), &self.outlets.publisher);
+                practice.patient(bedside.profile(), &bedside.setup().tasks, &self.outlets.publisher);
             }
             let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(bedside.setup()));
             if let Err(failure) = written {

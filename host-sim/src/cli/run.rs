@@ -150,6 +150,7 @@ impl Run {
             profile_origin: profile.source.origin.clone(),
             procedure: shown_procedure,
             device_toml: part.as_ref().map(|part| part.source.text.clone()),
+            tasks: procedure.tasks.clone(),
         };
         let hand = is_virtual.then(|| wanted.clone());
         let bedside = Bedside::new(profile.clone(), source, hand, setup.clone());

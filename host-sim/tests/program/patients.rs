@@ -34,6 +34,7 @@ fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscri
         profile_origin: profile.source.origin.clone(),
         procedure: None,
         device_toml: None,
+        tasks: Vec::new(),
     };
     let recorder = Recorder::create(file, &setup).expect("the folder can be written");
     let stop = AtomicBool::new(false);

@@ -22,6 +22,7 @@ fn setup() -> Setup {
         profile_origin: profile.source.origin,
         procedure: None,
         device_toml: None,
+        tasks: Vec::new(),
     }
 }
 

@@ -337,3 +337,43 @@ fn the_papers_are_reproduced_each_on_its_own_law() {
     }
     refused(&run(&["reproduce", "--paper", "7", "--out", text(&dir)]), 2, &["000, 001 or 002"]);
 }
+
+/// The scripted injection into the bursa, and three that a teacher would stop: injected first, injected before the bursa, not aspirated.
+#[test]
+fn tasks_are_recorded_and_scored() {
+    let good = include_str!("../../procedures/bursa.toml");
+    let swapped = good
+        .replace("task = \"aspirate\"", "task = \"x\"")
+        .replace("task = \"inject\"", "task = \"aspirate\"")
+        .replace("task = \"x\"", "task = \"inject\"");
+    let shallow = good.replace("by_mm = 1.5", "by_mm = -3.0");
+    let left_out = good.replace("task = \"aspirate\"\n", "");
+    let cases = [
+        ("right", good, (0, 0), [Value::Null, Value::Null]),
+        ("swapped", &swapped, (1, 0), [Value::Null, "wrong_order".into()]),
+        ("shallow", &shallow, (1, 1), ["wrong_place".into(), "wrong_place".into()]),
+        ("left-out", &left_out, (1, 0), ["missed".into(), Value::Null]),
+    ];
+    for (name, text_of, (critical, non_critical), mistakes) in cases {
+        let file = folder(&format!("tasks-{name}-file")).join("p.toml");
+        std::fs::write(&file, text_of).expect("the folder can be written");
+        let arguments = ["--seconds", "9.2", "--profile", "shoulder-joint", "--procedure", text(&file)];
+        let (recorded, insertions) = scored(&format!("tasks-{name}"), &arguments);
+        let [one] = &insertions[..] else { panic!("{name}: {} insertions", insertions.len()) };
+        let tasks = &one["tasks"];
+        assert_eq!(
+            (&tasks["critical"], &tasks["non_critical"]),
+            (&critical.into(), &non_critical.into()),
+            "{name}"
+        );
+        let found: Vec<&Value> = (0..2).map(|at| &tasks["list"][at]["mistake"]).collect();
+        assert_eq!(found, mistakes.iter().collect::<Vec<_>>(), "{name}: {tasks}");
+        let said = run_well(&["score", text(&recorded)]);
+        assert!((figure(&said, "critical_errors") - f64::from(critical)).abs() < 1e-9, "{said}");
+        let xapi = run_well(&["score", text(&recorded), "--xapi", "--actor", "trainee@example.org"]);
+        let statements: Value = serde_json::from_str(&xapi).expect("JSON");
+        let result = &statements[0]["result"];
+        assert_eq!(&result["extensions"]["urn:needle-insertion:figure:tasks"], tasks, "{name}");
+        assert_eq!(result["success"], Value::Bool(critical == 0), "{name}: {result}");
+    }
+}

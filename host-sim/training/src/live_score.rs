@@ -4,6 +4,7 @@
 use crate::score::{Insertion, Judge, Span, spans};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
+use device_sim::procedure::task::Task;
 use device_sim::profile::Profile;
 use device_sim::session::Batch;
 use link::frames::EventKind;
@@ -14,21 +15,27 @@ use recording::messages::Hello;
 const OUTSIDE: usize = TICK_HZ as usize / 2;
 /// An insertion that takes longer than five minutes is left to the recording.
 const LONGEST: usize = 300 * TICK_HZ as usize;
+/// Tasks kept of an insertion and of the time before it; a page may tell of any number.
+const MOST_TASKS: usize = 1_000;
 
 /// The insertion in progress.
 #[derive(Debug, Default)]
 pub struct LiveScore {
     profile: Option<Profile>,
+    /// The tasks that the procedure asks for.
+    tasks: Vec<Task>,
     stretch: Option<Stretch>,
     /// Tick of the first sample ever: begins are counted from it, as in a recording.
     zero_tick: Option<u64>,
 }
 
 impl LiveScore {
-    /// Insertions from now on are into `profile`; one in progress is dropped.
-    pub fn patient(&mut self, profile: Profile) {
+    /// Insertions from now on are into `profile`, with these tasks; one in progress is dropped.
+    pub fn patient(&mut self, profile: Profile, tasks: &[Task]) {
         self.profile = Some(profile);
+        self.tasks = tasks.to_vec();
         if let Some(stretch) = &mut self.stretch {
+            stretch.tasks.clear();
             let end = stretch.end_tick();
             begin_at(stretch, end);
         }
@@ -46,8 +53,9 @@ impl LiveScore {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
             let (samples, events) = (Vec::new(), Vec::new());
-            let probes = Vec::new();
-            self.stretch = Some(Stretch { hello, first_tick: 0, samples, events, probes, setup: None });
+            let (probes, tasks) = (Vec::new(), Vec::new());
+            self.stretch =
+                Some(Stretch { hello, first_tick: 0, samples, events, probes, tasks, setup: None });
         }
         let Some(stretch) = &mut self.stretch else { return };
         for (tick, sample) in &batch.samples {
@@ -56,6 +64,9 @@ impl LiveScore {
         }
         let first = stretch.first_tick;
         stretch.events.extend(batch.events.iter().map(|h| h.event).filter(|event| event.tick >= first));
+        stretch.tasks.extend(batch.tasks.iter().cloned());
+        let excess = stretch.tasks.len().saturating_sub(MOST_TASKS);
+        stretch.tasks.drain(..excess);
         self.ended(see);
     }
 
@@ -73,11 +84,13 @@ impl LiveScore {
             }
             return;
         };
-        let judge = Judge::new(profile, self.zero_tick.unwrap_or_default());
+        let judge = Judge::new(profile, &self.tasks, self.zero_tick.unwrap_or_default());
         for span in spans(stretch).into_iter().filter(|span| span.end <= left) {
             see(span, judge.insertion(span));
         }
         begin_at(stretch, left + 1);
+        // What was done before this insertion ended is not told of the next one.
+        stretch.tasks.retain(|task| task.tick > left);
     }
 }
 

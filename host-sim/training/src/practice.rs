@@ -6,6 +6,7 @@ use crate::score::Insertion;
 use crate::score::gesture::Gesture;
 use crate::score::target::Outcome;
 use control_core::config::Tissue;
+use device_sim::procedure::task::Task;
 use device_sim::profile::Profile;
 use device_sim::session::{Publisher, Subscription};
 use serde::Serialize;
@@ -85,6 +86,8 @@ impl Goal {
             Goal::Skin if figures.punctures == 0 => missing.push("the skin was not pierced".into()),
             _ => {}
         }
+        let mistakes = figures.tasks.iter().flat_map(|tasks| &tasks.list).filter(|task| task.is_critical);
+        missing.extend(mistakes.map(|task| task.in_words()));
         if figures.spared_hits > 0 {
             missing.push("something that is to be spared was touched".into());
         }
@@ -127,7 +130,7 @@ pub struct Practice {
 
 impl Practice {
     /// Listens to a session from now on.
-    pub fn new(subscription: Subscription, profile: &Profile, publisher: &Publisher) -> Self {
+    pub fn new(subscription: Subscription, profile: &Profile, tasks: &[Task], publisher: &Publisher) -> Self {
         let mut practice = Self {
             subscription,
             live: LiveScore::default(),
@@ -137,13 +140,13 @@ impl Practice {
             count: 0,
             by_person: false,
         };
-        practice.patient(profile, publisher);
+        practice.patient(profile, tasks, publisher);
         practice
     }
 
-    /// Insertions are into `profile` from now on; one in progress is not judged.
-    pub fn patient(&mut self, profile: &Profile, publisher: &Publisher) {
-        self.live.patient(profile.clone());
+    /// Insertions are into `profile`, with these tasks, from now on; one in progress is not judged.
+    pub fn patient(&mut self, profile: &Profile, tasks: &[Task], publisher: &Publisher) {
+        self.live.patient(profile.clone(), tasks);
         self.patient = profile.name.clone();
         self.goal = Goal::of(profile);
         self.skin_tilt_rad = profile.skin_tilt_rad();
@@ -151,6 +154,7 @@ impl Practice {
             "goal": self.goal.in_words(),
             "patient": self.patient,
             "targets": self.goal.targets(),
+            "tasks": tasks,
         }));
     }
 

@@ -47,7 +47,7 @@ fn visit() -> Result<(), Failure> {
     )?;
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
     record(&mut page, "monday")?;
-    insert(&mut page, IN_VEIN_MM)?;
+    tasks_count(&mut page)?;
     page.wait("a success", SOON, &format!("/^Attempt \\d+\\. Goal reached\\./.test({VERDICT})"))?;
     check(
         "the best attempt is the person's",
@@ -78,6 +78,18 @@ fn visit() -> Result<(), Failure> {
     complaints(&mut page)
 }
 
+/// Without its tasks an insertion into the vein fails, with them it does not.
+fn tasks_count(page: &mut Page) -> Result<(), Failure> {
+    insert(page, IN_VEIN_MM)?;
+    page.wait(
+        "a tourniquet left on is critical",
+        SOON,
+        &format!("/Not reached: tourniquet off: missed \\(critical\\)\\..*Not critical: tourniquet on missed/.test({VERDICT})"),
+    )?;
+    task(page, "tourniquet_on")?;
+    insert_and(page, IN_VEIN_MM, &["advance_catheter", "tourniquet_off"])
+}
+
 fn record(page: &mut Page, name: &str) -> Result<(), Failure> {
     page.evaluate(&format!("document.getElementById('record-name').value = '{name}'"))?;
     page.click("record")?;
@@ -93,8 +105,20 @@ fn end_recording(page: &mut Page) -> Result<(), Failure> {
     page.wait("no recording", SOON, "document.getElementById('recording').textContent === 'Not recording'")
 }
 
+/// Presses the button of a task, and waits until the program has told of it.
+fn task(page: &mut Page, name: &str) -> Result<(), Failure> {
+    let button = format!("document.querySelector('#tasks [data-task={name}]')");
+    page.evaluate(&format!("{button}.click()"))?;
+    page.wait("the task is done", SOON, &format!("{button}.dataset.done === 'true'"))
+}
+
 /// Takes the needle by its hub, inserts it to `deepest_mm`, rests and draws it out.
 fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Failure> {
+    insert_and(page, deepest_mm, &[])
+}
+
+/// The same, with tasks that are done while the needle rests.
+fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Failure> {
     let grab = Grab::take(page, false)?;
     let mut way: Vec<f64> =
         (0..).map(|step| grab.begin_mm + 0.5 * f64::from(step)).take_while(|mm| *mm < deepest_mm).collect();
@@ -104,6 +128,7 @@ fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Failure> {
     }
     page.wait("the needle deep", SOON, &format!("__stats.depthMm > {deepest_mm} - 1"))?;
     std::thread::sleep(REST);
+    tasks.iter().try_for_each(|name| task(page, name))?;
     for mm in way.iter().rev() {
         grab.move_to(page, *mm)?;
     }
@@ -115,11 +140,11 @@ fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Failure> {
 fn debriefed(page: &mut Page) -> Result<(), Failure> {
     page.wait("the link to the debrief", SOON, "!document.getElementById('debrief').hidden")?;
     let html = page.text("fetch(document.getElementById('debrief').href).then(answer => answer.text())")?;
-    let is_whole = html.contains("<h1>Debrief</h1>") && html.contains("monday.mcap, insertion 2");
-    check("the debrief of both insertions", is_whole, html.chars().take(300).collect::<String>())
+    let is_whole = html.contains("<h1>Debrief</h1>") && html.contains("monday.mcap, insertion 3");
+    check("the debrief of the insertions", is_whole, html.chars().take(300).collect::<String>())
 }
 
-/// The first file has both insertions, the second none.
+/// The first file has three insertions, the second none.
 fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Failure> {
     let score = |name: &str| {
         let output = Command::new(program).args(["score", name]).current_dir(scratch).output();
@@ -127,7 +152,12 @@ fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Failure> {
     };
     let first = score("monday.mcap")?;
     let said = String::from_utf8_lossy(&first.stdout).into_owned();
-    check("two insertions recorded", first.status.success() && said.contains("insertions=2 "), &said)?;
+    let is_whole = said.contains("insertions=3 ") && said.contains(" critical_errors=2 ");
+    check(
+        "three insertions recorded, two with the tourniquet left on",
+        first.status.success() && is_whole,
+        &said,
+    )?;
     let second = score("monday-2.mcap")?;
     check("none in the second", second.status.code() == Some(2), String::from_utf8_lossy(&second.stderr))
 }

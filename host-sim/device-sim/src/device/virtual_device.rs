@@ -52,6 +52,10 @@ pub struct VirtualDevice {
     zero_mm: f64,
     /// By how much the procedure has turned the needle, rad.
     turned_rad: f64,
+    /// The step of the procedure that is going on, as soon as it has begun.
+    step: Option<usize>,
+    /// Tasks that the scripted hand has done and nobody has been told of.
+    done: Vec<String>,
     set_value: f64,
     enable: bool,
     tripped: Option<Fault>,
@@ -90,6 +94,8 @@ impl VirtualDevice {
             hand_mm_per_s: 0.0,
             zero_mm: 0.0,
             turned_rad: 0.0,
+            step: None,
+            done: Vec::new(),
             set_value: 0.0,
             enable: false,
             tripped: None,
@@ -228,6 +234,7 @@ impl VirtualDevice {
 
     fn restart_script(&mut self) {
         self.hand = Hand::Script { since: self.tick };
+        self.step = None;
     }
 
     /// The converter's code as a share of full scale, as the amplifier sees it.
@@ -251,6 +258,9 @@ impl VirtualDevice {
                 let into = if self.enable { (self.tick - since) as f64 * TICK_S } else { 0.0 };
                 let Target { depth_mm, speed_mm_s, turned_rad } = self.procedure.target(into);
                 self.turn(turned_rad);
+                if self.enable {
+                    self.begin_step(into);
+                }
                 (depth_mm + self.zero_mm, speed_mm_s)
             }
             Hand::Rest => (self.hand_mm, 0.0),
@@ -274,6 +284,19 @@ impl VirtualDevice {
                 (self.hand_mm * 1e-3, self.hand_mm_per_s * 1e-3)
             }
         }
+    }
+
+    /// Notes the task of the step that has begun `into` s into the procedure.
+    fn begin_step(&mut self, into: f64) {
+        let step = self.procedure.step_at(into);
+        if self.step.replace(step) != Some(step) {
+            self.done.extend(self.procedure.task_of(step).map(str::to_owned));
+        }
+    }
+
+    /// Returns the tasks that the scripted hand has done since the last time.
+    pub fn take_done(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.done)
     }
 
     /// The scripted hand turns the needle by what its procedure says, from wherever a person or the beginning has put it.

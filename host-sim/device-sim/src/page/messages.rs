@@ -19,6 +19,13 @@ pub enum ToPage {
     Practice(serde_json::Value),
     /// An insertion that has ended, with its verdict: the fields of `practice::Attempt`.
     Attempt(serde_json::Value),
+    /// A task of the procedure that was done.
+    Task {
+        /// Its time, in s.
+        t_s: f64,
+        /// Its name.
+        name: String,
+    },
     /// The device; again whenever it restarts.
     Device(Device),
     /// The changes since the last frame.
@@ -211,6 +218,11 @@ pub enum FromPage {
     EndRecording,
     /// The probe has been moved, or its image shows another part of the needle; at most ten times a second.
     Probe(ProbeView),
+    /// A task of the procedure has been done.
+    Task {
+        /// Its name: 1 to 40 lower-case letters, digits or `_`.
+        name: String,
+    },
     /// A recording is to go on from here.
     Seek {
         /// Time into the recording in s, 0 or more.
@@ -234,6 +246,7 @@ impl From<FromPage> for Control {
             FromPage::Record { name } => Self::Record { name },
             FromPage::EndRecording => Self::EndRecording,
             FromPage::Probe(view) => Self::Probe(view),
+            FromPage::Task { name } => Self::Task { name },
             FromPage::Seek { at_s } => Self::Seek { at_s },
         }
     }
@@ -267,6 +280,9 @@ impl FromPage {
                     .into(),
             ),
             Self::Probe(view) if !view.is_plausible() => Err("the probe is not on the limb".into()),
+            Self::Task { name } if !crate::procedure::task::is_name(&name) => Err(
+                "a task's name has 1 to 40 lower-case letters, digits or _; use a name of the procedure's file".into(),
+            ),
             Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
                 Err(format!("time {at_s} s is not within 0 to 1e9 s"))
             }
@@ -302,6 +318,8 @@ mod tests {
             r#"{"do":"drag","depth_mm":1e9}"#,
             r#"{"do":"drag","depth_mm":null}"#,
             r#"{"do":"tilt","rad":2}"#,
+            r#"{"do":"task","name":""}"#,
+            r#"{"do":"task","name":"<b>"}"#,
             r#"{"do":"seek","at_s":-1}"#,
             r#"{"do":"record","name":"../monday"}"#,
             r#"{"do":"record","name":""}"#,

@@ -4,7 +4,7 @@ use super::rupture::ruptures;
 use super::{Layer, TissueName};
 use crate::session::tissue_name;
 use control_core::Patient;
-use control_core::config::Tissue;
+use control_core::config::{self, Tissue};
 use serde::Deserialize;
 
 /// A structure to be reached. Layers of the device go on for ever: where it ends to either side, that is for whoever judges.
@@ -20,6 +20,15 @@ pub struct Goal {
     pub below: Option<(u8, bool)>,
     /// From where to where it reaches along the skin, mm from the point of entry; none where it goes on for ever.
     pub reach_mm: Option<(f64, f64)>,
+}
+
+/// Returns for each layer, outermost first, whether it has a wall that gives way.
+pub(super) fn walls(patient: &Patient, entry_rad: f64) -> Vec<bool> {
+    let ruptures = ruptures(patient, entry_rad);
+    let has_wall = |(index, layer): (usize, &config::Layer)| {
+        layer.wall.is_some() || ruptures.iter().any(|rupture| rupture.layer == index)
+    };
+    patient.layers.iter().enumerate().map(has_wall).collect()
 }
 
 /// As the file has it.
@@ -69,11 +78,8 @@ pub(super) fn goal(
             reach_mm: None,
         });
     };
-    let ruptures = ruptures(patient, entry_rad);
-    let has_wall = |index: usize| {
-        layers.get(index).is_some_and(|layer| layer.wall.is_some())
-            || ruptures.iter().any(|rupture| rupture.layer == index)
-    };
+    let walls = walls(patient, entry_rad);
+    let has_wall = |index: usize| walls.get(index).copied().unwrap_or(false);
     Some(Goal {
         name: name.to_owned(),
         layer: index as u8,

@@ -183,6 +183,11 @@ impl Profile {
         Some(tissue_name(layer.tissue).to_owned())
     }
 
+    /// Returns for each layer, outermost first, whether it has a wall that gives way.
+    pub fn walls(&self) -> Vec<bool> {
+        goal::walls(&self.config.patient, self.entry_rad)
+    }
+
     /// Returns the needle's target: that of the file, else the vessel's lumen if there is a vessel.
     pub fn goal(&self) -> Option<Goal> {
         goal::goal(self.goal, &self.config.patient, self.entry_rad, self.body.is_some())

@@ -2,6 +2,8 @@
 //! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
 
 mod scene;
+#[cfg(test)]
+mod tests;
 mod told;
 
 pub use scene::{
@@ -10,7 +12,7 @@ pub use scene::{
 };
 pub use told::{
     Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
-    RecordingStatus, ReplayStatus,
+    RecordingStatus, ReplayStatus, TaskDone,
 };
 
 use control_core::controller::Sample;
@@ -57,6 +59,7 @@ struct HubState {
     timing: Option<Timing>,
     last_pose: Option<Pose>,
     events: VecDeque<Happening>,
+    tasks: VecDeque<TaskDone>,
     link: LinkStatus,
     jumps: u64,
     patient: Option<PatientStatus>,
@@ -74,6 +77,7 @@ struct Buffer {
     samples: VecDeque<(u64, Sample)>,
     poses: VecDeque<Pose>,
     events: VecDeque<Happening>,
+    tasks: VecDeque<TaskDone>,
     timing: Option<Timing>,
     skipped_samples: u64,
     jumps: u64,
@@ -118,6 +122,7 @@ impl Session {
             hello: state.hello.clone(),
             timing: state.timing,
             events: state.events.clone(),
+            tasks: state.tasks.clone(),
             jumps: state.jumps,
             ..Buffer::default()
         }));
@@ -157,6 +162,7 @@ impl Subscription {
             samples: taken.samples.into(),
             poses: taken.poses.into(),
             events: taken.events.into(),
+            tasks: taken.tasks.into(),
             timing: taken.timing,
             link,
             skipped_samples: taken.skipped_samples,
@@ -230,6 +236,7 @@ impl Publisher {
         {
             let mut state = lock(&self.hub.state);
             state.events = happenings.clone();
+            state.tasks.clear();
             state.last_pose = poses.last().copied();
             state.jumps += 1;
         }
@@ -238,16 +245,22 @@ impl Publisher {
             buffer.samples = samples.iter().copied().collect();
             buffer.poses = poses.iter().copied().collect();
             buffer.events = happenings.clone();
+            buffer.tasks.clear();
         });
     }
 
     /// Another tissue is simulated from now on: what happened to the old one is no longer shown.
     pub fn scene(&self, scene: &Scene) {
         *lock(&self.hub.scene) = scene.clone();
-        lock(&self.hub.state).events.clear();
+        {
+            let mut state = lock(&self.hub.state);
+            state.events.clear();
+            state.tasks.clear();
+        }
         self.each(|buffer| {
             buffer.scene = Some(scene.clone());
             buffer.events.clear();
+            buffer.tasks.clear();
         });
     }
 
@@ -269,6 +282,14 @@ impl Publisher {
         self.each(|buffer| buffer.attempts.push(attempt.clone()));
     }
 
+    /// A task that was done.
+    pub fn task(&self, task: &TaskDone) {
+        append(&mut lock(&self.hub.state).tasks, std::slice::from_ref(task), WAITING_EVENTS);
+        self.each(|buffer| {
+            append(&mut buffer.tasks, std::slice::from_ref(task), WAITING_EVENTS);
+        });
+    }
+
     /// Times of the stages.
     pub fn timing(&self, timing: Timing) {
         lock(&self.hub.state).timing = Some(timing);
@@ -287,109 +308,5 @@ impl Publisher {
                 true
             })
         });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use link::frames::EventKind;
-
-    fn scene() -> Scene {
-        Scene {
-            source: Source::Virtual,
-            profile: "adult".into(),
-            procedure: None,
-            layers: Vec::new(),
-            roller_radius_mm: 10.0,
-            travel_mm: 60.0,
-            largest_force_n: 2.88,
-            force_scale: 1.0,
-            tilt_rad: 0.0,
-            skin_tilt_rad: 0.0,
-            vessel: None,
-            body: None,
-            beside: Vec::new(),
-            needle: SceneNeedle::reaching(15.6),
-            hand: true,
-        }
-    }
-
-    #[test]
-    fn a_slow_looker_loses_the_oldest_and_is_told_how_many() {
-        let (session, publisher) = open(scene());
-        let (mut slow, mut quick) = (session.subscribe(), session.subscribe());
-        let block = [Sample::default(); 32];
-        let mut seen = 0;
-        for block_number in 0..1_000 {
-            publisher.samples(block_number * 32, &block);
-            seen += quick.drain().samples.len();
-        }
-        assert_eq!(seen, 32_000);
-        let late = slow.drain();
-        assert_eq!((late.samples.len(), late.skipped_samples), (20_000, 12_000));
-        assert_eq!(late.samples.first().map(|s| s.0), Some(12_000));
-        assert_eq!(slow.drain().samples.len(), 0);
-    }
-
-    #[test]
-    fn what_comes_after_a_jump_drops_none_of_it() {
-        let (session, publisher) = open(scene());
-        let mut looker = session.subscribe();
-        let poses: Vec<_> = (0..10_000).map(|ms| Pose { tick: ms * 10, ..Pose::default() }).collect();
-        let samples: Vec<_> = (0..100_000).map(|tick| (tick, Sample::default())).collect();
-        publisher.jump(&samples, &poses, &[]);
-        publisher.pose(Pose { tick: 100_000, ..Pose::default() });
-        publisher.samples(100_000, &[Sample::default()]);
-        let batch = looker.drain();
-        assert!(batch.poses.len() >= 10_000 && batch.samples.len() >= 100_000);
-        assert!(batch.poses[0].tick <= 10, "the ten seconds before are there");
-    }
-
-    #[test]
-    fn late_subscribers_get_the_same_state_and_dropped_ones_go() {
-        let (session, publisher) = open(scene());
-        let mut early = session.subscribe();
-        let pose = |tick| publisher.pose(Pose { tick, ..Pose::default() });
-        let event = |tick| publisher.event(Event { tick, kind: EventKind::Puncture { layer: 0 } });
-        pose(10);
-        // It overtakes the pose of its millisecond, and the pose of its own tick is from after the drop.
-        event(30);
-        pose(20);
-        pose(30);
-        event(90_000);
-        let told = |batch: &Batch| -> Vec<_> {
-            batch.events.iter().map(|h| (h.event.tick, h.before.map(|pose| pose.tick))).collect()
-        };
-        let seen = told(&early.drain());
-        assert_eq!(seen, [(30, Some(20)), (90_000, None)]);
-        drop(early);
-        pose(40);
-        assert!(lock(&session.hub.state).subscribers.is_empty());
-        let batch = session.subscribe().drain();
-        assert_eq!(told(&batch), seen);
-        assert!(batch.poses.is_empty());
-    }
-
-    #[test]
-    fn poses_of_a_restarted_device_do_not_change_earlier_events() {
-        let (session, publisher) = open(scene());
-        publisher.pose(Pose { tick: 490, ..Pose::default() });
-        publisher.event(Event { tick: 500, kind: EventKind::Stopped });
-        publisher.pose(Pose::default());
-        let events = session.subscribe().drain().events;
-        assert_eq!(events[0].before.map(|pose| pose.tick), Some(490));
-    }
-
-    #[test]
-    fn controls_arrive_in_order_and_outlive_their_device() {
-        let (session, publisher) = open(scene());
-        session.control(Control::Start);
-        session.control(Control::Drag { depth_mm: 3.0 });
-        assert_eq!(publisher.next_control(), Some(Control::Start));
-        assert_eq!(publisher.next_control(), Some(Control::Drag { depth_mm: 3.0 }));
-        assert_eq!(publisher.next_control(), None);
-        drop(publisher);
-        session.control(Control::Stop);
     }
 }

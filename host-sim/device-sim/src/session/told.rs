@@ -1,6 +1,7 @@
 //! The messages to those who watch a running device, and the requests of a person. Data only: nothing here waits or sends.
 
 use super::Scene;
+use crate::procedure::task::Task;
 use control_core::controller::Sample;
 use link::frames::{Event, Hello, Pose, Timing};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,8 @@ pub struct PatientStatus {
     pub names: Vec<String>,
     /// The profile that counts, key by key as in its file.
     pub profile: serde_json::Value,
+    /// The tasks that the procedure asks for.
+    pub tasks: Vec<Task>,
     /// The answer to the last request.
     pub answer: Option<PatientAnswer>,
 }
@@ -115,6 +118,8 @@ pub struct Batch {
     pub poses: Vec<Pose>,
     /// Events (a subscriber's first batch repeats the last 256).
     pub events: Vec<Happening>,
+    /// Tasks that were done (a subscriber's first batch repeats the last 256).
+    pub tasks: Vec<TaskDone>,
     /// The latest times of the stages, where there were any.
     pub timing: Option<Timing>,
     /// The present state of the link.
@@ -159,6 +164,15 @@ impl ProbeView {
     }
 }
 
+/// A task of the procedure that was done: a button in a page, or the scripted hand.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TaskDone {
+    /// Tick after the newest sample when it came.
+    pub tick: u64,
+    /// Its name.
+    pub name: String,
+}
+
 /// The requests of a person.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Control {
@@ -198,6 +212,11 @@ pub enum Control {
     EndRecording,
     /// The ultrasound probe is here now, and its image shows this.
     Probe(ProbeView),
+    /// A task of the procedure has been done.
+    Task {
+        /// Its name.
+        name: String,
+    },
     /// A recording goes on from here, or stays here where it is paused.
     Seek {
         /// Time into the recording, s.

@@ -50,8 +50,10 @@ impl ClassPublisher {
         if let Some(scene) = batch.scene.clone() {
             (self.scene, self.told) = (Some(scene), None);
         }
-        if let Some(profile) = batch.patient.as_ref().and_then(|patient| self.profile(patient)) {
-            self.scoring.patient(profile);
+        if let Some(patient) = &batch.patient
+            && let Some(profile) = self.profile(patient)
+        {
+            self.scoring.patient(profile, &patient.tasks);
         }
         for insertion in self.scoring.take(&batch) {
             self.score.count(insertion);
@@ -140,6 +142,7 @@ mod tests {
     use crate::class::message::ClassScore;
     use control_core::units::Millimetres;
     use device_sim::procedure::Procedure;
+    use device_sim::procedure::task::Task;
     use device_sim::session::{self, Publisher, Session, Source};
     use fixed::types::I16F16;
     use link::frames::Pose;
@@ -156,10 +159,11 @@ mod tests {
         (recording, profile)
     }
 
-    fn open(profile: &Profile) -> (Session, Publisher) {
+    fn open(profile: &Profile, tasks: &[Task]) -> (Session, Publisher) {
         let (session, publisher) = session::open(profile.scene(Source::Virtual, None));
         publisher.patient(&PatientStatus {
             profile: toml::from_str(&profile.source.text).unwrap(),
+            tasks: tasks.to_vec(),
             ..PatientStatus::default()
         });
         (session, publisher)
@@ -178,7 +182,7 @@ mod tests {
     #[test]
     fn live_score_equals_the_recordings_and_no_pose_is_lost() {
         let (recording, profile) = recorded();
-        let (session, publisher) = open(&profile);
+        let (session, publisher) = open(&profile, &recording.setup.tasks);
         let (mut subscription, mut to_class) =
             (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
         let (mut messages, mut poses) = (Vec::new(), 0);
@@ -194,6 +198,7 @@ mod tests {
                     publisher.pose(pose.to_frame());
                 }
                 Recorded::Event(event) => publisher.event(*event),
+                Recorded::Task(task) => publisher.task(task),
                 _ => {}
             }
             // As often as in a run: every few frames.
@@ -226,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_needle_that_stands_still_in_the_body_and_a_fault_are_told() {
-        let (session, publisher) = open(&Profile::find("adult").unwrap());
+        let (session, publisher) = open(&Profile::find("adult").unwrap(), &[]);
         let (mut subscription, mut to_class) =
             (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
         let mut about_after = |seconds: u64, depth_mm: f64| {

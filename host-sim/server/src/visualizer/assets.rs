@@ -52,6 +52,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/patient.js", "patient.js", SCRIPT),
     asset!("/place.js", "place.js", SCRIPT),
     asset!("/practice.js", "practice.js", SCRIPT),
+    asset!("/tasks.js", "tasks.js", SCRIPT),
     asset!("/learning_curve.js", "learning_curve.js", SCRIPT),
     asset!("/own_forces.js", "own_forces.js", SCRIPT),
     asset!("/scrub.js", "scrub.js", SCRIPT),

@@ -3,8 +3,10 @@
 
 use super::server::Shared;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
+use control_core::TICK_HZ;
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages::{FromPage, Hand, ToPage};
+use device_sim::session::TaskDone;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
 use std::sync::atomic::Ordering;
@@ -50,8 +52,11 @@ async fn stream_to(sink: &mut SplitSink<WebSocket, Message>, shared: &Shared) {
         let patient = batch.patient.take().map(ToPage::Patient);
         let practice = batch.practice.take().map(ToPage::Practice);
         let attempts: Vec<ToPage> = batch.attempts.drain(..).map(ToPage::Attempt).collect();
+        let done =
+            |task: TaskDone| ToPage::Task { t_s: task.tick as f64 / f64::from(TICK_HZ), name: task.name };
+        let tasks: Vec<ToPage> = batch.tasks.drain(..).map(done).collect();
         let (device, mut frame) = condenser.take(batch);
-        let news = scene.into_iter().chain(patient).chain(practice).chain(attempts);
+        let news = scene.into_iter().chain(patient).chain(practice).chain(tasks).chain(attempts);
         for news in news.chain(device.map(ToPage::Device)) {
             if !send(sink, &news).await {
                 return;

@@ -40,7 +40,7 @@ impl Better {
     }
 }
 
-const FIGURES: [Figure; 24] = [
+const FIGURES: [Figure; 26] = [
     ("time in tissue, s", |i| Some(i.time_s), 2, Better::Less),
     ("time in the lumen, s", |i| Some(i.in_lumen_s), 2, Better::Neither),
     ("time in the target, s", |i| i.target.as_ref().map(|target| target.time_s), 2, Better::Neither),
@@ -54,6 +54,8 @@ const FIGURES: [Figure; 24] = [
     ("blood in the hub, times", |i| Some(f64::from(i.flashbacks)), 0, Better::Neither),
     ("through the far wall", |i| Some(f64::from(u8::from(i.through_far_wall))), 0, Better::Less),
     ("touches of what was to be spared", |i| Some(f64::from(i.spared_hits)), 0, Better::Less),
+    ("tasks, critical errors", |i| i.tasks.as_ref().map(|t| f64::from(t.critical)), 0, Better::Less),
+    ("tasks, non-critical errors", |i| i.tasks.as_ref().map(|t| f64::from(t.non_critical)), 0, Better::Less),
     ("passes", |i| Some(f64::from(i.passes)), 0, Better::Less),
     ("redirections", |i| Some(f64::from(i.redirections)), 0, Better::Less),
     ("largest force, N", |i| Some(i.peak_force_n), 2, Better::Less),

@@ -5,6 +5,7 @@ mod figures;
 
 use crate::score::gesture::{Gesture, RATE_HZ};
 use crate::score::target::{Outcome, Reached};
+use crate::score::tasks::TaskResult;
 use crate::score::{Insertion, Judge, Span, each};
 use control_core::TICK_HZ;
 use device_sim::failure::Failure;
@@ -234,6 +235,10 @@ fn in_words(one: &Insertion) -> Vec<String> {
     }
     if !one.spared.is_empty() {
         words.push(format!("Spared: {}.", one.spared.join(", ")));
+    }
+    if let Some(tasks) = &one.tasks {
+        let each: Vec<String> = tasks.list.iter().map(TaskResult::in_words).collect();
+        words.push(format!("Tasks: {}.", each.join("; ")));
     }
     if one.redirections > 0 {
         words.push(format!("The needle was redirected {}.", times(one.redirections)));

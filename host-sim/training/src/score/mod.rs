@@ -5,6 +5,7 @@ pub mod gesture;
 mod probe;
 pub mod smoothness;
 pub mod target;
+pub mod tasks;
 pub mod track;
 pub mod vessel;
 
@@ -12,6 +13,7 @@ use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
+use device_sim::procedure::task::Task;
 use device_sim::profile::{Beside, Goal, Profile};
 use gesture::{Gesture, Place};
 use link::frames::{Event, EventKind};
@@ -20,6 +22,7 @@ use recording::read::Recording;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 use target::Reached;
+use tasks::{LayerName, Tasks};
 use vessel::Targets;
 
 /// What the score is called in JSON.
@@ -65,6 +68,8 @@ pub struct Insertion {
     pub spared_hits: u32,
     /// What became of the patient's target; none where there is none.
     pub target: Option<Reached>,
+    /// What became of the procedure's tasks; none where it asks for none.
+    pub tasks: Option<Tasks>,
     /// What was to be spared and was touched, by name.
     pub hit: Vec<String>,
     /// What was to be spared and was not touched, by name.
@@ -125,7 +130,8 @@ pub fn each(
             Some(profile) => profile.clone(),
             None => Rc::new(recording.profile_of(stretch.setup.as_ref().unwrap_or(&recording.setup))?),
         };
-        let judge = Judge::new(&profile, zero_tick);
+        let setup = stretch.setup.as_ref().unwrap_or(&recording.setup);
+        let judge = Judge::new(&profile, &setup.tasks, zero_tick);
         spans(stretch).into_iter().for_each(|span| see(span, &judge, &profile));
     }
     Ok(())
@@ -185,6 +191,9 @@ pub struct Judge {
     skin_tilt_rad: f64,
     targets: Targets,
     goal: Option<Goal>,
+    tasks: Vec<Task>,
+    /// Names of the layers, outermost first.
+    layers: Vec<LayerName>,
     /// Number and name of each layer to be spared.
     spared: Vec<(u8, String)>,
     beside: Vec<Beside>,
@@ -193,8 +202,8 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// By `profile`; times count from `zero_tick`.
-    pub fn new(profile: &Profile, zero_tick: u64) -> Self {
+    /// By `profile` and the tasks of the procedure; times count from `zero_tick`.
+    pub fn new(profile: &Profile, tasks: &[Task], zero_tick: u64) -> Self {
         let layers = &profile.config.patient.layers;
         let number = |wanted: Tissue| layers.iter().position(|l| l.tissue == wanted).map(|at| at as u8);
         Self {
@@ -206,6 +215,8 @@ impl Judge {
                 spared: profile.spared.clone(),
             },
             goal: profile.goal(),
+            tasks: tasks.to_vec(),
+            layers: tasks::layer_names(profile),
             spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
             beside: profile.beside.clone(),
             fixture: match &profile.config.patient.law {
@@ -231,6 +242,14 @@ impl Judge {
         Some(f64::from(sample.count) * span.stretch.hello.mm_per_count * angle_rad.cos())
     }
 
+    /// Returns what became of the target, and the visits of it.
+    fn target(&self, span: Span<'_>) -> Option<(Reached, Vec<(u64, u64)>)> {
+        let along_mm = |tick| self.along_mm(span, tick);
+        let (events, ticks) = (&span.stretch.events, (span.begin, span.end));
+        let goal = self.goal.as_ref()?;
+        Some(target::walk(events, ticks, goal, along_mm, 1.0 / f64::from(TICK_HZ)))
+    }
+
     /// The figures of one insertion.
     pub fn insertion(&self, span: Span<'_>) -> Insertion {
         let (begin, end) = (span.begin, span.end);
@@ -241,10 +260,7 @@ impl Judge {
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
         let passage = vessel::passage(&span.stretch.events, (begin, end), &self.targets);
-        let target = self.goal.as_ref().map(|goal| {
-            let along_mm = |tick| self.along_mm(span, tick);
-            target::reached(&span.stretch.events, (begin, end), goal, along_mm, 1.0 / f64::from(TICK_HZ))
-        });
+        let (target, visits) = self.target(span).unzip();
         let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
         let beside_hits = target::beside_hits(&gesture.places, &self.beside, &mut hit, &mut spared);
         let seen = probe::seen(&span.stretch.probes, (begin, end));
@@ -274,6 +290,7 @@ impl Judge {
             through_far_wall: passage.through_far_wall,
             spared_hits: passage.spared_hits + beside_hits,
             target,
+            tasks: self.tasks(span, &visits.unwrap_or_default()),
             hit,
             spared,
             barriers: span.events().filter(|e| e.kind == EventKind::Barrier).count() as u32,

@@ -43,8 +43,19 @@ pub fn reached(
     along_mm: impl Fn(u64) -> Option<f64>,
     tick_s: f64,
 ) -> Reached {
+    walk(events, (begin, end), target, along_mm, tick_s).0
+}
+
+/// Does the same and returns the visits of the target too, each from its first tick to the tick after its last.
+pub(super) fn walk(
+    events: &[Event],
+    (begin, end): (u64, u64),
+    target: &Goal,
+    along_mm: impl Fn(u64) -> Option<f64>,
+    tick_s: f64,
+) -> (Reached, Vec<(u64, u64)>) {
     let mut found = Reached { name: target.name.clone(), ..Reached::default() };
-    let (mut since, mut ticks, mut beyond) = (None::<u64>, 0, false);
+    let (mut since, mut visits, mut beyond) = (None::<u64>, Vec::new(), false);
     let is_there = |tick: u64| match (target.reach_mm, along_mm(tick)) {
         (Some((from, to)), Some(along)) => (from..=to).contains(&along),
         _ => true,
@@ -62,15 +73,16 @@ pub fn reached(
             }
         } else if target.below.is_some_and(|(layer, has_wall)| enters(&event.kind, layer, has_wall)) {
             beyond |= since.is_some();
-            ticks += since.take().map_or(0, |since| tick - since);
+            visits.extend(since.take().map(|since| (since, tick)));
             found.outcome = if beyond { Outcome::Beyond } else { found.outcome };
         } else if event.kind == (EventKind::Exit { layer: target.layer }) {
-            ticks += since.take().map_or(0, |since| tick - since);
+            visits.extend(since.take().map(|since| (since, tick)));
         }
     }
-    ticks += since.map_or(0, |since| end - since);
+    visits.extend(since.map(|since| (since, end)));
+    let ticks: u64 = visits.iter().map(|(from, to)| to - from).sum();
     found.time_s = ticks as f64 * tick_s;
-    found
+    (found, visits)
 }
 
 /// Whether the tip comes into a layer from above.

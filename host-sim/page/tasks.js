@@ -1,0 +1,49 @@
+// The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. What was done is told by the server,
+// for the scripted hand does them too.
+
+const byId = (id) => document.getElementById(id);
+
+/** The name of a task as a person reads it: `tourniquet_on` is "Tourniquet on". */
+export const taskWords = (name) => name.charAt(0).toUpperCase() + name.slice(1).replaceAll("_", " ");
+
+const PLACES = { target: "with the tip in the target", outside: "before the needle is in", any: "at any place" };
+
+export class Tasks {
+  /** @param {import("./link.js").Link} link where wishes go */
+  constructor(link) {
+    this.link = link;
+    this.box = byId("tasks");
+    this.buttons = new Map();
+  }
+
+  /** Shows the buttons of the procedure's tasks, in their order. */
+  follow(tasks) {
+    this.buttons = new Map(tasks.map(({ name, tip }) => [name, this.button(name, tip)]));
+    this.box.replaceChildren(...this.buttons.values());
+    this.box.hidden = tasks.length === 0;
+  }
+
+  button(name, tip) {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: taskWords(name), title: PLACES[tip] ?? "" });
+    button.dataset.task = name;
+    button.addEventListener("click", () => this.link.send({ do: "task", name }));
+    return button;
+  }
+
+  /** The task was done. */
+  done(name) {
+    const button = this.buttons.get(name);
+    if (button) button.dataset.done = "true";
+  }
+
+  /** A new insertion: nothing has been done. */
+  forget() {
+    for (const button of this.buttons.values()) delete button.dataset.done;
+  }
+}
+
+/** The mistakes of an insertion that are not critical, as a clause; empty where there is none. */
+export function mistakes(tasks) {
+  const wrong = (tasks?.list ?? []).filter((one) => one.mistake && !one.is_critical);
+  return wrong.map((one) => `${taskWords(one.name).toLowerCase()} ${one.mistake === "missed" ? "missed" : `${one.mistake === "wrong_place" ? "at the wrong place" : "in the wrong order"}`}`).join(", ");
+}
