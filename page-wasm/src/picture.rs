@@ -127,7 +127,7 @@ impl Picture {
     /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
     /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
     /// the skin in rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 instead of the limb, or 2 for a body, with its
-    /// numbers as [`Limb::new`] reads them.
+    /// numbers as `Limb::new` reads them.
     pub fn new(numbers: &[f32]) -> Result<Self, String> {
         let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
         let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();

@@ -51,7 +51,7 @@ impl Diagnosis {
         self.outcome.html()
     }
 
-    /// What the command line prints.
+    /// The summary, as the command line prints it.
     fn summary(&self) -> String {
         self.outcome.summary()
     }

@@ -1,4 +1,4 @@
-//! What a person does beside moving the needle (tourniquet, plunger, catheter): which tasks a procedure asks for, in which order, where the
+//! The tasks that a person does beside moving the needle (tourniquet, plunger, catheter): those that a procedure asks for, in which order, where the
 //! tip has to be, and which mistakes are critical. The device has no plunger: a page's button or the scripted hand tells of each.
 
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ const MOST_TASKS: usize = 12;
 pub struct Task {
     /// Its name, such as `tourniquet_on`.
     pub name: String,
-    /// Where the tip has to be.
+    /// The place in which the tip has to be.
     pub tip: TipPlace,
     /// The mistakes that are critical; the others are not.
     #[serde(default)]
@@ -23,7 +23,7 @@ pub struct Task {
     pub source: String,
 }
 
-/// Where the tip has to be when a task is done.
+/// The place in which the tip has to be when a task is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TipPlace {

@@ -23,7 +23,7 @@ impl Connected<IncomingStream<'_, BoundedListener>> for Peer {
     }
 }
 
-/// What other computers have to know; none where the program does not listen to them.
+/// The token that other computers have to know; none where the program does not listen to them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gate {
     token: Option<String>,

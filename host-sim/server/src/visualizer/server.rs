@@ -93,7 +93,7 @@ pub(super) struct Shared {
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
-    /// What other computers have to know.
+    /// The token that other computers have to know.
     token: Option<String>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
