@@ -200,6 +200,7 @@ fn compensation_leaves_a_quarter_of_the_mechanism_and_waits_for_each_press() {
         if text.contains("point the device down") {
             cable.line.act(Act::Tilt(0.5));
         }
+        cable.run_until(Duration::from_secs(5), |cable| cable.asked() != Some(step));
         pressed += 1;
     };
     assert_eq!(end["well"], true, "{end}");
