@@ -1,7 +1,7 @@
 //! The bootloader that an STM32F407 has in ROM, at the end of a USB cable, with the rules of AN3156 and USB DFU 1.1: stricter than silicon where
 //! those leave a choice, so that an update that relies on a favour fails here.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// Where the internal flash begins.
 pub const FLASH: u32 = 0x0800_0000;
@@ -9,8 +9,8 @@ pub const FLASH: u32 = 0x0800_0000;
 pub const MEMORY: &str = "@Internal Flash  /0x08000000/04*016Kg,01*064Kg,07*128Kg";
 /// Bytes of flash.
 const FLASH_BYTES: usize = 1 << 20;
-/// Bytes of a block.
-const BLOCK: usize = 2_048;
+/// Bytes that a block may have (AN3156 4.1 and 5.1; AN2662 4.4.1 has the same).
+const BLOCK: RangeInclusive<usize> = 2..=2_048;
 /// The content of the flash before, everywhere.
 pub const OLD: u8 = 0x5A;
 
@@ -109,13 +109,19 @@ impl Bootloader {
         self.transfer()?;
         match (request, self.state) {
             (3, _) => self.look(),
-            (2, State::Idle | State::UploadIdle) if value >= 2 && usize::from(length) <= BLOCK => {
+            (2, State::Idle | State::UploadIdle) if value >= 2 && BLOCK.contains(&usize::from(length)) => {
                 self.state = State::UploadIdle;
-                let from = (self.pointer - FLASH) as usize + (usize::from(value) - 2) * BLOCK;
+                let from = (self.address(value, usize::from(length)) - FLASH) as usize;
                 Ok(self.flash.get(from..from + usize::from(length)).unwrap_or_default().to_vec())
             }
             _ => self.stall(),
         }
+    }
+
+    /// The place of a block: ((wBlockNum − 2) × wTransferSize) + Address_Pointer, "where wTransferSize is the length of the requested data
+    /// buffer": of this block, and not of those before it.
+    fn address(&self, block: u16, length: usize) -> u32 {
+        self.pointer + (u32::from(block) - 2) * length as u32
     }
 
     fn transfer(&mut self) -> Result<(), String> {
@@ -136,8 +142,8 @@ impl Bootloader {
         match (value, data) {
             (0, [0x21, address @ ..]) => Ok(Job::SetAddress(number(address))),
             (0, [0x41, address @ ..]) if address.len() == 4 => Ok(Job::Erase(number(address))),
-            (2.., _) if data.len() <= BLOCK => {
-                Ok(Job::Write(self.pointer + (u32::from(value) - 2) * BLOCK as u32, data.to_vec()))
+            (2.., _) if BLOCK.contains(&data.len()) => {
+                Ok(Job::Write(self.address(value, data.len()), data.to_vec()))
             }
             _ => self.stall(),
         }

@@ -53,6 +53,13 @@ impl Image {
             bytes: element[ELEMENT..].to_vec(),
         })
     }
+
+    /// The same image, filled up to whole blocks with what erased flash holds.
+    #[must_use]
+    pub fn in_blocks_of(mut self, bytes: usize) -> Self {
+        self.bytes.resize(self.bytes.len().next_multiple_of(bytes), 0xFF);
+        self
+    }
 }
 
 /// The first four bytes as a number; the caller has looked that they are there.

@@ -16,7 +16,8 @@ use std::task::{Context, Poll, Waker};
 
 /// Bytes of a block (AN3156: 2 to 2,048).
 pub const BLOCK: usize = 2_048;
-/// The first block of data: its number times [`BLOCK`] past it is added to the address (AN3156 5.1).
+/// The first block of data. A block's place is the address and its number past this one times *its own* length (AN3156 4.1, 5.1), so that
+/// all blocks have to be as long as each other.
 const FIRST_BLOCK: u16 = 2;
 /// Requests (USB DFU 1.1, table 3.2).
 const DNLOAD: u8 = 1;
@@ -86,7 +87,7 @@ impl Update {
     /// Prepares to write `file`, a DfuSe file, to a bootloader that describes its memory as `memory`. Refuses what does not fit
     /// before anything is erased.
     pub fn new(file: &[u8], memory: &str) -> Result<Self, Failure> {
-        let image = Image::parse(file)?;
+        let image = Image::parse(file)?.in_blocks_of(BLOCK);
         let layout = Layout::parse(memory)?;
         let sectors = layout.sectors_of(&image)?;
         let usb = Usb::default();
@@ -144,7 +145,7 @@ async fn update(usb: Usb, image: Image, sectors: Vec<u32>) -> Result<(), Failure
     usb.to_idle().await?;
     for (done, (bytes, block)) in blocks() {
         usb.shows("reading back", done, total);
-        if usb.upload(block, bytes.len() as u16).await? != bytes {
+        if usb.upload(block).await? != bytes {
             let at = image.start as usize + done * BLOCK;
             return Err(Failure::failed(format_args!(
                 "the flash at {at:#010x} does not hold what was written to it; update again, and replace the board if it stays so"
@@ -234,8 +235,8 @@ impl Usb {
         Err(Failure::failed("the bootloader stays busy; plug it in again in its DFU mode and update again"))
     }
 
-    async fn upload(&self, block: u16, length: u16) -> Result<Vec<u8>, Failure> {
-        self.transfer(Next::In { request: UPLOAD, value: block, length }).await
+    async fn upload(&self, block: u16) -> Result<Vec<u8>, Failure> {
+        self.transfer(Next::In { request: UPLOAD, value: block, length: BLOCK as u16 }).await
     }
 
     /// An empty block ends the update; the bootloader goes to the image with the look that follows (AN3156 5.5), and is gone from the bus.
