@@ -48,16 +48,11 @@ fn along(
 }
 
 impl FitContext<'_> {
-    /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
-    pub(crate) fn screen(
-        &self,
-        now: &FittedModel,
-        wanted: &(dyn Fn(N) -> bool + Sync),
-    ) -> Vec<(Effect, f64)> {
-        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
-        let there = |name: N| now.model.effects.iter().any(|e| e.name == name);
+    /// The wanted effects that are not in a model yet and that these recordings may show beside it.
+    pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
+        let there = |name: N| model.effects.iter().any(|e| e.name == name);
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
-        let dry = self.nominal.has(NominalTerm::Coulomb) || now.model.effects.iter().any(is_dry);
+        let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);
         let no_losses = self.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
         let is_tried = |name: &N| {
             let definition = name.definition();
@@ -67,7 +62,17 @@ impl FitContext<'_> {
                 && candidates::is_seen(*name, self.nominal)
                 && wanted(*name)
         };
-        let all: Vec<N> = N::ALL.iter().chain(&self.nominal.rig.searched).copied().filter(is_tried).collect();
+        N::ALL.iter().chain(&self.nominal.rig.searched).copied().filter(is_tried).collect()
+    }
+
+    /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
+    pub(crate) fn screen(
+        &self,
+        now: &FittedModel,
+        wanted: &(dyn Fn(N) -> bool + Sync),
+    ) -> Vec<(Effect, f64)> {
+        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
+        let all = self.that_may_be_added(&now.model, wanted);
         let periodic: Vec<N> = all.iter().copied().filter(|name| name.definition().is_periodic()).collect();
         let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
         let waves = periodic::search(&periodic, self, &searched);

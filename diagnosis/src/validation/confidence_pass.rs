@@ -287,26 +287,29 @@ impl Scales<'_> {
     /// A model whose effects have met their rivals, and its fit under white noise. A rival that leads takes the effect's place, once: the
     /// search adds one effect after another, and what was best then need not be best in the end.
     fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
-        let contested = |standing: &mut StandingModel| {
+        let contest = |standing: &mut StandingModel, patched: &FittedModel| {
             let StandingModel { model, effects, .. } = standing;
-            let patched = self.context.fit(model.model.clone(), &model.noise, Colour::White);
-            alternatives::fit_rivals(self.context, &patched, model, self.holdout, effects);
-            patched
+            alternatives::fit_rivals(self.context, patched, model, self.holdout, effects);
         };
-        let patched = contested(&mut standing);
-        match alternatives::leader(&standing.effects)
-            .and_then(|(i, rival)| self.replaced(&standing, i, rival))
-        {
-            Some(mut other) => {
-                let patched = contested(&mut other);
+        let patched = self.context.fit(standing.model.model.clone(), &standing.model.noise, Colour::White);
+        contest(&mut standing, &patched);
+        let leader = alternatives::leader(&standing.effects);
+        match leader.and_then(|(i, rival)| self.replaced(&standing, i, rival)) {
+            Some((mut other, patched)) => {
+                contest(&mut other, &patched);
                 (other, patched)
             }
             None => (standing, patched),
         }
     }
 
-    /// A model with a rival in the place of effect `i`; none where the rival may not be named.
-    fn replaced(&self, standing: &StandingModel, i: usize, rival: Effect) -> Option<StandingModel> {
+    /// A model with a rival in the place of effect `i`, and its fit under white noise; none where the rival may not be named.
+    fn replaced(
+        &self,
+        standing: &StandingModel,
+        i: usize,
+        rival: Effect,
+    ) -> Option<(StandingModel, FittedModel)> {
         let Self { context, holdout, .. } = *self;
         let StandingModel { model, rejected, materials, .. } = standing;
         let mut with = model.model.clone();
@@ -316,12 +319,8 @@ impl Scales<'_> {
         let effects = gather_evidence(context, &white, &slow.noise, holdout);
         let may_stand = effects.iter().all(|one| one.rejection().is_none())
             && parameters::absence(context, &white, i).is_none();
-        may_stand.then(|| StandingModel {
-            model: slow,
-            effects,
-            rejected: rejected.clone(),
-            materials: materials.clone(),
-        })
+        let (rejected, materials) = (rejected.clone(), materials.clone());
+        may_stand.then(|| (StandingModel { model: slow, effects, rejected, materials }, white))
     }
 
     /// The force that a model leaves.

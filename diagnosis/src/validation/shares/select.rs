@@ -4,7 +4,7 @@ use super::design::{Design, held_out};
 use super::forms::forms;
 use super::laws::{Columns, columns};
 use super::sight::{FEWEST_ROWS, Scale, Sight, priors};
-use crate::effects::definition::{NominalTerm, Unnamed};
+use crate::effects::definition::Unnamed;
 use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
@@ -253,21 +253,7 @@ impl<'a> State<'a> {
         };
         let now = context.fit_at(model, &self.on.noise);
         let residuals: Vec<Vec<f64>> = (0..context.tracks.len()).map(|r| now.fit.residual(r)).collect();
-        let there = |name: N| self.laws.iter().any(|law| law.effect.name == name);
-        let is_dry =
-            |law: &&Columns| law.effect.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
-        let dry = context.nominal.has(NominalTerm::Coulomb) || self.laws.iter().any(is_dry);
-        let no_losses = context.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
-        let is_tried = |name: &N| {
-            let definition = name.definition();
-            !there(*name)
-                && (!definition.needs_dry() || dry)
-                && (!definition.is_of_jumps() || !no_losses)
-                && candidates::is_seen(*name, context.nominal)
-                && wanted(*name)
-        };
-        let all: Vec<N> =
-            N::ALL.iter().chain(&context.nominal.rig.searched).copied().filter(is_tried).collect();
+        let all = context.that_may_be_added(&now.model, wanted);
         let is_periodic = |name: &N| name.definition().is_periodic();
         // Waves that stand out as a force may be of the drive, and the other way round.
         let sought: Vec<N> = match all.iter().any(is_periodic) {

@@ -59,11 +59,11 @@ impl<'a> WireLine<'a> {
 impl Line for WireLine<'_> {
     fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
         let gone = |cause: std::io::Error| {
-            Failure::failed(format_args!("the device went away ({cause}); plug it in and commission again"))
+            Failure::failed(format_args!("the device went away ({cause}); plug it in and begin again"))
         };
         if self.stop.load(Ordering::Relaxed) {
             // A device whose heartbeat ends takes its torque away by itself.
-            return Err(Failure::failed("stopped before the end; the device was not commissioned"));
+            return Err(Failure::failed("stopped before the end; begin again from the first step"));
         }
         if !out.is_empty() {
             self.wire.write(out).map_err(gone)?;
