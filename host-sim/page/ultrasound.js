@@ -158,11 +158,12 @@ export class Ultrasound {
     if (!this.seen) return;
     const { share, tip, beside, tipShare, inserted } = this.seen;
     const soFar = inserted > 0 ? `tip seen ${(100 * tipShare).toFixed(0)} % of the time` : "";
-    let text = ["Needle outside", soFar].filter(Boolean).join("; ");
+    let now = "Needle outside";
     if (depth > 0) {
       const where = tip ? "tip in view" : Math.abs(beside) > 0.3 ? `tip ${Math.abs(beside).toFixed(1)} mm beside the plane` : "tip out of view";
-      text = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}; ${soFar}`;
+      now = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}`;
     }
+    const text = [now, soFar].filter(Boolean).join("; ");
     g.fillStyle = "#e8eff4";
     g.font = `12px ${this.colours.font}`;
     g.textAlign = "left";
