@@ -1,5 +1,6 @@
 //! Messages beside the results, and the browser that a program for people without a terminal opens.
 
+use std::io::IsTerminal;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -33,7 +34,15 @@ pub(crate) fn page_for_others(url: &str) {
     note!("for tablets and phones: {url}");
     // An address always fits.
     if let Ok(code) = qrcode::QrCode::new(url) {
-        note!("{}", code.render::<qrcode::render::unicode::Dense1x2>().build());
+        let text = code.render::<qrcode::render::unicode::Dense1x2>().build();
+        // Black on white, whatever the terminal's own colours are: cameras fail on the negative.
+        let (black_on_white, plain) = match std::io::stdout().is_terminal() {
+            true => ("\x1b[30;107m", "\x1b[0m"),
+            false => ("", ""),
+        };
+        for line in text.lines() {
+            note!("{black_on_white}{line}{plain}");
+        }
     }
 }
 
