@@ -320,7 +320,7 @@ impl Scales<'_> {
         let may_stand = effects.iter().all(|one| one.rejection().is_none())
             && parameters::absence(context, &white, i).is_none();
         let (rejected, materials) = (rejected.clone(), materials.clone());
-        may_stand.then(|| (StandingModel { model: slow, effects, rejected, materials }, white))
+        may_stand.then_some((StandingModel { model: slow, effects, rejected, materials }, white))
     }
 
     /// The force that a model leaves.
