@@ -10,6 +10,7 @@ use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+pub use crate::kinematics::SpeedMethod;
 pub use crate::law::{
     Cutting, Fixture, ForceTable, FrictionLaw, Law, Lugre, MAX_ANGLES, MAX_DEPTHS, MAX_SPEEDS, Sparte,
 };
@@ -28,11 +29,6 @@ impl Config {
     /// The default patient on [`Device::commissioned_virtual`].
     pub fn commissioned_virtual() -> Self {
         Self { device: Device::commissioned_virtual(), patient: Patient::default() }
-    }
-
-    /// Both parts checked, ready to run.
-    pub fn plan(&self) -> Result<crate::Plan, crate::Refusal> {
-        crate::Plan::new(&self.device, &self.patient)
     }
 }
 
@@ -214,15 +210,6 @@ pub struct SafetyConfig {
     pub stiffness: Stiffness,
     /// Largest silence of the PC while powered, 20–5,000 ms.
     pub heartbeat_ms: u16,
-}
-
-/// How speed is estimated. One count a tick is 157 mm/s at a 10 mm roller: counts are never differenced tick by tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SpeedMethod {
-    /// Counts over the last [`crate::kinematics::WINDOW_TICKS`] ticks.
-    Window,
-    /// Counts over the time between the edges that delimit them; finer at low speed.
-    EdgeTiming,
 }
 
 impl Default for Device {

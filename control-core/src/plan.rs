@@ -23,6 +23,13 @@ use fixed::types::{I2F30, I16F16, U16F16};
 /// 0.0005 N·s/mm: with 30 g and the speed estimate's 6 ms of delay, more would itself ring.
 const LARGEST_DAMPING_BITS: i32 = 8_389;
 
+impl Config {
+    /// Both parts checked, ready to run.
+    pub fn plan(&self) -> Result<Plan, Refusal> {
+        Plan::new(&self.device, &self.patient)
+    }
+}
+
 /// A configuration that may run.
 #[derive(Clone, Debug)]
 pub struct Plan {

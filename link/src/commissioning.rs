@@ -3,40 +3,18 @@
 //! [`crate::Command::Commission`]. From then on a command may lower its ceilings and not raise them
 //! ([`control_core::ceilings`]). A record that the device has sent carries its seal ([`Record`]) and is taken back.
 
-use crate::codec;
 use crate::frames::Rejection;
 use control_core::Device;
 use control_core::ceilings;
 use control_core::controller::Sample;
 use control_core::event::State;
-use serde::{Deserialize, Serialize};
+
+pub use crate::record::Record;
 
 /// The least way of the roller that shows anything, in counts.
 const LEAST_COUNTS: u32 = 20;
 /// The factor by which the most work must exceed the size of the least, and the work that remains at the end.
 const CLEARLY: i64 = 4;
-
-/// The device's part of the configuration under the seal of the device that told it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Record {
-    /// The device's part.
-    pub device: Device,
-    /// CRC-32 of the device's part and the number of the device. It tells a file of another device, and one that was edited,
-    /// from this one's. It is no secret: a program that forges it gets past this, and not past the board's ceilings.
-    pub seal: u32,
-}
-
-impl Record {
-    /// Returns the record that the device with this number sends.
-    pub fn of(device: &Device, serial: [u8; 12]) -> Self {
-        Self { device: *device, seal: codec::hash(&(device, serial)) }
-    }
-
-    /// True if the device with this number has sent it.
-    pub fn is_of(&self, serial: [u8; 12]) -> bool {
-        *self == Self::of(&self.device, serial)
-    }
-}
 
 /// Checks that a command may replace `before` by `after`.
 pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), Rejection> {
@@ -182,14 +160,5 @@ mod tests {
             flickering.get()
         };
         assert_eq!(played(flicker, false), Proof::None, "a dead channel");
-    }
-
-    #[test]
-    fn a_seal_is_of_one_device_and_one_record() {
-        let record = Record::of(&Device::commissioned_virtual(), [1; 12]);
-        assert!(record.is_of([1; 12]));
-        assert!(!record.is_of([2; 12]));
-        let edited = Device { dac_zero: 1, ..record.device };
-        assert!(!Record { device: edited, ..record }.is_of([1; 12]));
     }
 }

@@ -1,8 +1,8 @@
 //! The messages of both sides. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
 
 use crate::build::Build;
-use crate::commissioning::Record;
 use crate::crash::Crash;
+use crate::record::Record;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;

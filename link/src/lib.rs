@@ -16,5 +16,6 @@ pub mod crash;
 pub mod device;
 pub mod frames;
 pub mod host;
+mod record;
 
 pub use frames::{Command, DeviceFrame, HostFrame, Numbered};

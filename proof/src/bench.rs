@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use crate::baselines;
 use crate::dynamics::Bench;
-use crate::generator::case::{Spec, build};
+use crate::generator::case::build;
 use crate::generator::files;
+use crate::generator::spec::Spec;
 use crate::judge::Record;
 use crate::options::Options;
 use crate::pool;

@@ -1,10 +1,10 @@
 //! The list of cases of one run: every effect at three strengths, pairs, nulls, wrong values, physics without a name, and
 //! recordings that cannot tell.
 
-use crate::generator::case::Spec;
 use crate::generator::effects::{EFFECTS, go_together};
 use crate::generator::excite::Kind;
 use crate::generator::outside::FOREIGN;
+use crate::generator::spec::Spec;
 use crate::key::Category;
 use crate::metrics::STRENGTHS;
 use crate::rng::Rng;

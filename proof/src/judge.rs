@@ -3,12 +3,11 @@
 use crate::baselines::Opinion;
 use crate::key::{Category, Key};
 use crate::report_residuals::Left;
+use crate::share::{EXPLAINABLE, share};
 use crate::tool::{Answer, Named, Weighed};
 
 /// From this confidence on a wrong name is confidently wrong.
 pub(crate) const CONFIDENT: f64 = 0.8;
-/// An oracle that gains less than this part of the noise's mean square has nothing to gain on the recording.
-const EXPLAINABLE: f64 = 0.15;
 /// At this strength and below, random bursts may be taken for noise.
 const WEAK: f64 = 1.0;
 /// Effect over noise below which anything may be taken for noise.
@@ -200,14 +199,6 @@ impl Record {
         }
         out
     }
-}
-
-/// Share of what an oracle, which leaves `floor`, takes off the mean square of what `refit` leaves; `None` of nothing. Two
-/// at most either way: beyond, it is a ratio of two small numbers.
-pub(crate) fn share(refit: f64, left: f64, floor: f64) -> Option<f64> {
-    let room = refit.powi(2) - floor.powi(2);
-    let gain = refit.powi(2) - left.powi(2);
-    (gain.is_finite() && room >= EXPLAINABLE * floor.powi(2)).then(|| (gain / room).clamp(-2.0, 2.0))
 }
 
 /// A held-out improvement by the report.

@@ -24,6 +24,7 @@ mod report_residuals;
 mod rng;
 mod scratch;
 mod settle;
+mod share;
 mod signal;
 mod stats;
 mod tool;
@@ -34,8 +35,9 @@ use std::time::{Duration, Instant};
 pub use options::{HELP, Options};
 
 use cases::Amounts;
-use generator::case::{Spec, build};
+use generator::case::build;
 use generator::files;
+use generator::spec::Spec;
 use tool::Tool;
 
 /// The longest that another program may take over a case.

@@ -6,6 +6,7 @@
 use crate::elf::Elf;
 use crate::rows::{Better, ROWS, Row};
 use crate::shell::{self, Failure, cargo};
+use crate::workspace_build::ANY_RUST;
 use crate::{boards, firmware, setup};
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_EXTENSION;
@@ -23,7 +24,6 @@ const EXAMPLES: [(&str, &str, &str); 4] = [
 ];
 /// The crate whose build and dependencies are what a user waits for.
 const MAIN: &str = "host-sim";
-const ANY_RUST: &str = "--ignore-rust-version";
 /// A minute of the device, as fast as it goes.
 const STREAM_SECONDS: &str = "60";
 

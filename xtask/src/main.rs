@@ -3,6 +3,7 @@
 //!
 //! Built before everything else, hence no dependencies; it knows which commands to run, and nothing of the crates' insides.
 
+mod arrows;
 mod bench;
 mod board_test;
 mod boards;
@@ -23,6 +24,7 @@ mod test;
 mod wasm;
 mod wiring;
 mod words;
+mod workspace_build;
 
 use boards::Board;
 use shell::Failure;

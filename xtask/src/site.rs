@@ -4,7 +4,8 @@
 
 use crate::setup;
 use crate::shell::{self, Failure};
-use crate::{steps, wasm};
+use crate::wasm;
+use crate::workspace_build::built;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
@@ -90,7 +91,7 @@ pub(crate) fn run() -> Result<(), Failure> {
 pub(crate) fn check() -> Result<(), Failure> {
     setup::node()?;
     let device = wasm::build_crate("site-wasm")?;
-    let program = steps::built(&["--example", "device_digest"], "examples/device_digest")?;
+    let program = built(&["--example", "device_digest"], "examples/device_digest")?;
     for (profile, ticks) in COMPARED {
         let native = shell::output(Command::new(&program).args([profile, ticks]))?;
         let mut node = Command::new("node");

@@ -1,28 +1,31 @@
 //! The checks of `cargo xtask test` and `cargo xtask nightly`, each a function.
-//!
-//! Everything for the PC is built once, as one selection of packages: another selection is another set of features, and builds
-//! most of them once more.
 
 use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
-use crate::test::Step;
-use crate::{board_test, firmware, mutants, python, site, wasm, words};
+use crate::workspace_build::{ANY_RUST, BUILD, built};
+use crate::{arrows, board_test, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The emulator asks for a newer Rust than it needs.
-const ANY_RUST: &str = "--ignore-rust-version";
-/// The one build: what is built, and how.
-const BUILD: [&str; 3] = ["--release", "--workspace", ANY_RUST];
 /// The time for which damaged frames are parsed, in s.
 const FUZZ_SECONDS: &str = "10";
 const LONG_FUZZ_SECONDS: &str = "600";
 
+/// A check: its name, what it shows, and what it does.
+pub(crate) struct Step {
+    pub(crate) name: &'static str,
+    pub(crate) shows: &'static str,
+    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
+    pub(crate) bound_s: f64,
+    pub(crate) run: fn() -> Result<(), Failure>,
+}
+
 /// In the order that finds the most for the least time.
-pub(crate) const STEPS: [Step; 13] = [
+pub(crate) const STEPS: [Step; 14] = [
     step("fmt", "the sources are formatted", 5.0, fmt),
     step("words", "comments and documents are in plain English", 1.0, words::check),
+    step("arrows", "no files of a crate use each other in a circle", 2.0, arrows::check),
     step("clippy", "no warning from the compiler or clippy", 130.0, clippy),
     step("firmware", "the boards' flash images build, without warnings, and fit", 120.0, image),
     step("unit", "the crates' tests, and the build that all later steps share", 600.0, unit),
@@ -37,9 +40,10 @@ pub(crate) const STEPS: [Step; 13] = [
 ];
 
 /// The inner loop.
-pub(crate) const QUICK: [Step; 4] = [
+pub(crate) const QUICK: [Step; 5] = [
     step("fmt", "the sources are formatted", 5.0, fmt),
     step("words", "comments and documents are in plain English", 1.0, words::check),
+    step("arrows", "no files of a crate use each other in a circle", 2.0, arrows::check),
     step("clippy", "no warning from the compiler or clippy", 94.0, clippy),
     step("libraries", "the tests inside the crates", 80.0, libraries),
 ];
@@ -272,10 +276,4 @@ fn tests() -> Command {
     }
     command.args(BUILD);
     command
-}
-
-/// Builds a program of the one build; where it lies below the build's folder.
-pub(crate) fn built(which: &[&str], below: &str) -> Result<PathBuf, Failure> {
-    shell::run(cargo().args(["build", "--quiet"]).args(BUILD).args(which))?;
-    Ok(shell::target().join("release").join(below))
 }

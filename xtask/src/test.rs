@@ -3,7 +3,7 @@
 
 use crate::setup;
 use crate::shell::Failure;
-use crate::steps::{NIGHTLY, QUICK, STEPS};
+use crate::steps::{NIGHTLY, QUICK, STEPS, Step};
 use std::time::Instant;
 
 /// The space that a whole run writes into an empty target folder, and room to spare; a linker on a full disk dies of a bus error.
@@ -12,15 +12,6 @@ const NEEDED_MIB: u64 = 7 * 1024;
 const NEEDED_BY_A_STEP_MIB: u64 = 1024;
 /// The option that asks for the inner loop.
 const QUICK_OPTION: &str = "--quick";
-
-/// A check: its name, what it shows, and what it does.
-pub(crate) struct Step {
-    pub(crate) name: &'static str,
-    pub(crate) shows: &'static str,
-    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
-    pub(crate) bound_s: f64,
-    pub(crate) run: fn() -> Result<(), Failure>,
-}
 
 /// The checks that no command here runs, and why.
 const NEVER_HERE: [(&str, &str); 1] = [(

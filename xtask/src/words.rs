@@ -9,6 +9,7 @@ mod prose;
 use crate::shell::{self, Failure};
 use list::{OPENINGS, Phrase, STILL_TO_CLEAN, STILL_TO_RENAME};
 use prose::Word;
+pub(crate) use prose::code;
 use std::collections::HashMap;
 use std::fs;
 use std::io;

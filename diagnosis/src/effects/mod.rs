@@ -12,14 +12,16 @@ mod formula;
 pub(crate) mod joint_terms;
 mod law;
 mod load;
+mod state;
 mod travel_profile;
 mod waves;
 
 pub(crate) use command::CommandLaw;
 pub(crate) use formula::read_effects;
 pub use formula::{Formula, FormulaId, FormulaText};
-pub use law::{Law, State};
+pub use law::Law;
 pub(crate) use law::{sinc, wave_mean};
+pub use state::State;
 pub use table::{Table, Variable};
 
 use definition::Definition;

@@ -1,7 +1,6 @@
-//! The folders of the crate have an order, and each uses only those before it; no files use each other in a circle.
+//! The folders of the crate have an order, and each uses only those before it.
 
 use diagnosis::effects::EffectName;
-use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -71,119 +70,6 @@ fn each_folder_uses_only_those_before_it() {
     }
     assert!(arrows > 100, "only {arrows} uses were seen: the reader of sources is blind");
     assert!(upward.is_empty(), "folders use what stands above them:\n{}", upward.join("\n"));
-}
-
-/// The file of a module, as `folder/file`, that a path of code leads to; `mod.rs` is the folder's face and no file of its own.
-fn file_of(path: &[&str], files: &[String]) -> Option<String> {
-    (1..=path.len()).rev().map(|length| path[..length].join("/")).find(|name| files.contains(name))
-}
-
-/// Paths that a `use` declaration names, groups written out.
-fn paths(declaration: &str) -> Vec<Vec<String>> {
-    let Some((before, group)) = declaration.split_once('{') else {
-        return vec![declaration.split("::").map(|word| word.trim().to_owned()).collect()];
-    };
-    let prefix: Vec<String> =
-        before.split("::").map(|word| word.trim().to_owned()).filter(|word| !word.is_empty()).collect();
-    let inner = group.rsplit_once('}').map_or(group, |(inner, _)| inner);
-    let (mut parts, mut depth, mut from) = (Vec::new(), 0, 0);
-    for (at, c) in inner.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' => depth -= 1,
-            ',' if depth == 0 => {
-                parts.push(&inner[from..at]);
-                from = at + 1;
-            }
-            _ => {}
-        }
-    }
-    parts.push(&inner[from..]);
-    let with_prefix = |rest: Vec<String>| prefix.iter().cloned().chain(rest).collect();
-    parts
-        .into_iter()
-        .map(str::trim)
-        .filter(|part| !part.is_empty())
-        .flat_map(|part| paths(part).into_iter().map(with_prefix))
-        .collect()
-}
-
-/// The files that a file uses, by its `use` declarations and by whole paths; those of its tests do not count.
-fn uses(file: &str, text: &str, files: &[String]) -> Vec<String> {
-    let code = without_tests(text).0.join("\n");
-    let folder: Vec<&str> = file.split('/').collect();
-    let mut out = Vec::new();
-    for (at, _) in code.match_indices("use ").filter(|(at, _)| *at == 0 || code.as_bytes()[at - 1] == b'\n') {
-        let declaration = code[at + 4..].split(';').next().unwrap_or("");
-        for path in paths(declaration) {
-            let path: Vec<&str> = path.iter().map(|word| word.split(" as ").next().unwrap_or("")).collect();
-            let absolute: Vec<&str> = match path[0] {
-                "crate" => path[1..].to_vec(),
-                "super" => folder[..folder.len() - 1].iter().chain(&path[1..]).copied().collect(),
-                _ => continue,
-            };
-            out.extend(file_of(&absolute, files).filter(|used| used != file));
-        }
-    }
-    for (at, found) in code.match_indices("crate::") {
-        let rest = &code[at + found.len()..];
-        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(rest.len());
-        let path: Vec<&str> = rest[..end].split("::").filter(|word| !word.is_empty()).collect();
-        out.extend(file_of(&path, files).filter(|used| used != file));
-    }
-    out.sort();
-    out.dedup();
-    out
-}
-
-/// Files on a way from a file back to itself, if there is one.
-fn circle<'a>(
-    from: &'a str,
-    arrows: &'a BTreeMap<String, Vec<String>>,
-    way: &mut Vec<&'a str>,
-    seen: &mut BTreeSet<&'a str>,
-) -> bool {
-    way.push(from);
-    for next in &arrows[from] {
-        if next == way[0] || (seen.insert(next) && circle(next, arrows, way, seen)) {
-            return true;
-        }
-    }
-    way.pop();
-    false
-}
-
-#[test]
-fn no_files_use_each_other_in_a_circle() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut found = Vec::new();
-    sources(&root, &mut found);
-    let named: Vec<(String, PathBuf)> = found
-        .into_iter()
-        .filter(|path| path.file_name().is_some_and(|name| name != "mod.rs" && name != "lib.rs"))
-        .map(|path| {
-            let name = path.strip_prefix(&root).expect("it is below").with_extension("");
-            (name.to_string_lossy().replace('\\', "/"), path)
-        })
-        .collect();
-    let files: Vec<String> = named.iter().map(|(name, _)| name.clone()).collect();
-    let arrows: BTreeMap<String, Vec<String>> = named
-        .iter()
-        .map(|(name, path)| {
-            let text = fs::read_to_string(path).expect("a source can be read");
-            (name.clone(), uses(name, &text, &files))
-        })
-        .collect();
-    let count: usize = arrows.values().map(Vec::len).sum();
-    assert!(count > 300, "only {count} uses were seen: the reader of sources is blind");
-    let circles: Vec<String> = files
-        .iter()
-        .filter_map(|file| {
-            let mut way = Vec::new();
-            circle(file, &arrows, &mut way, &mut BTreeSet::new()).then(|| way.join(" -> "))
-        })
-        .collect();
-    assert!(circles.is_empty(), "files use each other in a circle:\n{}", circles.join("\n"));
 }
 
 /// Files outside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.

@@ -7,9 +7,9 @@ mod score_test;
 
 use crate::dynamics::Bench;
 use crate::generator::case::Case;
-use crate::judge;
 use crate::key::{Category, Key};
 use crate::rng::Rng;
+use crate::share::share;
 use crate::signal::Normal;
 use estimate::Table;
 use features::Feature;
@@ -51,7 +51,7 @@ pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Optio
     }
     let (bench, oracle) = (bench.as_ref().ok()?, key.oracle.as_ref()?);
     let left = bench.known_structure(key).ok()?;
-    let share = judge::share(bench.refit(), left, oracle.floor);
+    let share = share(bench.refit(), left, oracle.floor);
     Some(Opinion { rival: 0, names: Vec::new(), share })
 }
 

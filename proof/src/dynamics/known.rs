@@ -2,9 +2,10 @@
 //! together, least squares over the fit recordings in the oracle's band, as one would write it with SciPy or MuJoCo's
 //! system identification. It names nothing; its held-out gain is what a tool that names can be measured by.
 
+use super::band::{Band, NOMINAL, prior};
 use super::laws::{effective_command, forces};
 use super::motion::Motion;
-use super::residual::{Band, NOMINAL, prior, run};
+use super::patched;
 use super::rig::{Entry, Numbers, Rig};
 use crate::key::Key;
 use crate::signal::Normal;
@@ -141,7 +142,7 @@ pub(super) fn left(
         point = nelder_mead(point, |p| at(p).map_or(f64::INFINITY, |f| f.cost));
     }
     let best = at(&point)?;
-    Ok((run(rig, &best.rig, held)?, best.rig.inertia))
+    Ok((patched::left(rig, &best.rig, held)?, best.rig.inertia))
 }
 
 /// The linear values at given shapes.

@@ -7,34 +7,10 @@ use super::machine::{Machine, Needs};
 use super::outside;
 use super::plant::Plant;
 use super::simulate::{Believed, Row, STEP, Series};
+use super::spec::Spec;
 use super::strength::{Declared, Measured, measure};
 use crate::key::{Category, Parameter};
 use crate::rng::Rng;
-
-/// The specification of a case.
-#[derive(Clone, Debug)]
-pub(crate) struct Spec {
-    /// Opaque number: the only thing that the tool can see of it.
-    pub(crate) id: usize,
-    pub(crate) category: Category,
-    /// The hidden effects: contract names, or foreign ones in [`Category::Outside`].
-    pub(crate) hidden: Vec<&'static str>,
-    /// Effect over noise that is asked for; zero where nothing is hidden.
-    pub(crate) strength: f64,
-    /// The number of the draw among those of the same kind.
-    pub(crate) repeat: usize,
-    /// Plays one of these alone: recordings that cannot tell.
-    pub(crate) poor: Option<&'static [Kind]>,
-    /// Rate in Hz and duration in s, where they are not drawn.
-    pub(crate) recorder: Option<(f64, f64)>,
-}
-
-impl Spec {
-    /// The name of the case's folder.
-    pub(crate) fn name(&self) -> String {
-        format!("case-{:04}", self.id)
-    }
-}
 
 /// Values as the rig file has them; `None`: the key is missing.
 #[derive(Clone, Copy, Debug)]

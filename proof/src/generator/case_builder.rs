@@ -1,12 +1,12 @@
 //! A case before its strengths are found: a machine with plans for its recordings, played again and again.
 
-use super::case::Spec;
 use super::drive::Segment;
 use super::effects;
 use super::machine::Machine;
 use super::outside;
 use super::plant::Plant;
 use super::simulate::{Believed, Diverged, Row, Run, Series, simulate};
+use super::spec::Spec;
 use super::strength::{Declared, Measured, measure};
 use crate::key::Category;
 use crate::rng::Rng;

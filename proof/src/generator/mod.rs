@@ -10,6 +10,7 @@ pub(crate) mod machine;
 pub(crate) mod outside;
 pub(crate) mod plant;
 pub(crate) mod simulate;
+pub(crate) mod spec;
 pub(crate) mod strength;
 #[cfg(test)]
 mod tests;

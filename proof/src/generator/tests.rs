@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::case::{Spec, build};
+use super::case::build;
 use super::drive::{Drive, Segment, Tones};
 use super::files;
 use super::machine::{Machine, Needs};
 use super::plant::{Harmonic, Plant, Presliding, Train};
 use super::simulate::{Believed, Row, Run, STEP, Series, simulate};
+use super::spec::Spec;
 use crate::key::Category;
 use crate::rng::Rng;
 

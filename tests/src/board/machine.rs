@@ -23,16 +23,13 @@ use super::dac::Dac;
 use super::exti::{self, Exti};
 use super::flash::Flash;
 use super::pins::{PartPin, Pins};
-use super::processor::{DAC, EXTI, OTG, Probe, Probed};
+use super::processor::{DAC, EXTI, INSTRUCTIONS_PER_SECOND, OTG, Probe, Probed};
 use super::tilt::Accelerometer;
 use super::usb_port::{self, UsbPort};
 
 /// The clock that every board brings, and its rail.
 pub(super) const CLOCK_HZ: u64 = 8_000_000;
 pub(super) const RAIL_MILLIVOLTS: u32 = 3_300;
-/// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
-/// count a time.
-pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(INSTRUCTIONS_PER_SECOND).expect("not zero");
 const MCU: &str = "stm32f407";
 /// The board.

@@ -25,6 +25,7 @@ pub mod tilt;
 mod tracks;
 mod usb_port;
 pub mod wires;
+mod world;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -37,16 +38,16 @@ use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 pub use amplifier::Amplifier;
-pub use machine::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use processor::{Counted, Effect, HandlerRun, Probe, ToCode, Upset};
-pub use run::{EncoderRead, Log, Output};
+pub use processor::{Counted, Effect, HandlerRun, INSTRUCTIONS_PER_SECOND, Probe, ToCode, Upset};
 pub use stopped::Stopped;
 pub use usb_port::UsbPort;
+pub use world::{EncoderRead, Log, Output};
 
 use machine::Machine;
 use pins::Pins;
-use run::{Done, Order, PAINT, World};
+use run::{Done, Order, Run};
+use world::{PAINT, World};
 
 /// A millisecond of virtual time.
 pub const MILLISECOND: Nanos = 1_000_000;
@@ -221,13 +222,13 @@ impl Board {
                 ["_stack_end", "__euninit"].into_iter().filter_map(find).find(|low| same_memory(*low, top));
             (low.unwrap_or((top - 1) & !0xFFFF), top)
         });
-        let known = run::Symbols { rtt: find("_SEGGER_RTT"), stack };
+        let known = world::Symbols { rtt: find("_SEGGER_RTT"), stack };
         let (orders, taken) = channel();
         let (answer, done) = channel();
-        let world = World::new(wiring, known, Box::new(plant), taken, answer);
+        let run = Run::new(World::new(wiring, known, Box::new(plant)), taken, answer);
         let thread = std::thread::spawn(move || {
             let images = [image];
-            let finished = emulator::run(session, &Start::new(&images), world);
+            let finished = emulator::run(session, &Start::new(&images), run);
             finished.map(drop).map_err(|error| error.to_string())
         });
         let image = path.to_path_buf();

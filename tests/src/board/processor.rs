@@ -15,9 +15,11 @@ use rigless::time::VirtualNanos;
 
 use super::cache::InstructionCache;
 use super::flash::{FLASH_OPTCR, Flash, WRITABLE};
-use super::machine::INSTRUCTIONS_PER_SECOND;
 use super::pins::{PartPin, register};
 
+/// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
+/// count a time.
+pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
 /// The address of the USB core in the manual, its size, and the address of its window.
 pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
 /// The same for the DAC.

@@ -10,10 +10,10 @@ use rigless::time::VirtualNanos;
 use super::amplifier::Amplifier;
 use super::machine::{Machine, pin};
 use super::plant::{Drive, Nanos, PlantSide};
-use super::run::{Contact, Log, World};
 use super::tilt::Accelerometer;
 use super::usb_port::UsbPort;
 use super::wires::Wires;
+use super::world::{Contact, Log, World};
 
 /// The board between two instructions.
 pub struct Stopped<'a> {

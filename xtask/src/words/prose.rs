@@ -52,39 +52,75 @@ fn is_letter(letter: char) -> bool {
 /// Returns `source` with every character of code replaced by [`BREAK`]; line breaks and blanks stay.
 fn comments_and_strings(source: &str) -> String {
     let mut prose = String::with_capacity(source.len());
-    let mut rest = source;
-    while let Some(first) = rest.chars().next() {
-        let length = if rest.starts_with("//") {
-            let length = rest.find('\n').unwrap_or(rest.len());
-            prose.push_str(rest[..length].trim_start_matches(['/', '!']));
-            length
-        } else if rest.starts_with("/*") {
-            let length = block_comment(rest);
-            prose.push_str(&rest[2..length]);
-            length
-        } else if let Some(length) = raw_string(rest) {
-            prose.push(BREAK);
-            prose.push_str(&rest[2..length]);
-            prose.push(BREAK);
-            length
-        } else if first == '"' {
-            let length = quoted(rest, '"');
-            prose.push_str(&rest[..length]);
-            length
-        } else if first == '\'' {
-            prose.push(BREAK);
-            character(rest)
-        } else if first.is_alphanumeric() || first == '_' {
-            // A whole word, so that the `r` at the end of another does not open a raw string.
-            prose.push(BREAK);
-            rest.find(|letter: char| !letter.is_alphanumeric() && letter != '_').unwrap_or(rest.len())
-        } else {
-            prose.push(if first.is_whitespace() { first } else { BREAK });
-            first.len_utf8()
-        };
-        rest = &rest[length..];
+    for (kind, piece) in Pieces(source) {
+        match kind {
+            Kind::LineComment => prose.push_str(piece.trim_start_matches(['/', '!'])),
+            Kind::BlockComment => prose.push_str(&piece[2..]),
+            Kind::RawString => {
+                prose.push(BREAK);
+                prose.push_str(&piece[2..]);
+                prose.push(BREAK);
+            }
+            Kind::String => prose.push_str(piece),
+            Kind::Character | Kind::Word => prose.push(BREAK),
+            Kind::Other => prose.push(if piece.trim().is_empty() { ' ' } else { BREAK }),
+            Kind::LineBreak => prose.push('\n'),
+        }
     }
     prose
+}
+
+/// Returns `source` without comments, and with every literal as a blank.
+pub(crate) fn code(source: &str) -> String {
+    let is_code = |kind| matches!(kind, Kind::Word | Kind::Other | Kind::LineBreak);
+    Pieces(source).map(|(kind, piece)| if is_code(kind) { piece } else { " " }).collect()
+}
+
+/// A kind of piece of a Rust source.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    LineComment,
+    BlockComment,
+    RawString,
+    String,
+    /// A character literal, or the apostrophe of a lifetime.
+    Character,
+    /// A whole word, so that the `r` at the end of another does not open a raw string.
+    Word,
+    LineBreak,
+    /// One character of anything else.
+    Other,
+}
+
+/// The pieces of the rest of a source, in its order.
+struct Pieces<'a>(&'a str);
+
+impl<'a> Iterator for Pieces<'a> {
+    type Item = (Kind, &'a str);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rest = self.0;
+        let first = rest.chars().next()?;
+        let (kind, length) = if rest.starts_with("//") {
+            (Kind::LineComment, rest.find('\n').unwrap_or(rest.len()))
+        } else if rest.starts_with("/*") {
+            (Kind::BlockComment, block_comment(rest))
+        } else if let Some(length) = raw_string(rest) {
+            (Kind::RawString, length)
+        } else if first == '"' {
+            (Kind::String, quoted(rest, '"'))
+        } else if first == '\'' {
+            (Kind::Character, character(rest))
+        } else if first.is_alphanumeric() || first == '_' {
+            let is_end = |letter: char| !letter.is_alphanumeric() && letter != '_';
+            (Kind::Word, rest.find(is_end).unwrap_or(rest.len()))
+        } else {
+            (if first == '\n' { Kind::LineBreak } else { Kind::Other }, first.len_utf8())
+        };
+        let (piece, after) = rest.split_at(length);
+        self.0 = after;
+        Some((kind, piece))
+    }
 }
 
 /// The length of the block comment that `text` begins with; such comments nest.

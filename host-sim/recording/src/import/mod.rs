@@ -2,6 +2,7 @@
 //! out on the way is said. It reads tables and writes the contract's files; it may not know what is done with them.
 
 mod counts;
+mod file;
 mod folder;
 mod json;
 mod log;
@@ -93,7 +94,7 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         None => None,
     };
     let paths = folder::files(&request.files)?;
-    let logs = paths.iter().map(|path| table::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let logs = paths.iter().map(|path| file::read(path)).collect::<Result<Vec<_>, _>>()?;
     for log in &logs {
         notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
     }

@@ -1,9 +1,6 @@
 //! What every reader hands on: tables of numbers with named columns, whatever the file's format.
 
 use super::units::{self, Unit};
-use super::{json, log, mat, npy, text};
-use device_sim::failure::Failure;
-use std::path::Path;
 
 /// A column of numbers; NaN where there is none.
 #[derive(Clone, Debug)]
@@ -79,93 +76,4 @@ impl Log {
         }
         log
     }
-}
-
-/// Reads a file of any format that is known, told by its first bytes and its name's ending.
-pub(super) fn read(path: &Path) -> Result<Log, Failure> {
-    let file = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|cause| Failure::input(format_args!("{file}: cannot be read ({cause}); check its path")))?;
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let first = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(0);
-    let mut log = if bytes.starts_with(mcap::MAGIC) {
-        log::read(&file, &bytes)?
-    } else if let Some(advice) = unread(&bytes) {
-        return Err(Failure::input(format_args!("{file}: is {advice}")));
-    } else if bytes.starts_with(ZIP) || bytes.starts_with(b"\x93NUMPY") {
-        npy::read(&file, bytes)?
-    } else if bytes.starts_with(b"MATLAB 5.0") {
-        mat::read(&file, &bytes)?
-    } else if bytes.starts_with(b"PAR1") {
-        parquet(&file, bytes)?
-    } else if matches!(first, b'{' | b'[')
-        && (ending.contains("json") || text::decode(&bytes).trim_end().ends_with(['}', ']']))
-    {
-        json::read(&file, &text::decode(&bytes))?
-    } else {
-        text::read(&file, &bytes)?
-    };
-    for table in &mut log.tables {
-        table.columns.retain(Column::has_numbers);
-    }
-    log.tables.retain(|table| !table.columns.is_empty());
-    if log.tables.is_empty() {
-        return Err(Failure::input(format_args!(
-            "{file}: holds no column of numbers; is it the right file?"
-        )));
-    }
-    Ok(log)
-}
-
-const ZIP: &[u8] = b"PK\x03\x04";
-
-/// What a file of a known format that is not read is, and how to make one that is.
-fn unread(bytes: &[u8]) -> Option<&'static str> {
-    const WORKBOOK: &str = "an Excel workbook; save its sheet as CSV (File, Save As, CSV UTF-8), with one row of names above the numbers";
-    let holds = |name: &[u8]| bytes.windows(name.len()).any(|window| window == name);
-    if bytes.starts_with(ZIP) {
-        return match () {
-            () if holds(b"xl/workbook.") => Some(WORKBOOK),
-            () if bytes[..bytes.len().min(200)].windows(11).any(|w| w == b"opendocumen") => {
-                Some("an OpenDocument file; save its sheet as CSV (File, Save As, Text CSV)")
-            }
-            () if holds(b".npy") => None,
-            () => Some("a zip archive without NumPy arrays; unpack it and give the files in it"),
-        };
-    }
-    [
-        (
-            &b"MATLAB 7.3"[..],
-            "a MATLAB file of -v7.3, which is HDF5; save it again with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
-        ),
-        (
-            b"\x89HDF",
-            "an HDF5 file, as MATLAB's -v7.3 is; save it again from MATLAB with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
-        ),
-        (
-            b"#ROSBAG",
-            "a ROS 1 bag; make an MCAP file of it with rosbags-convert --src FILE --dst OUT --dst-storage mcap (pip install rosbags)",
-        ),
-        (
-            b"SQLite format 3",
-            "an SQLite file, as older ROS 2 bags are; make an MCAP file of it with rosbags-convert --src BAG --dst OUT --dst-storage mcap (pip install rosbags)",
-        ),
-        (b"\x1f\x8b", "compressed with gzip; unpack it with gunzip first"),
-        (b"\xd0\xcf\x11\xe0", WORKBOOK),
-        (b"ARROW1", "an Arrow or Feather file; write it as Parquet or CSV"),
-    ]
-    .into_iter()
-    .find_map(|(magic, what)| bytes.starts_with(magic).then_some(what))
-}
-
-#[cfg(feature = "parquet")]
-fn parquet(file: &str, bytes: Vec<u8>) -> Result<Log, Failure> {
-    super::parquet::read(file, bytes)
-}
-
-#[cfg(not(feature = "parquet"))]
-fn parquet(file: &str, _: Vec<u8>) -> Result<Log, Failure> {
-    Err(Failure::input(format_args!(
-        "{file}: is a Parquet file, which this build does not read; build with `--features parquet` (cargo run --release --features parquet -- import …)"
-    )))
 }

@@ -1,7 +1,7 @@
 //! One page: what it is sent, and what it asks for. The two ways are independent, so that the stop of a page that is too
 //! slow to read still arrives.
 
-use super::server::Shared;
+use super::shared::Shared;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use control_core::TICK_HZ;
 use device_sim::page::condense::Condenser;

@@ -12,6 +12,7 @@ mod connection;
 mod debrief;
 mod gate;
 mod server;
+mod shared;
 mod watched;
 
 pub use debrief::Debrief;

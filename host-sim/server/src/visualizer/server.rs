@@ -4,6 +4,7 @@ use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
 use super::connection;
 use super::debrief::{self, Debrief};
 use super::gate::{self, Gate, Peer};
+use super::shared::Shared;
 use super::watched::{self, Said, Watched, Watches};
 use crate::bounded_listener::BoundedListener;
 use axum::Router;
@@ -17,7 +18,6 @@ use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 use tokio::sync::oneshot;
 
@@ -80,14 +80,6 @@ fn option(address: &SocketAddr) -> &'static str {
 }
 
 impl std::error::Error for ServeError {}
-
-/// The state that every request needs.
-#[derive(Clone)]
-pub(super) struct Shared {
-    pub(super) session: Session,
-    /// True if a person has taken the needle in any page.
-    pub(super) person: Arc<AtomicBool>,
-}
 
 /// A page being served; dropped, it is not any more.
 #[derive(Debug)]

@@ -1,0 +1,171 @@
+//! The arrow check: no files of a crate use each other in a circle.
+//!
+//! A file uses another if its code, tests aside, names something that the other defines. A name that a module only hands on
+//! (`pub use`) belongs to the file that defines it. A module and the modules that it is made of are one house: what it uses of
+//! them is no arrow, what they use of it is one.
+
+mod krate;
+mod source;
+
+use crate::shell::{self, Failure};
+use krate::Crate;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Folders that hold no crate of ours.
+const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
+/// Crates with a circle that is still to be opened.
+const STILL_TO_OPEN: [&str; 1] = ["page-wasm"];
+/// Uses that the whole repository has at least; fewer, and the reader of sources is blind.
+const FEWEST_USES: usize = 1000;
+
+/// What each file of a crate uses: the other file, and a name of it.
+type Uses = BTreeMap<String, BTreeMap<String, String>>;
+
+/// Checks every crate of the repository, prints each circle, and fails if there is one.
+pub(crate) fn check() -> Result<(), Failure> {
+    let unreadable = |error: io::Error| Failure::new(format!("the sources could not be read: {error}"));
+    let mut count = 0;
+    let mut circles = Vec::new();
+    for folder in crates(&shell::top()).map_err(unreadable)? {
+        let uses = Crate::read(&folder.join("src")).map_err(unreadable)?.uses();
+        count += uses.values().map(BTreeMap::len).sum::<usize>();
+        let name = folder.strip_prefix(shell::top()).unwrap_or(&folder).display().to_string();
+        if STILL_TO_OPEN.contains(&name.as_str()) {
+            continue;
+        }
+        circles.extend(circles_of(&uses).iter().map(|circle| message(&name, circle, &uses)));
+    }
+    circles.iter().for_each(|circle| eprintln!("{circle}"));
+    if count < FEWEST_USES {
+        return Err(Failure::new(format!("only {count} uses were seen: the reader of sources is blind")));
+    }
+    if circles.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "{} circles, each printed above: move what both files need into a file below them",
+        circles.len()
+    )))
+}
+
+/// Folders of the repository with a manifest and sources.
+fn crates(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    if folder.join("Cargo.toml").is_file() && folder.join("src").is_dir() {
+        found.push(folder.to_path_buf());
+    }
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let is_skipped = entry.file_name().to_str().is_none_or(|name| SKIPPED.contains(&name));
+        if entry.file_type()?.is_dir() && !is_skipped {
+            found.extend(crates(&entry.path())?);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Sets of files each of which uses every other of its set, by way of the rest.
+fn circles_of(uses: &Uses) -> Vec<Vec<String>> {
+    let reached: BTreeMap<&str, BTreeSet<&str>> =
+        uses.keys().map(|file| (file.as_str(), reach(file, uses))).collect();
+    let mut seen = BTreeSet::new();
+    let mut circles = Vec::new();
+    for (file, from_file) in &reached {
+        if !from_file.contains(file) || !seen.insert(*file) {
+            continue;
+        }
+        let back = |other: &&&str| reached.get(**other).is_some_and(|from| from.contains(file));
+        let circle: Vec<String> = from_file.iter().filter(back).map(|other| (*other).to_owned()).collect();
+        for other in from_file.iter().filter(back) {
+            seen.insert(other);
+        }
+        circles.push(circle);
+    }
+    circles
+}
+
+/// Files that a file uses, directly or by way of others.
+fn reach<'a>(file: &str, uses: &'a Uses) -> BTreeSet<&'a str> {
+    let mut found = BTreeSet::new();
+    let mut open: Vec<&str> = uses.get(file).into_iter().flatten().map(|(other, _)| other.as_str()).collect();
+    while let Some(next) = open.pop() {
+        if found.insert(next) {
+            open.extend(uses.get(next).into_iter().flatten().map(|(other, _)| other.as_str()));
+        }
+    }
+    found
+}
+
+/// The circle with what ties it, a line for each arrow.
+fn message(name: &str, circle: &[String], uses: &Uses) -> String {
+    let mut text = format!("{name}: {} files use each other in a circle:", circle.len());
+    for file in circle {
+        for (other, what) in uses.get(file).into_iter().flatten().filter(|(other, _)| circle.contains(other))
+        {
+            text.push_str(&format!("\n  src/{file} uses {what} of src/{other}"));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circles(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+        circles_of(&Crate::of(files.iter().map(|(name, text)| (String::from(*name), *text))).uses())
+    }
+
+    #[test]
+    fn files_that_use_each_other_are_a_circle() {
+        let found = circles(&[
+            ("lib.rs", "mod a;\nmod b;\nmod c;\nuse a::A;"),
+            ("a.rs", "use crate::b::{self, B};\npub struct A(B);"),
+            ("b.rs", "pub struct B;\nfn f() { crate::c::g(); }"),
+            ("c.rs", "use super::a::A;\npub fn g() {}"),
+        ]);
+        assert_eq!(found, [["a.rs", "b.rs", "c.rs"]]);
+    }
+
+    #[test]
+    fn a_name_belongs_to_the_file_that_defines_it() {
+        let faces = [
+            ("lib.rs", "mod a;"),
+            ("a/mod.rs", "mod one;\nmod two;\npub(crate) use one::One;\npub(crate) use two::Two;"),
+            ("a/one.rs", "use super::Two;\npub(crate) struct One(Two);"),
+            ("a/two.rs", "pub(crate) struct Two;"),
+        ];
+        assert!(circles(&faces).is_empty());
+    }
+
+    #[test]
+    fn a_module_may_use_what_it_is_made_of() {
+        let mut files = vec![
+            ("lib.rs", "mod a;\nmod b;"),
+            ("a/mod.rs", "mod one;\npub(crate) struct Two;\nfn f() { one::g(); }"),
+            ("a/one.rs", "use super::Two;\npub(super) fn g() -> Two { Two }"),
+            ("b.rs", "pub(crate) fn h() {}"),
+        ];
+        assert!(circles(&files).is_empty());
+        files[1].1 = "mod one;\npub(crate) struct Two;\nfn f() { crate::b::h(); }";
+        files[3].1 = "pub(crate) fn h() -> crate::a::Two { crate::a::Two }";
+        assert_eq!(circles(&files), [["a/mod.rs", "b.rs"]]);
+    }
+
+    #[test]
+    fn tests_comments_and_strings_are_no_uses() {
+        let found = circles(&[
+            ("lib.rs", "mod a;\nmod b;"),
+            ("a.rs", "use crate::b::B;\npub struct A(B);"),
+            (
+                "b.rs",
+                "// crate::a::A\npub struct B(&'static str);\nconst C: &str = \"crate::a::A\";\n#[cfg(test)]\nmod tests { use crate::a::A; }",
+            ),
+        ]);
+        assert!(found.is_empty(), "{found:?}");
+    }
+}
