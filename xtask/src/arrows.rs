@@ -21,7 +21,7 @@ const STILL_TO_OPEN: [&str; 1] = ["page-wasm"];
 /// Uses that the whole repository has at least; fewer, and the reader of sources is blind.
 const FEWEST_USES: usize = 1000;
 
-/// What each file of a crate uses: the other file, and a name of it.
+/// The uses of each file of a crate: the other file, and a name of it.
 type Uses = BTreeMap<String, BTreeMap<String, String>>;
 
 /// Checks every crate of the repository, prints each circle, and fails if there is one.

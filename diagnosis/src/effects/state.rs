@@ -1,4 +1,4 @@
-//! What the law of an effect sees of the plant.
+//! The state of the plant, as the law of an effect sees it.
 
 /// The plant's state during one step.
 #[derive(Debug, Clone, Copy, Default)]

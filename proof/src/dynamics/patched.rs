@@ -1,4 +1,4 @@
-//! What a patched rig leaves of the force on a recording.
+//! The force that a patched rig leaves on a recording.
 
 use super::band::{Band, spread};
 use super::laws::{Forces, effective_command, forces, is_along_travel, is_over};

@@ -1,4 +1,4 @@
-//! What a case is asked to be, before anything of it is drawn.
+//! The request for a case, before anything of it is drawn.
 
 use super::excite::Kind;
 use crate::key::Category;

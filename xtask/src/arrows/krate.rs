@@ -7,7 +7,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// How often a name may be handed on.
+/// The number of times that a name may be handed on.
 const MOST_HANDED_ON: usize = 5;
 
 /// The files of a crate by their module's path; the root's is empty.
@@ -43,7 +43,7 @@ impl Crate {
         Self { modules }
     }
 
-    /// What each file uses of the others; files that only tests declare are left out, and so is what a module uses of the modules
+    /// The uses of every file; files that only tests declare are left out, and so is what a module uses of the modules
     /// that it is made of.
     pub(super) fn uses(&self) -> Uses {
         let declared = self.modules.keys().filter(|path| self.is_declared(path));

@@ -1,4 +1,4 @@
-//! What the server and its connections share.
+//! The state that the server and its connections share.
 
 use device_sim::session::Session;
 use std::sync::Arc;
