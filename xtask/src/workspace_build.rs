@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// The emulator asks for a newer Rust than it needs.
 pub(crate) const ANY_RUST: &str = "--ignore-rust-version";
-/// What is built, and how.
+/// The selection of packages and the profile.
 pub(crate) const BUILD: [&str; 3] = ["--release", "--workspace", ANY_RUST];
 
 /// Builds a program of the one build; where it lies below the build's folder.
