@@ -158,6 +158,7 @@ fn said(settled: &Settled, out: &Path) -> Vec<String> {
         .map(|name| format!("{} {:.2}", name.class.join(" or "), name.confidence))
         .collect();
     lines.push(format!("{}.", settled.conclusion));
+    lines.extend(settled.unsure_in_words().map(|sentence| format!("{sentence}.")));
     match &settled.feel {
         Some(Ok(Feel { before, after, notes })) => {
             lines.extend(notes.iter().cloned());

@@ -2,6 +2,7 @@
 //! name is left or nothing tells the rest apart. What was settled is fed forward by the device, as far as it can be.
 
 mod feel;
+mod looks;
 mod page;
 mod play;
 mod subject;
@@ -83,6 +84,8 @@ pub struct Round {
     pub sentence: String,
     /// Names that contend afterwards, with their probabilities; `none` for none of them.
     pub contenders: Vec<(String, f64)>,
+    /// Names of the diagnosis of all recordings so far, with the confidence of that diagnosis alone.
+    pub names: Vec<Name>,
 }
 
 /// A named effect at the end.
@@ -92,7 +95,7 @@ pub struct Name {
     pub name: String,
     /// Names that the recordings cannot tell from it, itself included.
     pub class: Vec<String>,
-    /// Probability that the class holds the truth.
+    /// Probability that the class holds the truth; in the outcome of a run, with all its looks counted.
     pub confidence: f64,
 }
 
@@ -101,8 +104,10 @@ pub struct Name {
 pub struct Settled {
     /// The rounds, in order.
     pub rounds: Vec<Round>,
-    /// The names of the last diagnosis.
+    /// The names of the last diagnosis that are sure enough with every look counted.
     pub names: Vec<Name>,
+    /// The others: a run that looks as often finds them by chance.
+    pub unsure: Vec<Name>,
     /// Why no further round follows, a sentence without its full stop.
     pub conclusion: String,
     /// The force on a hand before and after, or why nothing is fed forward; none where nothing is named or it was not asked for.
@@ -110,6 +115,23 @@ pub struct Settled {
 }
 
 impl Settled {
+    /// Takes the names from the rounds so far.
+    fn count_looks(&mut self) {
+        let rounds: Vec<Vec<Name>> = self.rounds.iter().map(|round| round.names.clone()).collect();
+        (self.names, self.unsure) = looks::corrected(&rounds);
+    }
+
+    /// Sentences, without their full stops, on the names that are not sure enough.
+    pub fn unsure_in_words(&self) -> impl Iterator<Item = String> {
+        self.unsure.iter().map(|name| {
+            format!(
+                "{} is not named: it came up in a later round, and with every look counted it is {:.0} % sure",
+                name.class.join(" or "),
+                100.0 * name.confidence
+            )
+        })
+    }
+
     /// Motion of all rounds, s.
     pub fn motion_s(&self) -> f64 {
         self.rounds.iter().map(|round| round.seconds).sum()
@@ -199,7 +221,7 @@ impl Run<'_> {
             };
             progress(Progress::Said(&report.sentence))?;
             settled.rounds.push(round(asked, &report));
-            settled.names = names(&report);
+            settled.count_looks();
             let folder = folder.join("report");
             match following(&self.limited, &report, &folder, self.settings, settled)? {
                 Ok(next) => asked = next,
@@ -366,6 +388,7 @@ fn round(asked: Asked, report: &Report) -> Round {
         why: asked.why,
         sentence: report.sentence.clone(),
         contenders: report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect(),
+        names: names(report),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
-use super::{Feel, Round, Settled};
+use super::{Feel, Name, Round, Settled};
 use crate::compensate::felt::Felt;
 use device_sim::failure::Failure;
 use html_report::{Cell, Sheet};
@@ -33,22 +33,24 @@ fn json(settled: &Settled) -> String {
             "seconds": round.seconds,
             "sentence": round.sentence,
             "contenders": contenders,
+            "names": names_json(&round.names),
         })
     };
-    let names: Vec<serde_json::Value> = settled
-        .names
-        .iter()
-        .map(|n| serde_json::json!({ "name": n.name, "class": n.class, "confidence": n.confidence }))
-        .collect();
     let value = serde_json::json!({
         "format": 1,
-        "names": names,
+        "names": names_json(&settled.names),
+        "unsure": names_json(&settled.unsure),
         "conclusion": settled.conclusion,
         "motion_s": settled.motion_s(),
         "feel": settled.feel.as_ref().map(feel_json),
         "rounds": settled.rounds.iter().map(round).collect::<Vec<_>>(),
     });
     format!("{value:#}\n")
+}
+
+fn names_json(names: &[Name]) -> Vec<serde_json::Value> {
+    let one = |n: &Name| serde_json::json!({ "name": n.name, "class": n.class, "confidence": n.confidence });
+    names.iter().map(one).collect()
 }
 
 fn feel_json(feel: &Result<Feel, String>) -> serde_json::Value {
@@ -97,6 +99,9 @@ fn html(settled: &Settled) -> String {
     let rows: Vec<Vec<Cell>> = settled.rounds.iter().enumerate().map(row).collect();
     sheet.table(&["round", "asked", "why", "motion, s", "the diagnosis of all recordings so far"], &rows);
     contenders(&mut sheet, settled);
+    for sentence in settled.unsure_in_words() {
+        sheet.note(&format!("{}.", capitalised(&sentence)));
+    }
     if let Some(feel) = &settled.feel {
         felt(&mut sheet, feel);
     }
