@@ -48,7 +48,11 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
             }
         }
     }
-    let topics = found.topics;
+    tables_of(file, found.topics, notes)
+}
+
+/// The tables of the topics that are read, and notes on the others; an error where there is none.
+fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -> Result<Log, Failure> {
     if topics.values().any(|t| t.name == "/setup") && topics.values().any(|t| t.name == "/samples") {
         return Err(Failure::input(format_args!(
             "{file}: is a recording of this program; `host-sim export {file} --out DIR` gives its files"

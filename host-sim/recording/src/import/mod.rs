@@ -99,25 +99,7 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
     }
     roles::check(&logs, &request.columns)?;
-    let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
-    let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(&logs));
-    let wholes: Vec<Rows> = if !one_run && logs.iter().all(is_whole) {
-        let mut wholes = Vec::new();
-        for (index, log) in logs.iter().enumerate() {
-            let mut said = Vec::new();
-            wholes.push(rows::gather(std::slice::from_ref(log), &request.columns, request.known, &mut said)?);
-            // The same columns of further files need no further words.
-            if index == 0 {
-                notes.extend(said);
-            }
-        }
-        if !request.runs {
-            separate::check(&logs, &wholes)?;
-        }
-        joined(wholes, &mut notes)
-    } else {
-        vec![rows::gather(&logs, &request.columns, request.known, &mut notes)?]
-    };
+    let wholes = wholes(&logs, request, &mut notes)?;
     let per_turn =
         request.counts_per_turn.or_else(|| rig.as_ref().map(|rig| rig.encoder.counts_per_unit * TAU));
     let mut all = Vec::new();
@@ -131,21 +113,7 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
             notes.join("; ")
         )));
     };
-    if all.iter().any(|run| run.position != first.position) {
-        return Err(Failure::input(
-            "the files measure their positions in different units; import them one by one",
-        ));
-    }
-    if let (Some(rig), false) = (&rig, first.position == Quantity::Counts)
-        && (rig.kind == Kind::Linear) != (first.position == Quantity::Length)
-    {
-        return Err(Failure::input(format_args!(
-            "the position is in {} and the rig {} is {}; correct one of them",
-            first.position.unit(),
-            rig.name,
-            if rig.kind == Kind::Linear { "linear" } else { "rotary" }
-        )));
-    }
+    check_positions(&all, first, rig.as_ref())?;
     let per_unit = request
         .counts_per_unit
         .or(request.counts_per_turn.map(|counts| counts / TAU))
@@ -168,6 +136,49 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         .collect();
     let rig = request.rig.clone().unwrap_or_else(|| request.out.join("rig.toml"));
     Ok(Imported { rig, to_fill_in, recordings, notes })
+}
+
+/// The rows of the files: each file's own where each has all columns, with one that goes on where another ends joined to it; else those of
+/// all files together.
+fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Vec<Rows>, Failure> {
+    let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
+    let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(logs));
+    if one_run || !logs.iter().all(is_whole) {
+        return Ok(vec![rows::gather(logs, &request.columns, request.known, notes)?]);
+    }
+    let mut wholes = Vec::new();
+    for (index, log) in logs.iter().enumerate() {
+        let mut said = Vec::new();
+        wholes.push(rows::gather(std::slice::from_ref(log), &request.columns, request.known, &mut said)?);
+        // The same columns of further files need no further words.
+        if index == 0 {
+            notes.extend(said);
+        }
+    }
+    if !request.runs {
+        separate::check(logs, &wholes)?;
+    }
+    Ok(joined(wholes, notes))
+}
+
+/// Checks that all runs measure their positions as the first does, and as the rig has it.
+fn check_positions(runs: &[Rows], first: &Rows, rig: Option<&Rig>) -> Result<(), Failure> {
+    if runs.iter().any(|run| run.position != first.position) {
+        return Err(Failure::input(
+            "the files measure their positions in different units; import them one by one",
+        ));
+    }
+    if let (Some(rig), false) = (rig, first.position == Quantity::Counts)
+        && (rig.kind == Kind::Linear) != (first.position == Quantity::Length)
+    {
+        return Err(Failure::input(format_args!(
+            "the position is in {} and the rig {} is {}; correct one of them",
+            first.position.unit(),
+            rig.name,
+            if rig.kind == Kind::Linear { "linear" } else { "rotary" }
+        )));
+    }
+    Ok(())
 }
 
 /// Files whose clock goes on where the one before ended are one run.

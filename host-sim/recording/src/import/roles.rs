@@ -198,9 +198,14 @@ fn suggested(column: &Column) -> Option<(Role, u32)> {
         let exact = u32::from(!has("position pos"));
         return Some((Role::Position, 1 + exact));
     }
-    match of_motion {
-        Some(Quantity::Angle | Quantity::Length | Quantity::Counts) => Some((Role::Position, 4)),
-        Some(Quantity::Current | Quantity::Voltage) => Some((Role::Command, 4)),
+    by_unit(of_motion?)
+}
+
+/// The role of a column whose name says nothing.
+fn by_unit(quantity: Quantity) -> Option<(Role, u32)> {
+    match quantity {
+        Quantity::Angle | Quantity::Length | Quantity::Counts => Some((Role::Position, 4)),
+        Quantity::Current | Quantity::Voltage => Some((Role::Command, 4)),
         _ => None,
     }
 }

@@ -4,7 +4,7 @@ use super::roles::{self, Choice, Chosen, Role};
 use super::table::{Log, Table};
 use super::units::{Quantity, Unit};
 use device_sim::failure::Failure;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A recording in SI units; the position is in `position_unit`. All columns have the same length.
 #[derive(Clone, Debug)]
@@ -140,16 +140,7 @@ pub(super) fn gather(
     let mut found = find_all(logs, choices)?;
     let said = |role: Role| choices.iter().any(|c| c.role == role);
     // Everything that only a person can know is asked at once.
-    let mut questions = Vec::new();
-    if !found.contains_key(&Role::Position) && !found.contains_key(&Role::Velocity) {
-        questions.push(roles::missing(logs, Role::Position).to_string());
-    }
-    if !found.contains_key(&Role::Command) && !known.undriven {
-        questions.push(format!(
-            "{}; or give --undriven where nothing drives the axis",
-            roles::missing(logs, Role::Command)
-        ));
-    }
+    let mut questions = missing(logs, &found, known);
     if found.contains_key(&Role::Position)
         && !said(Role::Velocity)
         && let Some(left) = found.remove(&Role::Velocity)
@@ -166,17 +157,12 @@ pub(super) fn gather(
     }
     let base = if found.contains_key(&Role::Position) { Role::Position } else { Role::Velocity };
     let base = found[&base].clone();
-    let tables: std::collections::BTreeSet<(usize, usize)> =
-        found.values().map(|c| (c.at.0, c.at.1)).collect();
-    let several = tables.len() > 1;
-    let mut clocks = BTreeMap::new();
-    for at in &tables {
-        clocks.insert(*at, clock(&logs[at.0].tables[at.1], choices, several, known, notes)?);
-    }
-    if several {
+    let tables = found.values().map(|chosen| (chosen.at.0, chosen.at.1)).collect();
+    let clocks = clocks(logs, &tables, choices, known, notes)?;
+    if clocks.len() > 1 {
         notes.push(format!(
             "columns of {} tables put on the clock of {}: each holds until its next value",
-            tables.len(),
+            clocks.len(),
             logs[base.at.0].tables[base.at.1].name
         ));
     }
@@ -192,16 +178,7 @@ pub(super) fn gather(
     for (role, chosen) in &found {
         let column = column(logs, chosen);
         let unit = units[role];
-        match role {
-            Role::Position => rows.position = unit.quantity,
-            Role::Velocity if rows.position == Quantity::Counts && !found.contains_key(&Role::Position) => {
-                rows.position =
-                    if unit.quantity == Quantity::Speed { Quantity::Length } else { Quantity::Angle };
-            }
-            Role::Command => rows.command = unit.quantity,
-            Role::Reference => rows.reference = unit.quantity,
-            _ => {}
-        }
+        rows.set_quantity(*role, unit.quantity, found.contains_key(&Role::Position));
         let scaled: Vec<f64> = column.values.iter().map(|x| chosen.sign * unit.factor * x).collect();
         let at = (chosen.at.0, chosen.at.1);
         let values = if at == (base.at.0, base.at.1) {
@@ -218,6 +195,52 @@ pub(super) fn gather(
         notes.push("the command is zero throughout, as --undriven says".into());
     }
     Ok(rows)
+}
+
+/// The clock of each table, by the places of file and table, and its zero.
+type Clocks = BTreeMap<(usize, usize), (Vec<f64>, f64)>;
+
+fn clocks(
+    logs: &[Log],
+    tables: &BTreeSet<(usize, usize)>,
+    choices: &[Choice],
+    known: Known,
+    notes: &mut Vec<String>,
+) -> Result<Clocks, Failure> {
+    let several = tables.len() > 1;
+    let one =
+        |at: &(usize, usize)| Ok((*at, clock(&logs[at.0].tables[at.1], choices, several, known, notes)?));
+    tables.iter().map(one).collect()
+}
+
+/// Questions for what no column gives.
+fn missing(logs: &[Log], found: &BTreeMap<Role, Chosen>, known: Known) -> Vec<String> {
+    let mut questions = Vec::new();
+    if !found.contains_key(&Role::Position) && !found.contains_key(&Role::Velocity) {
+        questions.push(roles::missing(logs, Role::Position).to_string());
+    }
+    if !found.contains_key(&Role::Command) && !known.undriven {
+        questions.push(format!(
+            "{}; or give --undriven where nothing drives the axis",
+            roles::missing(logs, Role::Command)
+        ));
+    }
+    questions
+}
+
+impl Rows {
+    /// Notes what a column measures; a velocity tells what the position is where no column is one.
+    fn set_quantity(&mut self, role: Role, quantity: Quantity, has_position: bool) {
+        match role {
+            Role::Position => self.position = quantity,
+            Role::Velocity if self.position == Quantity::Counts && !has_position => {
+                self.position = if quantity == Quantity::Speed { Quantity::Length } else { Quantity::Angle };
+            }
+            Role::Command => self.command = quantity,
+            Role::Reference => self.reference = quantity,
+            _ => {}
+        }
+    }
 }
 
 /// A clock counted from another's zero.

@@ -113,18 +113,7 @@ fn layout(lines: &[(usize, &str)]) -> Layout {
 /// Reads a text file.
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
     let text = decode(bytes);
-    let mut comments: Vec<(usize, &str)> = Vec::new();
-    let mut lines: Vec<(usize, &str)> = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let line = line.trim_end_matches(['\r', '\0']);
-        if line.trim().is_empty() {
-            continue;
-        }
-        match COMMENTS.iter().find(|mark| line.trim_start().starts_with(**mark)) {
-            Some(mark) => comments.push((lines.len(), line.trim_start().trim_start_matches(mark))),
-            None => lines.push((index + 1, line)),
-        }
-    }
+    let (lines, comments) = lines_and_comments(&text);
     let Layout { separator, count } = layout(&lines);
     if let Some(log) = channels_in_rows(file, &lines, separator, count) {
         return Ok(log);
@@ -151,9 +140,46 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
             format!(", {} comment lines left out", comments.len())
         }
     ));
-    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(lines.len() - first); count];
+    let columns = names
+        .into_iter()
+        .zip(values(&lines[first..], separator, count, &mut notes))
+        .enumerate()
+        .map(|(i, ((name, unit), values))| {
+            let mut column = match name {
+                Some(name) => Column::new(name, values),
+                None => Column::unnamed(format!("column{}", i + 1), values),
+            };
+            column.unit = unit.or(column.unit);
+            column
+        })
+        .collect();
+    Ok(Log { file: file.to_owned(), tables: vec![Table { name: file.to_owned(), columns }], notes })
+}
+
+/// Lines, each with a number.
+type Lines<'a> = Vec<(usize, &'a str)>;
+
+/// Lines with their numbers from 1, and comments with the count of lines before them; empty ones are left out.
+fn lines_and_comments(text: &str) -> (Lines<'_>, Lines<'_>) {
+    let (mut lines, mut comments) = (Vec::new(), Vec::new());
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim_end_matches(['\r', '\0']);
+        if line.trim().is_empty() {
+            continue;
+        }
+        match COMMENTS.iter().find(|mark| line.trim_start().starts_with(**mark)) {
+            Some(mark) => comments.push((lines.len(), line.trim_start().trim_start_matches(mark))),
+            None => lines.push((index + 1, line)),
+        }
+    }
+    (lines, comments)
+}
+
+/// The numbers of each column; lines of another number of fields or without a number are left out, with a note.
+fn values(lines: &[(usize, &str)], separator: char, count: usize, notes: &mut Vec<String>) -> Vec<Vec<f64>> {
+    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(lines.len()); count];
     let (mut ragged, mut first_ragged) = (0, 0);
-    for (at, line) in &lines[first..] {
+    for (at, line) in lines {
         let row = fields(line, separator);
         if row.len() != count || row.iter().all(|f| number(f, separator).is_none()) {
             if ragged == 0 {
@@ -171,20 +197,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
             "{ragged} lines without {count} fields or without a number left out, the first at line {first_ragged}"
         ));
     }
-    let columns = names
-        .into_iter()
-        .zip(columns)
-        .enumerate()
-        .map(|(i, ((name, unit), values))| {
-            let mut column = match name {
-                Some(name) => Column::new(name, values),
-                None => Column::unnamed(format!("column{}", i + 1), values),
-            };
-            column.unit = unit.or(column.unit);
-            column
-        })
-        .collect();
-    Ok(Log { file: file.to_owned(), tables: vec![Table { name: file.to_owned(), columns }], notes })
+    columns
 }
 
 /// More rows than this are rows.
