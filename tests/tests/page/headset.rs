@@ -115,8 +115,8 @@ fn both_eyes(page: &mut Page) -> Result<(), Failure> {
 /// The needle in the headset is the device's, and the tissue goes on with it.
 fn needle_goes_on(page: &mut Page) -> Result<(), Failure> {
     page.wait("the needle outside", SOME_TIME, "__stats.depthMm < 0")?;
-    page.wait("the needle inside", SOME_TIME, "__stats.depthMm > 6")?;
-    page.evaluate("window.at = [__body.headset.step(0.016)[1].depth, __stats.depthMm]")?;
-    let gap = page.number("Math.abs(at[0] - at[1])")?;
-    check("the needle is the device's", gap < 1.0, gap)
+    // The page's figure is of its last picture, and here pictures are slow.
+    let is_the_devices =
+        "__stats.depthMm > 6 && Math.abs(__body.headset.step(0.016)[1].depth - __stats.depthMm) < 0.5";
+    page.wait("the device's needle, deep inside", SOME_TIME, is_the_devices)
 }
