@@ -239,6 +239,12 @@ impl Controller {
         self.silent_ticks = 0;
     }
 
+    /// Says that the tissue's surface is displaced by so much along the needle: the law of Paper 000 counts depth from there. At most 3 mm
+    /// count, they change by at most 20 mm/s, and they go back to 0 if they are not said again within 50 ms. The firmware never says it.
+    pub fn displace(&mut self, displacement: Millimetres) {
+        self.memory.displace(displacement);
+    }
+
     /// Says, until it is said again, whether both of the encoder's lines are at one level, as they also are without its supply or
     /// its ground. An encoder without lines, such as a simulated one, leaves it at `false`.
     #[inline]

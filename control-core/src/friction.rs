@@ -17,7 +17,10 @@ pub(crate) enum Law {
         /// S_f2.
         follow: I2F30,
         stiffness: Stiffness,
+        /// T_f_max.
         limit: Newtons,
+        /// T_f_min, negative.
+        least: Newtons,
     },
     /// `z = x − w`, clamped to `limit/K`; `F = K·z`.
     Cone { stiffness: Stiffness, inverse_stiffness: I16F16 },
@@ -57,7 +60,7 @@ impl Law {
         limit: impl FnOnce() -> Newtons,
     ) -> Newtons {
         match self {
-            Law::Paper { per_level_length, level_cap, follow, stiffness, limit } => {
+            Law::Paper { per_level_length, level_cap, follow, stiffness, limit, least } => {
                 anchor.follow(depth.0, *follow);
                 // 1/S_f1 is at most 1.
                 let levels = truncating_product(inserted.0.to_bits(), per_level_length.to_bits(), 30);
@@ -66,7 +69,7 @@ impl Law {
                 let stretch = anchor.stretch(depth).to_bits().clamp(-1 << 26, (1 << 26) - 1);
                 let levelled = saturating_product(stretch, level.to_bits(), 16);
                 let force = I16F16::from_bits(saturating_product(levelled, stiffness.0.to_bits(), 16));
-                Newtons(force.min(limit.0).max(-limit.0))
+                Newtons(force.min(limit.0).max(least.0))
             }
             Law::Cone { stiffness, inverse_stiffness } => {
                 let limit = limit();

@@ -193,6 +193,7 @@ pub enum Field {
     MechanismFriction,
     DriveDelayUs,
     SlidingShare,
+    FrictionLimitOut,
 }
 
 /// The key in the device's or the patient's file, or words with a unit if no key holds the value in this unit.
@@ -214,6 +215,7 @@ impl fmt::Display for Field {
             Self::LevelCap => "level_cap",
             Self::AnchorMs => "anchor_ms",
             Self::FrictionLimit => "limit_n",
+            Self::FrictionLimitOut => "limit_out_n",
             Self::Compliance => "compliance_mm2_per_n",
             Self::PunctureTravel => "puncture_mm",
             Self::UnloadStiffness => "unload_n_per_mm",

@@ -1,5 +1,6 @@
 // The second view of the picture: limb in three dimensions and ultrasound, started only when somebody looks at it.
 
+import { Headset } from "./headset.js";
 import { WebGl } from "./limb_webgl.js";
 import { WebGpu } from "./limb_webgpu.js";
 import { Picture } from "./picture.js";
@@ -45,6 +46,8 @@ export class BodyView {
       const picture = await Picture.load();
       await this.openLimb(new URLSearchParams(location.search).get("graphics"));
       this.ultrasound = new Ultrasound(byId("ultrasound"), this.colours);
+      this.headset = new Headset(byId("headset"), this.colours, (seconds) => this.stepForHeadset(seconds), () => [this.picture, this.drawn]);
+      this.stats.headset = this.headset;
       // Last, for there is nothing to draw with before.
       this.picture = picture;
       if (this.scene) this.build();
@@ -100,7 +103,9 @@ export class BodyView {
       return;
     }
     byId("body-note").textContent = "";
-    this.limb?.build(this.picture, table1 ? asSlabs(this.scene) : this.scene);
+    this.drawn = table1 ? asSlabs(this.scene) : this.scene;
+    this.limb?.build(this.picture, this.drawn);
+    this.headset?.build();
     this.ultrasound.build(this.picture);
     this.stats.particles = this.picture.particles;
     this.stats.structures = this.scene.layers.map((layer) => layer.structure ?? layer.name);
@@ -115,17 +120,36 @@ export class BodyView {
     if (this.picture?.built) this.picture.happen(event);
   }
 
+  /** The needle as the device has it. */
+  needle() {
+    const { depth, angle, tilt, vessel } = this.view;
+    return { depth, angle: angle ?? tilt - this.scene.skin_tilt_rad, flashback: vessel === "in_lumen" };
+  }
+
+  /** A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up. */
+  step(seconds) {
+    const { depth, angle } = this.needle();
+    this.picture.step(Math.min(Math.max(seconds, 1 / 120), 1 / 20), depth, angle);
+  }
+
+  /** Moves the tissue on for a headset; what it draws. */
+  stepForHeadset(seconds) {
+    if (!this.view || !this.picture?.built) return null;
+    this.step(seconds);
+    return [this.picture, this.needle(), this.ultrasound.probe];
+  }
+
   /** One picture; `view` as main.js keeps it. */
   draw(view) {
     if (!this.open || !this.picture?.built) return;
-    const angle = view.angle ?? view.tilt - this.scene.skin_tilt_rad;
+    this.view = view;
     // While a person holds the slider it says where the hand wants to be, else where the needle is.
     if (!view.person || document.activeElement !== this.depth) this.depth.value = view.depth.toFixed(1);
     const begin = performance.now();
-    // A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up.
-    this.picture.step(Math.min(Math.max(view.seconds, 1 / 120), 1 / 20), view.depth, angle);
+    // In a headset its own pictures move the tissue on: there the page's may stop.
+    if (!this.headset?.session) this.step(view.seconds);
     const stepped = performance.now();
-    this.limb?.draw(this.picture, { depth: view.depth, angle, flashback: view.vessel === "in_lumen" }, this.ultrasound.probe);
+    this.limb?.draw(this.picture, this.needle(), this.ultrasound.probe);
     const drawn = performance.now();
     this.ultrasound.draw(this.picture, view.seconds, view.depth);
     if (this.scene.source.kind !== "recording") this.ultrasound.report(this.hand.link, performance.now());

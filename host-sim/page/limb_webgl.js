@@ -102,17 +102,19 @@ export class WebGl {
     return this.shared;
   }
 
-  /** Begins a picture: where the shared points are now, and what all meshes have in common. */
-  begin(points, normals, { view, eye, along, lumen, wall, blood, edge, sky }) {
+  /** Begins a picture: where the shared points are now, and what all meshes have in common. A headset has its own `target`, two eyes
+   *  share it, and only the first `clears` it. */
+  begin(points, normals, { view, eye, along, lumen, wall, blood, edge, sky, target = null, clears = true }) {
     const { gl } = this;
     [points, normals].forEach((numbers, i) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.moving[i]);
       gl.bufferSubData(gl.ARRAY_BUFFER, 0, numbers);
     });
-    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target?.framebuffer ?? null);
+    gl.viewport(...(target?.viewport ?? [0, 0, this.canvas.width, this.canvas.height]));
     gl.clearColor(...sky, 1);
     gl.depthMask(true);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (clears) gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.useProgram(this.program.handle);
     const { at } = this.program;
     gl.uniformMatrix4fv(at("view"), false, view);

@@ -130,9 +130,13 @@ export class Tissue3d {
     const { eye, target } = this.camera(needle, width / height);
     this.seen = { eye, target, aspect: width / height };
     this.held = probe;
+    this.paint(picture, needle, probe, { view: multiply(perspective(FIELD, width / height, 1, 400), look(eye, target)), eye });
+  }
+
+  /** The same from a place of one's own: `view` as a matrix, `eye` in mm, and what else a renderer's `begin` takes. */
+  paint(picture, needle, probe, camera) {
     this.renderer.begin(picture.points, picture.normals, {
-      view: multiply(perspective(FIELD, width / height, 1, 400), look(eye, target)),
-      eye,
+      ...camera,
       along: ALONG_MM,
       lumen: picture.lumen,
       wall: rgb(this.colours["vessel-wall"]),

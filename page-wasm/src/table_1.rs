@@ -5,8 +5,7 @@ use tissue::Configuration;
 use tissue::needle::WallName;
 
 /// Returns the tissue of Table 1 with the depths of the scene's vessel, and which of its walls belongs to which layer of the scene; an
-/// error if the scene has no vessel between two walls. The spacings of the table are scaled by `bottom_mm` over the depth of the paper's
-/// block, so that they keep their ratios.
+/// error if the scene has no vessel between two walls.
 pub(crate) fn configure(
     given: &[Given],
     bottom_mm: f32,
@@ -16,26 +15,14 @@ pub(crate) fn configure(
         return Err("Table 1 is skin, vessel and skin, and this patient has no vessel".into());
     };
     let [near_mm, far_mm] = [near, far].map(|layer| given[layer].depth_mm);
-    if !(near_mm > 0.0 && far_mm > near_mm && bottom_mm > far_mm) {
-        return Err("the vessel's walls are not one below the other".into());
-    }
-    let paper = Configuration::paper_000();
-    let depth_mm: f32 = paper.layers.iter().map(|layer| layer.thickness_mm).sum();
-    let scale = bottom_mm / depth_mm;
-    let mut layers = paper.layers;
-    let edges_mm = [0.0, near_mm, far_mm, bottom_mm];
-    for (number, (layer, wall)) in layers.iter_mut().zip([0, near, far]).enumerate() {
-        layer.top_mm = edges_mm[number];
-        layer.thickness_mm = edges_mm[number + 1] - edges_mm[number];
-        layer.spacing_mm *= scale;
-        layer.drag_mm *= scale;
-        layer.gives_mm = given[wall].travel_mm.clamp(0.0, 30.0);
-    }
+    let gives_mm = [0, near, far].map(|wall| given[wall].travel_mm);
+    let configuration = Configuration::table_1(near_mm, far_mm, bottom_mm, gives_mm)
+        .ok_or("the vessel's walls are not one below the other")?;
     let mut walls = vec![None; given.len()];
     for (number, wall) in [0, near, far].into_iter().enumerate() {
         walls[wall] = Some(WallName::Layer(number));
     }
-    Ok((Configuration { layers, vessel: None, ..Configuration::default() }, walls))
+    Ok((configuration, walls))
 }
 
 #[cfg(test)]

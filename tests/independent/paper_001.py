@@ -33,10 +33,11 @@ def eq_1(travel_mm, n, a, b):
     return (travel_mm - n) ** 2 / a + b
 
 
-def eq_2(position_mm, s_f1_mm, s_f2, gain_n_per_mm, t_f_max_n, level_max):
+def eq_2(position_mm, s_f1_mm, s_f2, gain_n_per_mm, t_f_n, level_max):
     """The friction cone line by line as printed, times the gain from position to force that the paper leaves out.
 
-    P_pre is the previous P_curr_f, as the equation's fourth line sets it. The level is bounded, as any exponential must be.
+    P_pre is the previous P_curr_f, as the equation's fourth line sets it. The level is bounded, as any exponential must be. `t_f_n` is
+    T_f_min, negative, and T_f_max.
     """
     force = numpy.zeros(len(position_mm))
     p_pre = position_mm[0]
@@ -45,7 +46,7 @@ def eq_2(position_mm, s_f1_mm, s_f2, gain_n_per_mm, t_f_max_n, level_max):
         p_curr = p_pre + (p_now - p_pre) * s_f2
         p_diff = (p_now - p_curr) * level * gain_n_per_mm
         p_pre = p_curr
-        force[tick] = min(max(p_diff, -t_f_max_n), t_f_max_n)
+        force[tick] = min(max(p_diff, t_f_n[0]), t_f_n[1])
     return force
 
 
@@ -95,10 +96,10 @@ def vein_stage(recording, report):
 
 def friction_cone(device, report):
     """Eq. 2 in a body of muscle alone, as printed: in, held, further in, out."""
-    s_f1, cap, tau_ms, gain, limit = 23.0, 2.0, 50.0, 0.25, 0.5
+    s_f1, cap, tau_ms, gain, limit, limit_out = 23.0, 2.0, 50.0, 0.25, 0.5, 0.2
     friction = (
         f'[friction]\nlaw = "paper"\nlevel_length_mm = {s_f1}\nlevel_cap = {cap}\nanchor_ms = {tau_ms:.0f}\n'
-        f"stiffness_n_per_mm = {gain}\nlimit_n = {limit}\n"
+        f"stiffness_n_per_mm = {gain}\nlimit_n = {limit}\nlimit_out_n = {limit_out}\n"
     )
     muscle = '[[layer]]\ntissue = "muscle"\ndepth_mm = 0.0\nfriction_n_per_mm = 0.02\n'
     body = f'format = 1\nname = "independent"\nentry_deg = 90.0\n{friction}{muscle}'
@@ -109,11 +110,12 @@ def friction_cone(device, report):
     recording = device.record(body, hand(steps), 4.0)
     rows = recording.inside()
     # S_f2 is dimensionless per tick; a first-order follower of 50 ms has this one.
-    wanted = eq_2(recording.depth_mm[rows], s_f1, 1.0 - math.exp(-TICK_S * 1e3 / tau_ms), gain, limit, cap)
+    wanted = eq_2(recording.depth_mm[rows], s_f1, 1.0 - math.exp(-TICK_S * 1e3 / tau_ms), gain, (-limit_out, limit), cap)
     # The paper does not say where the anchor is when the tip arrives; it has followed after 5 time constants.
     difference = numpy.abs(recording.force_n[rows] - wanted)[round(5 * tau_ms * 1e-3 / TICK_S) :]
     report.within("eq. 2 as printed: in, held, in, out", difference.max(), 0.005, "N")
     report.holds("eq. 2 as printed: the run reaches more than half of its limit", wanted.max() > 0.25, f"{wanted.max():.3f} N")
+    report.within("eq. 2, T_f_min: the least force on the way out", recording.force_n[rows].min() + limit_out, 0.005, "N")
 
 
 def check(device, report):

@@ -14,16 +14,18 @@ import time
 
 import anatomy
 import body
+import fem
 import paper_000
 import paper_001
 import paper_002
 import skew
+import xpbd
 from device import Device, Report
 
 
 def main(program):
     report, begun = Report(), time.monotonic()
-    for part in (paper_000, paper_001, paper_002, anatomy, body, skew):
+    for part in (paper_000, fem, paper_001, paper_002, anatomy, body, skew, xpbd):
         with tempfile.TemporaryDirectory() as folder:
             part.check(Device(program, folder), report)
     verdict = "pass" if report.failures == 0 else f"{report.failures} checks failed"

@@ -1,7 +1,7 @@
 //! The whole picture: built from a configuration, moved by a needle, read by whoever draws.
 
 use crate::configuration::{Configuration, Refusal};
-use crate::constraint::{Point, Tie, place};
+use crate::constraint::{Anchor, Point, Tie, place};
 use crate::lattice::{Extent, Lattice};
 use crate::needle::{Insertion, Needle, PunctureState, Punctures, Wall, WallName};
 use crate::solver::{Pace, Parts, Solver};
@@ -166,6 +166,11 @@ impl Tissue {
             .iter()
             .find_map(|lattice| lattice.anchor(rest))
             .map(|anchor| anchor.place(self.solver.points()))
+    }
+
+    /// Returns the place that the tip pushes in, if it has pierced nothing.
+    pub fn touched(&self) -> Option<Anchor> {
+        self.insertion.touched()
     }
 
     /// Returns the solver, for measurements.

@@ -243,6 +243,27 @@ impl Configuration {
         }
     }
 
+    /// Returns the tissue of Table 1 in a block as large as the default limb, with the outer faces of its layers at 0, `near_mm` and
+    /// `far_mm`, its end at `bottom_mm`, and walls that give way after `gives_mm`. Spacings and drag are scaled by `bottom_mm` over the
+    /// depth of the paper's block, so that they keep their ratios. None if the faces are not one below the other.
+    pub fn table_1(near_mm: f32, far_mm: f32, bottom_mm: f32, gives_mm: [f32; 3]) -> Option<Self> {
+        if !(near_mm > 0.0 && far_mm > near_mm && bottom_mm > far_mm) {
+            return None;
+        }
+        let mut layers = Self::paper_000().layers;
+        let depth_mm: f32 = layers.iter().map(|layer| layer.thickness_mm).sum();
+        let scale = bottom_mm / depth_mm;
+        let faces_mm = [0.0, near_mm, far_mm, bottom_mm];
+        for ((layer, faces), gives) in layers.iter_mut().zip(faces_mm.windows(2)).zip(gives_mm) {
+            layer.top_mm = faces[0];
+            layer.thickness_mm = faces[1] - faces[0];
+            layer.spacing_mm *= scale;
+            layer.drag_mm *= scale;
+            layer.gives_mm = gives.clamp(0.0, 30.0);
+        }
+        Some(Self { layers, vessel: None, ..Self::default() })
+    }
+
     /// Refuses what cannot be built, with the reason.
     pub(crate) fn check(&self) -> Result<(), Refusal> {
         let refuse = |what: String| Err(Refusal(what));

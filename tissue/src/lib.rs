@@ -15,6 +15,7 @@ pub mod configuration;
 pub mod constraint;
 mod lattice;
 pub mod needle;
+pub mod push;
 pub mod solver;
 mod tube;
 pub mod vector;

@@ -248,6 +248,10 @@ impl Insertion {
         self.walls.iter().map(|wall| (wall.name, wall.state, wall.indentation))
     }
 
+    pub(crate) fn touched(&self) -> Option<Anchor> {
+        self.walls.first().and_then(|wall| wall.touch).map(|(anchor, _)| anchor)
+    }
+
     /// Follows the needle to where it is now; `material` finds the tissue that was at a place at rest.
     pub(crate) fn follow(
         &mut self,

@@ -61,6 +61,19 @@ impl<C: Constraint + Copy> Group<C> {
         };
         self.constraints.iter().map(one).sum()
     }
+
+    /// Adds to `forces` what each constraint does to its particles, −C/α·∇C, µN.
+    fn push(&self, points: &[Point], forces: &mut [[f64; 3]]) {
+        for constraint in &self.constraints {
+            let (violation, compliance) = constraint.violation(points);
+            let tension = -f64::from(violation) / f64::from(compliance).max(1e-9);
+            constraint.slopes(points, |index, slope| {
+                for (sum, part) in forces[index as usize].iter_mut().zip(slope) {
+                    *sum += tension * f64::from(part);
+                }
+            });
+        }
+    }
 }
 
 /// The particles and constraints to simulate, before they move.
@@ -207,6 +220,16 @@ impl Solver {
             + self.ties.energy(&self.points)
     }
 
+    /// Returns the force of all constraints on each particle, µN: zero at rest, except where something holds it.
+    pub fn forces(&self) -> Vec<[f64; 3]> {
+        let mut forces = vec![[0.0; 3]; self.points.len()];
+        self.distances.push(&self.points, &mut forces);
+        self.volumes.push(&self.points, &mut forces);
+        self.bendings.push(&self.points, &mut forces);
+        self.ties.push(&self.points, &mut forces);
+        forces
+    }
+
     /// Returns the numbers of distances, volumes, bending angles and ties.
     pub fn counts(&self) -> [usize; 4] {
         [
@@ -230,5 +253,10 @@ impl Solver {
     /// The bending angles, for those who check them.
     pub fn bendings(&self) -> &[Bending] {
         &self.bendings.constraints
+    }
+
+    /// The ties between layers, for those who check them.
+    pub fn ties(&self) -> &[Tie] {
+        &self.ties.constraints
     }
 }

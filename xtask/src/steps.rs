@@ -150,13 +150,13 @@ fn board() -> Result<(), Failure> {
     shell::run(tests.args(["--test", "board"]))
 }
 
-/// Checks a page for accessibility, at the version that the page was checked with. MPL 2.0: it is used by the test only, and is no
-/// part of any product.
-const ACCESSIBILITY: [&str; 1] = ["axe-core@4.14.1"];
+/// Checks a page for accessibility (MPL 2.0), and emulates a headset (MIT), each at the version that the page was checked with. They are
+/// used by the tests only and are no part of any product.
+const IN_PAGES: [&str; 2] = ["axe-core@4.14.1", "iwer@2.5.0"];
 
 fn browser() -> Result<(), Failure> {
     setup::browser()?;
-    setup::node_packages(&ACCESSIBILITY)?;
+    setup::node_packages(&IN_PAGES)?;
     site::build()?;
     shell::run(tests().args(["--test", "page"]))
 }

@@ -28,8 +28,10 @@ pub enum FrictionLaw {
         anchor_ms: u16,
         /// K_f: force for each mm between needle and anchor at level 1.
         stiffness: Stiffness,
-        /// T_f_max = −T_f_min.
+        /// T_f_max, against a needle that goes in.
         limit: Newtons,
+        /// −T_f_min, against a needle that is drawn back: a magnitude.
+        limit_out: Newtons,
     },
     /// A clamped proxy: holds a resting needle, slips at the friction limit.
     Cone {
@@ -206,12 +208,13 @@ fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
     let layer = ground.configured as u8;
     let limit = ground.stiffest;
     match *law {
-        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit: force } => {
+        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit: force, limit_out } => {
             within(Field::LevelLength, level_length.0, milli(1_000), milli(1_000_000))?;
             within(Field::LevelCap, level_cap, milli(1_000), milli(32_000))?;
             within(Field::AnchorMs, I16F16::from_num(anchor_ms.min(30_000)), milli(5_000), milli(1_000_000))?;
             within(Field::FrictionStiffness, stiffness.0, milli(1), limit)?;
             within(Field::FrictionLimit, force.0, milli(1), ground.largest)?;
+            within(Field::FrictionLimitOut, limit_out.0, milli(1), ground.largest)?;
             let slope = law.hold();
             if slope > limit { Err(Refusal::TooStiff { layer, slope, limit }) } else { Ok(()) }
         }
@@ -225,12 +228,13 @@ fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
 
 fn plan_friction(law: &FrictionLaw) -> friction::Law {
     match *law {
-        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => friction::Law::Paper {
+        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => friction::Law::Paper {
             per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
             level_cap,
             follow: follow_share(anchor_ms),
             stiffness,
             limit,
+            least: Newtons(limit_out.0.saturating_neg()),
         },
         FrictionLaw::Cone { stiffness } => {
             friction::Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }

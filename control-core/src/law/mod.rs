@@ -137,6 +137,13 @@ macro_rules! laws {
         }
 
         impl Memory {
+            /// Depth counts from a surface that is displaced by so much along the needle, if the law can use it.
+            pub(crate) fn displace(&mut self, displacement: Millimetres) {
+                if let Memory::Xr(memory) = self {
+                    memory.displace(displacement);
+                }
+            }
+
             /// One tick of `law`, of which `plan` was made, with a needle that moves so, where `met` says what it has met.
             pub(crate) fn tick(
                 &mut self,

@@ -11,8 +11,10 @@
 
 mod cells;
 mod check;
+mod surface;
 
 use cells::{Cells, Gaps};
+use surface::Surface;
 
 use super::{Ground, Motion, Response, reach};
 use crate::anatomy::Insertion;
@@ -258,9 +260,15 @@ pub(crate) struct Memory {
     /// The knot that the tip was at.
     knot: usize,
     track: Track,
+    surface: Surface,
 }
 
 impl Memory {
+    /// Depth counts from a surface that is displaced by so much along the needle.
+    pub(crate) fn displace(&mut self, displacement: Millimetres) {
+        self.surface.follow(displacement);
+    }
+
     /// One tick with the tip at `depth` along the needle.
     pub(crate) fn tick(
         &mut self,
@@ -270,6 +278,7 @@ impl Memory {
         Motion { depth, speed, movement }: Motion,
     ) -> Response {
         let (fine, steady) = self.way.tick(depth, speed, plan.count);
+        let fine = Millimetres(fine.0.saturating_sub(self.surface.tick()));
         self.cells.follow(table, &plan.gaps, steady, met.angle());
         if depth.0 < met.top(0) {
             self.anchor.release(fine);

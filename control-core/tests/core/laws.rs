@@ -23,6 +23,7 @@ fn paper() -> FrictionLaw {
         anchor_ms: 60,
         stiffness: Stiffness(I16F16::from_num(0.5)),
         limit: Newtons(I16F16::from_num(1)),
+        limit_out: Newtons(I16F16::from_num(1)),
     }
 }
 
@@ -257,6 +258,22 @@ fn friction_opposes_withdrawal() {
         assert!(inwards > 0.03 && outwards < -0.03, "{law:?}: {inwards} N in, {outwards} N out");
         assert_eq!(state, State::Withdrawal as u8);
     }
+}
+
+#[test]
+fn equation_2_has_a_limit_of_its_own_on_the_way_out() {
+    let mut law = paper();
+    if let FrictionLaw::Paper { limit_out, .. } = &mut law {
+        limit_out.0 = I16F16::from_num(0.04);
+    }
+    let mut c = started(&Config {
+        patient: Patient { law: Law::Jog(law), ..Patient::default() },
+        ..Config::commissioned_virtual()
+    });
+    let (mut at, mut most, mut least) = (0.0, 0.0_f64, 0.0_f64);
+    travel(&mut c, &mut at, 5.0, 10.0, |o| most = most.max(o.force.0.to_num()));
+    travel(&mut c, &mut at, 4.2, 10.0, |o| least = least.min(o.force.0.to_num()));
+    assert!((least + 0.04).abs() < 1e-4 && most > 0.06, "{most} N in, {least} N out");
 }
 
 #[test]

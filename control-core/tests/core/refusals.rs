@@ -80,6 +80,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
             anchor_ms: 60,
             stiffness: Stiffness(q(0.5)),
             limit: Newtons(q(0.5)),
+            limit_out: Newtons(q(0.3)),
         };
         change(&mut law);
         config.patient.law = Law::Jog(law);
@@ -142,7 +143,7 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
             }
         }
     }
-    let papers: [(Field, ChangedLaw); 6] = [
+    let papers: [(Field, ChangedLaw); 7] = [
         (Field::LevelLength, |l| {
             if let FrictionLaw::Paper { level_length, .. } = l {
                 level_length.0 = q(0.9)
@@ -171,6 +172,11 @@ fn each_value_has_a_range_and_its_ends_belong_to_it() {
         (Field::FrictionLimit, |l| {
             if let FrictionLaw::Paper { limit, .. } = l {
                 limit.0 = q(2.9)
+            }
+        }),
+        (Field::FrictionLimitOut, |l| {
+            if let FrictionLaw::Paper { limit_out, .. } = l {
+                limit_out.0 = q(0.0)
             }
         }),
     ];
@@ -279,6 +285,7 @@ fn friction_as_printed_is_as_stiff_as_its_highest_level() {
                 anchor_ms: 60,
                 stiffness: Stiffness(q(1.0)),
                 limit: Newtons(q(0.5)),
+                limit_out: Newtons(q(0.5)),
             });
         })
     };

@@ -54,6 +54,29 @@ fn rising(depth: f64, speed: f64, angle: f64) -> f64 {
     0.1 * depth * (0.8 + 0.05 * speed) * (0.6 + 0.4 * angle)
 }
 
+/// The picture's surface moves in the tissue: the law counts depth from it, and from where it was at rest once the picture stands still.
+#[test]
+fn depth_may_count_from_a_displaced_surface() {
+    let config = config(table(rising));
+    let angle = ANGLES[2];
+    let expected = |mm: f64| rising(mm * (f64::from(angle) * 1e-3).sin(), 3.0, f64::from(angle) * 1e-3);
+    let mut needle = Needle::new(&config, Milliradians(angle));
+    needle.go(3.0, 3.0, |_| ());
+    let mut seen = [0.0; 2];
+    let mut ticks = 0;
+    while needle.at_mm < 9.0 {
+        if ticks % 160 == 0 {
+            needle.core.displace(Millimetres(q(1.5)));
+        }
+        ticks += 1;
+        let to = needle.at_mm + 3e-4;
+        needle.go(to + 1e-6, 3.0, |out| seen = [out.depth.0.to_num(), force(out)]);
+    }
+    assert!((seen[1] - expected(seen[0] - 1.5)).abs() < 0.01, "{seen:?}, wanted {}", expected(seen[0] - 1.5));
+    needle.go(10.0, 3.0, |out| seen = [out.depth.0.to_num(), force(out)]);
+    assert!((seen[1] - expected(seen[0])).abs() < 0.01, "{seen:?}, wanted {}", expected(seen[0]));
+}
+
 #[test]
 fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
     let config = config(table(rising));

@@ -219,11 +219,11 @@ fn a_cell_is_laid_out_as_it_always_was() {
     let words = &flash.words[Slot::A as usize];
     let (mut bytes, mut patients) = ([0; PAYLOAD_BYTES], [0; PAYLOAD_BYTES]);
     let length = postcard::to_slice(&device, &mut bytes).unwrap().len();
-    assert_eq!(words[0], 0xC0F1_5400 + length as u32);
+    assert_eq!(words[0], 0xC0F1_6400 + length as u32);
     assert_eq!((words[1], words[255]), (0, COMMITTED));
     assert_eq!(words[3].to_le_bytes(), bytes[..4]);
     let length = postcard::to_slice(&patient, &mut patients).unwrap().len();
-    assert_eq!((words[256], words[257]), (0xC0F1_5800 + length as u32, 1));
+    assert_eq!((words[256], words[257]), (0xC0F1_6800 + length as u32, 1));
     assert_eq!(words[259].to_le_bytes(), patients[..4]);
 }
 

@@ -5,6 +5,7 @@ mod measure;
 mod paper_000;
 mod paper_001;
 mod paper_002;
+mod table_1;
 
 use device_sim::failure::Failure;
 use html_report::{Cell, Sheet};

@@ -1,6 +1,7 @@
 //! Paper 000, layered tissue in extended reality: force against depth at its speeds and angles (Fig. 2), and Table 1.
 
 use super::measure::{Trace, is_contact_with, is_puncture_of};
+use super::table_1;
 use super::{Row, Whose, numbers, row};
 use control_core::config::Tissue;
 use device_sim::failure::Failure;
@@ -88,6 +89,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     let speed = |c: &Cut| format!("{} mm/s", c.speed);
     let angle = |c: &Cut| format!("{}°", c.angle);
     let no_data = "The paper did not measure this; the table is taken as separable there.";
+    let (svg, words) = table_1::side_by_side(dir)?;
     sheet.figures(&[
         (
             of(&|c| c.angle == 60, &speed, "Fig. 2 (a): 60°"),
@@ -99,12 +101,13 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         ),
         (of(&|c| c.angle == 45 && c.speed < 5, &speed, "45°, no data in the paper"), no_data.into()),
         (of(&|c| c.angle == 30 && c.speed < 5, &speed, "30°, no data in the paper"), no_data.into()),
+        (svg, words),
     ]);
     sheet.heading("Table 1");
     sheet.paragraph(
         "Constraints of the tissue's picture, as the paper prints them. It gives no unit to L₀, no compliance, no count of particles and no time \
          step; its bending values are rest angles. They are one of the configurations of the tissue picture (`paper_000` in the folder tissue), where L₀ is \
-         taken as metres between particles and V₀ as a share of the volume as built, and no part of the force.",
+         taken as metres between particles and V₀ as a share of the volume as built, and no part of the force unless one asks for it.",
     );
     let cells = |name: &str, values: [&str; 3]| {
         let mut row = vec![Cell::text(name)];
@@ -120,6 +123,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
             cells("Skin (bottom)", ["0.012; here 12 mm", "1.0", "180°"]),
         ],
     );
+    table_1::pushes(&mut sheet, dir)?;
     sheet.heading("What the paper leaves open");
     for words in [
         "The force function is “described in Figure 3”, which is a picture of a screen. Here the force is a table over depth, speed and angle, which fit-force fits to insertions.",

@@ -4,9 +4,12 @@ use super::measure::{Trace, is_puncture_of};
 use super::{Row, Whose, numbers, row};
 use control_core::TICK_HZ;
 use control_core::config::Tissue;
+use device_sim::device::part::DevicePart;
 use device_sim::failure::Failure;
 use device_sim::library::Text;
+use device_sim::plant::hand::Grip;
 use device_sim::plant::motor::Motor;
+use device_sim::plant::{Plant, PlantConfig};
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use html_report::chart::{Chart, Curve};
@@ -39,7 +42,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
          What it does not print is ours, from the sources in the patient's file.",
     );
     sheet.heading("Numbers");
-    numbers(&mut sheet, &rows(&cone, &injection, &with_cone, &as_printed));
+    numbers(&mut sheet, &rows(&cone, &injection, &with_cone, &as_printed)?);
     sheet.heading("Fig. 5 and the hold of eq. 2");
     sheet.figures(&[
         (profile_chart(&cone, &injection), "Fig. 5: elasticity of the skin, friction in the tissue between (the paper's muscle), elasticity of the vessel. Way in and way out; the paper's axes have no numbers.".into()),
@@ -47,8 +50,9 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     ]);
     sheet.heading("What the paper leaves open");
     for words in [
-        "24 V, 0.6 A and 28.8 mN·m do not belong to one of the RE25's windings: at 0.6 A the 24 V winding makes 14 mN·m, half of what the paper says. \
-         Here the torque is the paper's and the current follows from the winding; the amplifier must give it.",
+        "24 V, 0.6 A and 28.8 mN·m belong together in a motor of 48 mN·m for each ampere: run --device-config paper-001 has it, the RE25's copper wound with \
+         about twice the turns (an assumption). The 24 V winding of the RE25 as it is sold makes 14 mN·m at 0.6 A; the built-in device has it, gives the \
+         paper's torque, and takes the current that follows.",
         "P_curr_f is called the current position. Taken so, eq. 2 has no state; we read it as an anchor that follows the needle, and P_pre as the \
          anchor of the tick before, as the equation's last line sets it.",
         "S_f1 and S_f2 have no values, and from position to torque a factor is missing. Ours: S_f1 23 mm, S_f2 from a time constant of 50 ms, 0.25 N/mm.",
@@ -64,7 +68,7 @@ fn number(profile: &Profile, tissue: Tissue) -> Option<u8> {
     profile.config.patient.layers.iter().position(|l| l.tissue == tissue).map(|at| at as u8)
 }
 
-fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> Vec<Row> {
+fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> Result<Vec<Row>, Failure> {
     let device = &profile.config.device;
     let motor = Motor::re25(device.full_scale_torque.0.to_num::<f64>() * 1e-3);
     let newtons = |n: f64| format!("{} N", decimal(n, 2));
@@ -78,16 +82,7 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
         row("counts in a turn of the roller", "4000", device.counts_per_turn.to_string(), Whose::Papers),
         row("rate of the control loop", "10 kHz", format!("{} kHz", TICK_HZ / 1000), Whose::Papers),
         row("supply of the motor", "24 V", format!("{} V", decimal(motor.supply, 0)), Whose::Papers),
-        row(
-            "current of the motor at that torque",
-            "0.6 A",
-            format!(
-                "{} A: the RE25's 24 V winding makes {} mN·m for each ampere",
-                decimal(device.full_scale_torque.0.to_num::<f64>() * 1e-3 / motor.torque_constant, 2),
-                decimal(motor.torque_constant * 1e3, 1)
-            ),
-            Whose::Papers,
-        ),
+        row("current of the motor at that torque", "0.6 A", currents(profile)?, Whose::Papers),
         row(
             "radius of the roller",
             "“an acceptable range of encoder resolution”",
@@ -126,7 +121,32 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
         let said = format!("{} at first, {} after {} s", at(begin), at(end - tenth), decimal(rested_s, 1));
         rows.push(row(&format!("force on a needle held still, {law}"), "–", said, Whose::NoneGiven));
     }
-    rows
+    Ok(rows)
+}
+
+/// The current that the plant takes for the torque at full scale while a hand holds the needle: with the paper's motor and with the built-in
+/// device's.
+fn currents(profile: &Profile) -> Result<String, Failure> {
+    let device = &profile.config.device;
+    let paper = DevicePart::read(Path::new("paper-001"))?;
+    let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;
+    let radius_m = device.roller_radius.0.to_num::<f64>() * 1e-3;
+    let usual = PlantConfig::new(radius_m, device.counts_per_turn, full_scale);
+    let motors = [paper.winding.map_or(usual.motor, |winding| winding.motor(full_scale)), usual.motor];
+    let [papers, built_in] = motors.map(|motor| {
+        let grip = Grip { stiffness_n_per_m: 4_000.0, damping_n_s_per_m: 20.0, tremor_rms_m: 0.0, seed: 0 };
+        let mut plant = Plant::new(PlantConfig { motor, ..usual }, grip, 0.0);
+        for _ in 0..TICK_HZ {
+            plant.tick(1.0, true, Some((0.0, 0.0)));
+        }
+        let constant = decimal(motor.torque_constant * 1e3, 1);
+        format!(
+            "{} A for {} mN·m with {constant} mN·m/A",
+            decimal(plant.current(), 2),
+            decimal(plant.torque() * 1e3, 1)
+        )
+    });
+    Ok(format!("{papers} (the device paper-001); {built_in} (the built-in device: the RE25's 24 V winding)"))
 }
 
 /// When the needle is held still: from when it has come to rest until it is drawn back.

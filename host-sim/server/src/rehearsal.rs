@@ -20,10 +20,24 @@ use std::sync::atomic::AtomicBool;
 
 /// One round of `procedure` on `profile`, recorded in `file`, and read from there.
 pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
+    record_with(profile, procedure, file, false)
+}
+
+/// The same with depth counted from the surface of the deformed tissue.
+pub fn record_deformed(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
+    record_with(profile, procedure, file, true)
+}
+
+fn record_with(
+    profile: &Profile,
+    procedure: Procedure,
+    file: &Path,
+    is_deformed: bool,
+) -> Result<Recording, Failure> {
     let (_, publisher) = session::open(profile.scene(Source::Virtual, Some(procedure.name.clone())));
     let setup = Setup {
         program: recording::version::program(),
-        source: "virtual".into(),
+        source: if is_deformed { "virtual, depth from the deformed tissue" } else { "virtual" }.into(),
         profile_toml: profile.source.text.clone(),
         profile_origin: profile.source.origin.clone(),
         procedure: Some(procedure.name.clone()),
@@ -36,6 +50,7 @@ pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Re
     let stop = AtomicBool::new(false);
     let driver = Driver::new(profile.config.patient.clone());
     let device = VirtualDevice::new(profile, procedure);
+    let device = if is_deformed { device.with_deformed(profile)? } else { device };
     Station::new(driver, outlets, &stop).run_in_step(device, Pace::Free, |_| {})?;
     Recording::read(file)
 }

@@ -54,8 +54,8 @@ pub(crate) struct Run {
     /// host-sim/profiles; without it, adult, or the default one of --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// The device's construction: a TOML file as commissioning writes it; without it, a real device keeps its own
-    #[arg(long, value_name = "FILE")]
+    /// The device's construction: a TOML file as commissioning writes it, or paper-001; without it, a real device keeps its own
+    #[arg(long, value_name = "NAME|FILE")]
     device_config: Option<PathBuf>,
     /// The force law; the patient must use the same
     #[arg(long, value_enum)]
@@ -63,6 +63,10 @@ pub(crate) struct Run {
     /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the patient's
     #[arg(long, value_name = "DEG")]
     angle: Option<f64>,
+    /// On a virtual device with the law xr: count depth from the surface of the deformed tissue (Table 1 of paper 000) instead
+    /// of from where it was at rest
+    #[arg(long)]
+    deformed: bool,
     /// Serve no page; a real device is then started at once
     #[arg(long)]
     headless: bool,
@@ -145,7 +149,11 @@ impl Run {
         let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
         let setup = Setup {
             program: recording::version::program(),
-            source: self.device.clone(),
+            source: if self.deformed {
+                "virtual, depth from the deformed tissue".into()
+            } else {
+                self.device.clone()
+            },
             profile_toml: profile.source.text.clone(),
             profile_origin: profile.source.origin.clone(),
             procedure: shown_procedure,
@@ -179,8 +187,10 @@ impl Run {
         let outcome = match &mut serial {
             Some(port) => station.run_in_real_time(port, seconds, progress)?,
             None => {
-                let mut device =
-                    VirtualDevice::held(&profile, procedure, part.as_ref().and_then(|part| part.grip));
+                let mut device = VirtualDevice::built(&profile, procedure, part.as_ref());
+                if self.deformed {
+                    device = device.with_deformed(&profile)?;
+                }
                 if !self.fast {
                     device.take_times();
                 }
@@ -217,6 +227,11 @@ impl Run {
         self.class.check()?;
         if self.angle.is_some() && self.device != "virtual" {
             return Err(Failure::input("--angle is for the virtual device: a hand turns a real needle"));
+        }
+        if self.deformed && self.device != "virtual" {
+            return Err(Failure::input(
+                "--deformed is for the virtual device: the board takes no surface from a PC that may stall",
+            ));
         }
         if self.fast && self.device != "virtual" {
             return Err(Failure::input("--fast is for the virtual device: a real one runs in real time"));

@@ -1,8 +1,11 @@
 //! The plant against mechanics on paper: energy, terminal speed, slip above the grip, weight, sameness.
 
+use device_sim::device::part::DevicePart;
 use device_sim::plant::bearing::Bearing;
 use device_sim::plant::hand::Grip;
+use device_sim::plant::motor::Motor;
 use device_sim::plant::{GRAVITY, Plant, PlantConfig};
+use std::path::Path;
 
 const NO_HAND: Grip = Grip { stiffness_n_per_m: 0.0, damping_n_s_per_m: 0.0, tremor_rms_m: 0.0, seed: 0 };
 const FREE: Bearing = Bearing { viscous: 0.0, coulomb: 0.0, breakaway: 0.0 };
@@ -46,6 +49,27 @@ fn a_free_roller_settles_where_friction_balances_the_torque() {
     }
     let expected = (share * 0.0288 - 4.0e-4) / 1.2e-6;
     assert!((plant.speed() / expected - 1.0).abs() < 1e-3, "{} rad/s, on paper {expected}", plant.speed());
+}
+
+/// Paper 001: 24 V, 0.6 A, 28.8 mN·m. The hand holds the needle, and the amplifier gives all that it has.
+#[test]
+fn the_papers_motor_takes_its_current_for_its_torque() {
+    let part = DevicePart::read(Path::new("paper-001")).expect("it comes with the program");
+    let winding = part.winding.expect("it has one");
+    let held = |motor: Motor| {
+        let grip = Grip { stiffness_n_per_m: 4_000.0, damping_n_s_per_m: 20.0, ..NO_HAND };
+        let mut plant = Plant::new(PlantConfig { motor, ..config() }, grip, 0.0);
+        for _ in 0..5_000 {
+            plant.tick(1.0, true, Some((0.0, 0.0)));
+        }
+        (plant.current(), plant.torque() * 1e3, plant.hand_force())
+    };
+    let (current, torque, force) = held(winding.motor(0.0288));
+    assert!((current - 0.6).abs() < 1e-3 && (torque - 28.8).abs() < 0.02, "{current} A, {torque} mN·m");
+    // 28.8 mN·m on a roller of 10 mm; the bearing's friction holds the rest.
+    assert!((force + 2.88).abs() < 0.1, "{force} N");
+    let (current, torque, _) = held(config().motor);
+    assert!((current - 1.231).abs() < 2e-3 && (torque - 28.8).abs() < 0.02, "{current} A, {torque} mN·m");
 }
 
 #[test]

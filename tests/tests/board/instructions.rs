@@ -141,6 +141,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
         anchor_ms: 60,
         stiffness: Stiffness(q(0.5)),
         limit: Newtons(q(1.0)),
+        limit_out: Newtons(q(0.8)),
     };
     let cone = FrictionLaw::Cone { stiffness: Stiffness(q(0.5)) };
     let sticking = FrictionLaw::StickSlip { stiffness: Stiffness(q(0.5)), sliding: q(0.5) };

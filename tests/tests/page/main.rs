@@ -7,6 +7,7 @@ mod body;
 mod browser;
 mod graphics;
 mod guide;
+mod headset;
 mod layout;
 mod needle;
 mod patient;

@@ -63,14 +63,16 @@ fn limits(device: Device) -> impl Strategy<Value = SafetyConfig> {
 }
 
 fn friction(stiffest: f64, strongest: f64) -> impl Strategy<Value = FrictionLaw> {
-    let paper = (1.0..200.0_f64, 1.0..8.0_f64, 5..1_000_u16, 0.01..0.9_f64, 0.01..0.9_f64);
-    let paper = paper.prop_map(move |(length, cap, anchor_ms, share, limit)| FrictionLaw::Paper {
-        level_length: Millimetres(q(length)),
-        level_cap: q(cap),
-        anchor_ms,
-        stiffness: Stiffness(q((stiffest * share / cap).max(0.001))),
-        limit: Newtons(q((strongest * limit).max(0.001))),
-    });
+    let paper = (1.0..200.0_f64, 1.0..8.0_f64, 5..1_000_u16, 0.01..0.9_f64, [0.01..0.9_f64, 0.01..0.9_f64]);
+    let paper =
+        paper.prop_map(move |(length, cap, anchor_ms, share, [limit, limit_out])| FrictionLaw::Paper {
+            level_length: Millimetres(q(length)),
+            level_cap: q(cap),
+            anchor_ms,
+            stiffness: Stiffness(q((stiffest * share / cap).max(0.001))),
+            limit: Newtons(q((strongest * limit).max(0.001))),
+            limit_out: Newtons(q((strongest * limit_out).max(0.001))),
+        });
     let cone = (0.1..0.6_f64)
         .prop_map(move |share| FrictionLaw::Cone { stiffness: Stiffness(q((stiffest * share).max(0.05))) });
     prop_oneof![paper, cone]

@@ -264,12 +264,12 @@ impl Twin {
         }
         let Law::Jog(friction) = self.config.patient.law else { panic!("the jog law's twin") };
         match friction {
-            FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit } => {
+            FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => {
                 let follow = 1.0 - (-0.1 / f64::from(anchor_ms)).exp();
                 self.anchor += (depth - self.anchor) * follow;
                 let level = ((depth - entry) / level_length.0.to_num::<f64>()).exp().min(level_cap.to_num());
-                let limit = limit.0.to_num::<f64>();
-                ((depth - self.anchor) * level * stiffness.0.to_num::<f64>()).clamp(-limit, limit)
+                let [most, least] = [limit.0.to_num::<f64>(), -limit_out.0.to_num::<f64>()];
+                ((depth - self.anchor) * level * stiffness.0.to_num::<f64>()).clamp(least, most)
             }
             FrictionLaw::StickSlip { .. } => {
                 panic!("`laws.rs` tests it: when a needle slips is a matter of a last place")

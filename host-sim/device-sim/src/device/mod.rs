@@ -1,9 +1,11 @@
 //! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial port.
 
 pub mod compensated;
+mod deformed;
 pub mod grip;
 pub mod part;
 pub mod virtual_device;
+pub mod winding;
 
 use std::io;
 use std::time::Duration;

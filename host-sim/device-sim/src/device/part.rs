@@ -4,6 +4,7 @@
 
 use super::compensated::Compensated;
 use super::grip::Grip;
+use super::winding::Winding;
 use crate::failure::Failure;
 use crate::library::{self, Text};
 use crate::profile::fix;
@@ -16,6 +17,9 @@ use link::commissioning::Record;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// The devices that come with the program, by name.
+const BUILT_IN: [(&str, &str); 1] = [("paper-001", include_str!("../../../devices/paper-001.toml"))];
+
 /// A device's part from a file.
 #[derive(Clone, Debug)]
 pub struct DevicePart {
@@ -27,14 +31,16 @@ pub struct DevicePart {
     seal: Option<u32>,
     /// The force that its rollers hold, if measured.
     pub grip: Option<Grip>,
+    /// The winding of its motor, if not the built-in one.
+    pub winding: Option<Winding>,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
 
 impl DevicePart {
-    /// Reads a file.
+    /// Reads a file, or one that comes with the program by its name.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        Self::parse(library::find("device", &path.display().to_string(), &[])?)
+        Self::parse(library::find("device", &path.display().to_string(), &BUILT_IN)?)
     }
 
     /// Checks the text of one.
@@ -46,7 +52,7 @@ impl DevicePart {
         }
         let device = file.device().map_err(refuse)?;
         Plan::new(&device, &Patient::nobody()).map_err(|why| refuse(why.to_string()))?;
-        Ok(Self { name: file.name, device, seal: file.seal, grip: file.grip, source })
+        Ok(Self { name: file.name, device, seal: file.seal, grip: file.grip, winding: file.motor, source })
     }
 
     /// The command that gives it to a device.
@@ -82,6 +88,7 @@ struct File {
     mechanism: Moving,
     compensation: Option<Compensated>,
     grip: Option<Grip>,
+    motor: Option<Winding>,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -188,6 +195,9 @@ impl File {
         if let Some(grip) = self.grip {
             grip.bound(&mut device, self.limits.torque_mnm)?;
         }
+        if let Some(winding) = self.motor {
+            winding.check(&device)?;
+        }
         Ok(device)
     }
 
@@ -234,6 +244,8 @@ impl File {
             },
             // It is the ceiling of torque that a device keeps of it.
             grip: None,
+            // A device knows its torque at full scale and no current.
+            motor: None,
             compensation: device.compensation.is_some().then(|| Compensated::new(&device.compensation)),
         }
     }

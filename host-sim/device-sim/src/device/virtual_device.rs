@@ -1,7 +1,10 @@
 //! The device without the hardware: the control core, tick by tick, against the plant, behind the same end of the link that
 //! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
 
+use super::deformed::Deformed;
 use super::grip::Grip;
+use super::part::DevicePart;
+use crate::failure::Failure;
 use crate::plant::{Plant, PlantConfig};
 use crate::procedure::{Procedure, Target};
 use crate::profile::Profile;
@@ -62,16 +65,18 @@ pub struct VirtualDevice {
     powered_before: bool,
     timing: Timing,
     timed: bool,
+    /// Tissue from whose surface depth counts, by choice.
+    deformed: Option<Deformed>,
 }
 
 impl VirtualDevice {
     /// Powered down, the needle where `procedure` begins, the device configured as it leaves the bench: with the defaults.
     pub fn new(profile: &Profile, procedure: Procedure) -> Self {
-        Self::held(profile, procedure, None)
+        Self::built(profile, procedure, None)
     }
 
-    /// The same, with rollers that let the needle slip at another force than usual.
-    pub fn held(profile: &Profile, procedure: Procedure, grip: Option<Grip>) -> Self {
+    /// The same, with the rollers' grip and the motor's winding that a device's file gives.
+    pub fn built(profile: &Profile, procedure: Procedure, part: Option<&DevicePart>) -> Self {
         let device = &profile.config.device;
         // A device that is too weak for the default patient waits for the one that it is for.
         let plan = Plan::new(device, &Patient::default()).unwrap_or_else(|_| profile.plan.clone());
@@ -80,8 +85,14 @@ impl VirtualDevice {
             device.counts_per_turn,
             device.full_scale_torque.0.to_num::<f64>() * 1e-3,
         );
-        let mechanism =
-            PlantConfig { grip_force: grip.map_or(mechanism.grip_force, Grip::slips_at_n), ..mechanism };
+        let grip = part.and_then(|part| part.grip);
+        let winding = part.and_then(|part| part.winding);
+        let mechanism = PlantConfig {
+            grip_force: grip.map_or(mechanism.grip_force, Grip::slips_at_n),
+            motor: winding
+                .map_or(mechanism.motor, |winding| winding.motor(mechanism.motor.full_scale_torque)),
+            ..mechanism
+        };
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
         plant.set_tilt(procedure.entry_rad.unwrap_or(profile.entry_rad) + profile.skin_tilt_rad());
         Self {
@@ -103,7 +114,15 @@ impl VirtualDevice {
             procedure,
             timing: Timing::default(),
             timed: false,
+            deformed: None,
         }
+    }
+
+    /// Lets the law count depth from the surface of the deformed tissue instead of from where it was at rest: the law xr, on a patient with
+    /// a vessel and its far wall.
+    pub fn with_deformed(self, profile: &Profile) -> Result<Self, Failure> {
+        let deformed = Deformed::new(profile).map_err(Failure::input)?;
+        Ok(Self { deformed: Some(deformed), ..self })
     }
 
     /// The plant behind it.
@@ -170,6 +189,9 @@ impl VirtualDevice {
         self.enable = output.enable;
         self.tripped = output.tripped.or(self.tripped);
         self.endpoint.record(self.tick, &output);
+        if let Some(displacement) = self.deformed.as_mut().and_then(|tissue| tissue.follow(&output)) {
+            self.controller.displace(displacement);
+        }
         if self.enable && !self.powered_before && !matches!(self.hand, Hand::Drag { .. }) {
             // The scripted hand waits for a person to start the device; a person who holds the needle goes on holding it.
             self.restart_script();

@@ -187,6 +187,11 @@ impl Plant {
         self.hand_force
     }
 
+    /// Current of the motor, A.
+    pub fn current(&self) -> f64 {
+        self.torque() / self.config.motor.torque_constant
+    }
+
     /// Torque of the motor, N·m.
     pub fn torque(&self) -> f64 {
         self.amplifier.torque(&self.config.motor)

@@ -127,9 +127,22 @@ enum Depths {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "law", rename_all = "kebab-case")]
 pub(super) enum Friction {
-    Paper { level_length_mm: f64, level_cap: f64, anchor_ms: u16, stiffness_n_per_mm: f64, limit_n: f64 },
-    Cone { stiffness_n_per_mm: f64 },
-    StickSlip { stiffness_n_per_mm: f64, sliding: f64 },
+    Paper {
+        level_length_mm: f64,
+        level_cap: f64,
+        anchor_ms: u16,
+        stiffness_n_per_mm: f64,
+        limit_n: f64,
+        /// T_f_min as a magnitude; that of T_f_max if left out.
+        limit_out_n: Option<f64>,
+    },
+    Cone {
+        stiffness_n_per_mm: f64,
+    },
+    StickSlip {
+        stiffness_n_per_mm: f64,
+        sliding: f64,
+    },
 }
 
 /// `cutting` of a layer.
@@ -343,15 +356,21 @@ impl Forces {
 impl Friction {
     fn law(&self) -> Result<FrictionLaw, String> {
         Ok(match *self {
-            Friction::Paper { level_length_mm, level_cap, anchor_ms, stiffness_n_per_mm, limit_n } => {
-                FrictionLaw::Paper {
-                    level_length: Millimetres(fix("level_length_mm", level_length_mm)?),
-                    level_cap: fix("level_cap", level_cap)?,
-                    anchor_ms,
-                    stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?),
-                    limit: Newtons(fix("limit_n", limit_n)?),
-                }
-            }
+            Friction::Paper {
+                level_length_mm,
+                level_cap,
+                anchor_ms,
+                stiffness_n_per_mm,
+                limit_n,
+                limit_out_n,
+            } => FrictionLaw::Paper {
+                level_length: Millimetres(fix("level_length_mm", level_length_mm)?),
+                level_cap: fix("level_cap", level_cap)?,
+                anchor_ms,
+                stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?),
+                limit: Newtons(fix("limit_n", limit_n)?),
+                limit_out: Newtons(fix("limit_out_n", limit_out_n.unwrap_or(limit_n))?),
+            },
             Friction::Cone { stiffness_n_per_mm } => {
                 FrictionLaw::Cone { stiffness: Stiffness(fix("stiffness_n_per_mm", stiffness_n_per_mm)?) }
             }

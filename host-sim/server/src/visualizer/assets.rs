@@ -59,6 +59,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/slider.js", "slider.js", SCRIPT),
     asset!("/body.js", "body.js", SCRIPT),
     asset!("/bytes.js", "bytes.js", SCRIPT),
+    asset!("/headset.js", "headset.js", SCRIPT),
     asset!("/picture.js", "picture.js", SCRIPT),
     asset!("/limb_shapes.js", "limb_shapes.js", SCRIPT),
     asset!("/limb_webgl.js", "limb_webgl.js", SCRIPT),
