@@ -248,6 +248,11 @@ impl Picture {
         self.probe = Probe { centre_mm, azimuth, lean: lean + slope, ..self.probe }.checked();
     }
 
+    /// Returns the probe as it is held.
+    pub fn probe(&self) -> &Probe {
+        &self.probe
+    }
+
     /// Returns the depth of the skin at a place along and across, mm, and, on a body, the lean that makes a probe of this turn stand
     /// upright on it, rad.
     pub fn on_skin(&self, [along_mm, across_mm]: [f32; 2], azimuth: f32) -> [f32; 2] {
