@@ -1,6 +1,7 @@
 // The second view of the picture: limb in three dimensions and ultrasound, started only when somebody looks at it.
 
 import { Headset } from "./headset.js";
+import { t } from "./language.js";
 import { WebGl } from "./limb_webgl.js";
 import { WebGpu } from "./limb_webgpu.js";
 import { Picture } from "./picture.js";
@@ -52,7 +53,7 @@ export class BodyView {
       this.picture = picture;
       if (this.scene) this.build();
     } catch (error) {
-      byId("body-note").textContent = `Cannot be drawn here: ${error.message}`;
+      byId("body-note").textContent = t("picture.cannot", { cause: error.message });
     }
   }
 
@@ -99,7 +100,7 @@ export class BodyView {
     const angle = this.scene.tilt_rad - this.scene.skin_tilt_rad;
     const table1 = this.model.value === "table-1";
     if (!this.picture.build(this.scene, angle, table1)) {
-      byId("body-note").textContent = "This anatomy cannot be drawn";
+      byId("body-note").textContent = t("picture.no_anatomy");
       return;
     }
     byId("body-note").textContent = "";

@@ -3,8 +3,8 @@
 // What arrives was said by other computers: it is written as text and drawn as numbers, and a card that cannot be drawn says so.
 
 import { colours } from "./canvas.js";
+import { number } from "./language.js";
 import { Link } from "./link.js";
-import { number } from "./panel.js";
 import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
 

@@ -1,46 +1,42 @@
 // What has happened, in words, newest first.
 
-import { number } from "./panel.js";
-import { taskWords } from "./tasks.js";
+import { capital, number, said, t, taskName, tissueName } from "./language.js";
 
 const LONGEST_LIST = 80;
-
-const article = (name) => `the ${name}`;
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** " at 3.0 mm, 1.0 N", as much of it as is known. */
 function where(event, withForce) {
   const parts = [];
   if (event.depth_mm !== null) parts.push(`${number(event.depth_mm, 1)}\u00a0mm`);
   if (withForce && event.force_n !== null) parts.push(`${number(event.force_n, 2)}\u00a0N`);
-  return parts.length ? ` at ${parts.join(", ")}` : "";
+  return parts.length ? t("event.at", { what: parts.join(t("event.and")) }) : "";
 }
 
 /** An event as a person would say it; null for one that is shown elsewhere. */
 export function words(event, layers) {
-  const name = layers[event.layer]?.name ?? "layer";
+  const name = tissueName(layers[event.layer]?.name ?? "layer");
   switch (event.kind) {
-    case "contact": return `Tip touches ${article(name)}${where(event, false)}`;
-    case "puncture": return `${capital(name)} punctured${where(event, true)}`;
-    case "flashback": return "Flashback: blood shows in the hub";
-    case "far_wall": return "Through the far wall of the vessel";
-    case "in_track": return `Through ${article(name)} in the needle's own track`;
-    case "barrier": return "Turned further than the tissue allows";
-    case "vessel": return `Needle in ${article(name)}`; // comes with its puncture
-    case "task": return taskWords(event.name);
-    case "exit": return `Needle out of ${article(name)}`;
-    case "fault": return `Fault, torque off: ${event.cause}`;
-    case "not_saved": return capital(event.cause);
-    case "started": return "Started, torque fades in";
-    case "stopped": return "Stopped, torque off";
+    case "contact": return capital(t("event.contact", { name, where: where(event, false) }));
+    case "puncture": return capital(t("event.puncture", { name, where: where(event, true) }));
+    case "flashback": return t("event.flashback");
+    case "far_wall": return t("event.far_wall");
+    case "in_track": return capital(t("event.in_track", { name }));
+    case "barrier": return t("event.barrier");
+    case "vessel": return t("event.vessel", { name }); // comes with its puncture
+    case "task": return capital(taskName(event.name));
+    case "exit": return capital(t("event.exit", { name }));
+    case "fault": return t("event.fault", { cause: said(event.cause) });
+    case "not_saved": return capital(said(event.cause));
+    case "started": return t("event.started");
+    case "stopped": return t("event.stopped");
     default: return null; // limits have lamps
   }
 }
 
 /** Seconds of the device's clock as minutes and seconds. */
-export function clock(t) {
-  const minutes = Math.floor(t / 60);
-  return `${minutes}:${(t - 60 * minutes).toFixed(1).padStart(4, "0")}`;
+export function clock(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${number(seconds - 60 * minutes, 1).padStart(4, "0")}`;
 }
 
 export class EventList {

@@ -1,13 +1,15 @@
 // What a person does: takes the needle by mouse, finger or arrow keys, starts, stops, gives it back to the demo, sets its zero, turns it.
 
+import { number, t } from "./language.js";
+
 /** Arrow keys move the hand so far, with Shift ten times. */
 const KEY_STEP_MM = 0.2;
 /** The limit to which the hand may draw the tip back from the entry point; inwards the limit is the hub on the skin. */
 const DRAWN_BACK_MM = -15;
 /** The elements that use the space bar themselves. */
 const CONTROLS = "button, input, select, textarea, summary, a";
-/** A phone has none. */
-const KEYS = matchMedia("(any-pointer: fine)").matches ? ", or arrow keys" : "";
+/** A phone has no keys. */
+const HELD = matchMedia("(any-pointer: fine)").matches ? "hand.held_keys" : "hand.held";
 /** The server hears of a new hand a little later; until then what it says of the old one does not count. */
 const NEWS_MS = 500;
 
@@ -67,11 +69,10 @@ export class Hand {
   /** A recording has no torque: the same two buttons play and pause it. */
   nameButtons(recording) {
     const [start, stop] = [document.getElementById("start"), document.getElementById("stop")];
-    start.textContent = recording ? "Play" : "Start";
-    start.title = recording ? "The recording goes on" : "Amplifier on; torque fades in";
-    stop.firstChild.data = recording ? "Pause" : "Stop";
-    const what = recording ? "The recording pauses" : "Torque off at once";
-    stop.title = `${what}: Escape, or Space while no control has the focus`;
+    start.textContent = t(recording ? "start.play" : "start.start");
+    start.title = t(recording ? "start.play_title" : "start.title");
+    stop.firstChild.data = t(recording ? "stop.pause" : "stop.stop");
+    stop.title = t(recording ? "stop.pause_title" : "stop.title");
   }
 
   /** Takes the server's message of who moves the needle, and its position. */
@@ -89,8 +90,8 @@ export class Hand {
 
   say() {
     this.demo.disabled = !this.person;
-    let text = this.source === "recording" ? "Recording" : "Moved by hand, on the device";
-    if (this.movable) text = this.person ? `You hold it: drag${KEYS}` : "Demo: drag to take it";
+    let text = t(this.source === "recording" ? "hand.recording" : "hand.device");
+    if (this.movable) text = t(this.person ? HELD : "hand.demo");
     if (this.note.textContent !== text) this.note.textContent = text;
   }
 
@@ -100,7 +101,7 @@ export class Hand {
     this.unsent = false;
     this.link.send({ do: "drag", depth_mm: Math.round(this.depth * 1000) / 1000 });
     this.canvas.setAttribute("aria-valuenow", this.depth.toFixed(1));
-    this.canvas.setAttribute("aria-valuetext", `${this.depth.toFixed(1)} millimetres along the needle`);
+    this.canvas.setAttribute("aria-valuetext", t("hand.value", { mm: number(this.depth, 1) }));
   }
 
   want(depth) {

@@ -1,6 +1,7 @@
 // The three-dimensional view in a headset (WebXR): the same limb and needle, drawn once for each eye. Its button is shown only where
 // the browser has a headset. Nothing here moves the needle: that is the device's, or the hand's at the page.
 
+import { t } from "./language.js";
 import { WebGl } from "./limb_webgl.js";
 import { multiply } from "./limb_shapes.js";
 import { Tissue3d } from "./tissue3d.js";
@@ -22,7 +23,7 @@ export class Headset {
     Object.assign(this, { button, colours, step, built });
     this.session = null;
     this.frames = 0;
-    button.addEventListener("click", () => this.toggle().catch((error) => this.say(`No headset: ${error.message}`)));
+    button.addEventListener("click", () => this.toggle().catch((error) => this.say(t("picture.headset_none", { error: error.message }))));
     navigator.xr?.addEventListener?.("devicechange", () => this.offer());
     this.offer();
   }
@@ -50,14 +51,14 @@ export class Headset {
     this.space = await session.requestReferenceSpace("local");
     this.session = session;
     this.build();
-    this.say("Leave the headset");
+    this.say(t("picture.headset_leave"));
     this.last = NaN;
     session.requestAnimationFrame((now, frame) => this.draw(now, frame));
   }
 
   ended() {
     this.session = this.limb = null;
-    this.say("Headset");
+    this.say(t("picture.headset"));
   }
 
   /** Another anatomy. */

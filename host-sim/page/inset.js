@@ -1,11 +1,12 @@
 // The vessel cut across, at the top right of the section: an ellipse with its wall, the needle's tip in it or beside it, and that in
 // words.
 
+import { t } from "./language.js";
+
 const WORDS = {
-  outside: "Outside the vessel", touching: "Touching the vessel", in_lumen: "In the lumen", through: "Through the far wall",
-  beside: "Beside the vessel",
+  outside: "inset.outside", touching: "inset.touching", in_lumen: "inset.in_lumen", through: "inset.through", beside: "inset.beside",
 };
-const SHORT = { ...WORDS, outside: "Outside", touching: "Touching", through: "Through", beside: "Beside" };
+const SHORT = { ...WORDS, outside: "inset.short_outside", touching: "inset.short_touching", through: "inset.short_through" };
 const WORDS_HIGH = 22;
 
 /** Draws it `wide` CSS pixels wide and at most `high` tall, with its right edge at `right`. */
@@ -45,7 +46,8 @@ export function drawInset(g, colours, { right, wide, high }, tissue, tipDepth, n
   g.font = `600 12px ${colours.font}`;
   g.textAlign = "center";
   g.textBaseline = "middle";
-  g.fillText((narrow ? SHORT : WORDS)[tissue.place] ?? "", left + wide / 2, top + high - 10);
+  const words = (narrow ? SHORT : WORDS)[tissue.place];
+  if (words) g.fillText(t(words), left + wide / 2, top + high - 10, wide - 6);
   g.restore();
   g.strokeStyle = colours.line;
   g.lineWidth = 1;

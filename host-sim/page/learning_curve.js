@@ -3,6 +3,7 @@
 // 20 % was found acceptable there for arterial cannulation; as there, twice as much is not.
 
 import { surface } from "./canvas.js";
+import { t } from "./language.js";
 
 const ACCEPTABLE = 0.2;
 const UNACCEPTABLE = 0.4;
@@ -41,8 +42,8 @@ export class LearningCurve {
     this.attempts = attempts;
     const { context: g, width, height, canvas } = this.surface;
     const { sums, mark, passedAfter } = cumulativeSum(attempts.map((one) => one.reached));
-    const words = passedAfter ? `passed after ${passedAfter} attempts` : `${attempts.length} attempts, not passed yet`;
-    canvas.setAttribute("aria-label", `Learning curve, a cumulative sum: ${words}`);
+    const words = passedAfter ? t("practice.passed", { count: passedAfter }) : t("practice.not_passed", { count: attempts.length });
+    canvas.setAttribute("aria-label", t("practice.curve_label", { words }));
     const [low, high] = [Math.min(mark, ...sums) - 0.3, Math.max(0, ...sums) + 0.3];
     const [left, right, top, bottom] = [6, width - 6, 18, height - 6];
     const x = (i) => left + ((right - left) * i) / Math.max(sums.length, 10);
@@ -71,11 +72,11 @@ export class LearningCurve {
     g.fillStyle = this.colours.muted;
     g.textBaseline = "top";
     g.textAlign = "left";
-    const title = `Learning curve: ${words}`;
-    g.fillText(left + g.measureText(title).width < right ? title : words, left, 2);
+    const title = t("practice.curve_title", { words });
+    g.fillText(left + g.measureText(title).width < right ? title : words, left, 2, right - left);
     g.textAlign = "right";
     g.textBaseline = "bottom";
     g.fillStyle = this.colours.depth;
-    g.fillText("pass mark", right, y(mark) - 2);
+    g.fillText(t("practice.pass_mark"), right, y(mark) - 2);
   }
 }

@@ -4,6 +4,7 @@ import { BodyView } from "./body.js";
 import { colours } from "./canvas.js";
 import { EventList } from "./events.js";
 import { Hand } from "./hand.js";
+import { begin, t, tissueName } from "./language.js";
 import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PatientEditor } from "./patient.js";
@@ -18,6 +19,8 @@ import { Clock, Trace } from "./trace.js";
 
 const PANEL_MS = 100;
 const byId = (id) => document.getElementById(id);
+
+begin();
 
 const palette = colours();
 const trace = new Trace();
@@ -52,6 +55,7 @@ const receive = {
     panel.scene(scene);
     body.setScene(scene);
     place.setScene(scene);
+    patient.setScene(scene);
   },
   device(message) {
     panel.device(message);
@@ -125,7 +129,7 @@ function happen(event) {
   events.add(event, scene.layers);
   if (event.limits) panel.limits(event.limits, performance.now());
   if (event.kind === "puncture") {
-    timePlot.mark(event.t_s, scene.layers[event.layer]?.name ?? "layer");
+    timePlot.mark(event.t_s, tissueName(scene.layers[event.layer]?.name ?? "layer"));
   }
 }
 
@@ -134,7 +138,7 @@ const hand = new Hand(byId("section"), section, link);
 body.setHand(hand);
 const scrub = new Scrub(link);
 const ownForces = new OwnForces(link);
-const patient = new PatientEditor(link);
+const patient = new PatientEditor(link, palette);
 const place = new PlaceEditor(link, hand);
 body.entered = (found) => place.enter(found);
 const practice = new Practice(link, palette);
@@ -193,13 +197,13 @@ function largestForce(now) {
 function tellCondition(condition) {
   document.body.dataset.link = condition;
   const seconds = Math.floor(link.dataAge / 1000);
-  const since = `no data for ${seconds} s`;
+  const since = t("banner.since", { seconds });
   const notice = linkStatus?.notice ?? "";
-  const owed = link.stopOwed ? " Your stop could not be sent; to be safe cut the power." : "";
+  const owed = link.stopOwed ? ` ${t("banner.owed")}` : "";
   if (condition === "connecting") panel.banner("");
   else if (condition === "lost") {
-    panel.banner(seconds < 2 ? `Connection to the program lost. Reconnecting.${owed}` : `Program unreachable, ${since}. Reconnecting.${owed}`);
-  } else if (condition === "stale") panel.banner(`Device silent, ${since}.${notice ? ` ${notice}.` : ""}`);
+    panel.banner((seconds < 2 ? t("banner.lost") : t("banner.unreachable", { since })) + owed);
+  } else if (condition === "stale") panel.banner(t("banner.silent", { since }) + (notice ? ` ${notice}.` : ""));
   else panel.banner(notice);
 }
 

@@ -1,7 +1,7 @@
 // The needle in the section: cannula, bevel and hub to scale, what a person takes hold of, and the force in the hand. Its measures are
 // the scene's, the same that the three-dimensional view and the ultrasound draw.
 
-import { number } from "./panel.js";
+import { number } from "./language.js";
 
 /** Length of the arrow for a force, mm. */
 const MM_PER_N = 4;

@@ -1,5 +1,6 @@
 // The slider of a device's compensation: how much of its own forces is taken away, while a hand feels it.
 
+import { t } from "./language.js";
 import { Slider } from "./slider.js";
 
 export class OwnForces {
@@ -26,7 +27,7 @@ export class OwnForces {
   }
 
   say(percent) {
-    const text = percent === 0 ? "off" : `${percent} %`;
+    const text = percent === 0 ? t("reading.off") : `${percent} %`;
     if (this.value.textContent !== text) this.value.textContent = text;
     this.slider.setAttribute("aria-valuetext", text);
   }

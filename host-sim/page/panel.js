@@ -1,26 +1,20 @@
 // Numbers, lamps and words around the pictures. Written ten times a second: faster cannot be read.
 
+import { count, number, t } from "./language.js";
+
 const LIMITS = [
-  [1, "Torque limit"],
-  [2, "Slew limit"],
-  [4, "Fading in"],
-  [8, "Motor warm"],
-  [16, "Added damping"],
-  [32, "Force estimated"],
+  [1, "limit.torque"],
+  [2, "limit.slew"],
+  [4, "limit.fade"],
+  [8, "limit.warm"],
+  [16, "limit.damping"],
+  [32, "limit.estimated"],
 ];
 /** A limit in force for a millisecond stays lit so long, or the lamp would flicker. */
 const LAMP_MS = 600;
-/** The largest force is that of the last ten seconds. */
+/** States: their tones; their words are `state.NAME`. */
 const STATES = {
-  idle: ["Stopped, torque off", "off"],
-  approach: ["Running: approaching", "good"],
-  elastic: ["Running: pressing", "good"],
-  puncture: ["Running: puncture", "good"],
-  friction: ["Running: in tissue", "good"],
-  withdrawal: ["Running: withdrawing", "good"],
-  excitation: ["Running: test signal", "good"],
-  fault: ["Fault, torque off", "bad"],
-  unknown: ["State unknown", "warn"],
+  idle: "off", approach: "good", elastic: "good", puncture: "good", friction: "good", withdrawal: "good", excitation: "good", fault: "bad", unknown: "warn",
 };
 
 const byId = (id) => document.getElementById(id);
@@ -38,28 +32,20 @@ function chip(name, text, tone) {
   if (chip.title !== text) chip.title = text;
 }
 
-/** A number with its sign in front of a fixed number of digits; no "−0.00". */
-export function number(value, digits) {
-  if (!Number.isFinite(value)) return "–";
-  const text = value.toFixed(digits);
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
-}
-
 /** Sets a screen reader's text for a slider: its value with the unit. */
 function sayValue(slider) {
-  const text = `${slider.value} ${slider.dataset.unit}`;
+  const text = `${slider.value} ${t(`unit.${slider.dataset.unit}`)}`;
   if (slider.getAttribute("aria-valuetext") !== text) slider.setAttribute("aria-valuetext", text);
 }
 
-const whole = new Intl.NumberFormat("en-GB");
-
 function stateWords(view, condition, played) {
-  if (condition === "paused") return ["Recording paused", "off"];
-  if (condition === "connecting") return ["Connecting…", "off"];
-  if (condition !== "live" || !view.known) return ["No data", "warn"];
-  const [text, tone] = STATES[view.state] ?? STATES.unknown;
+  if (condition === "paused") return [t("state.paused"), "off"];
+  if (condition === "connecting") return [t("page.connecting"), "off"];
+  if (condition !== "live" || !view.known) return [t("state.no_data"), "warn"];
+  const state = Object.hasOwn(STATES, view.state) ? view.state : "unknown";
+  const text = t(`state.${state}`);
   // What a recording shows has been: nothing runs.
-  return played ? [text.replace("Running", "Recording"), tone] : [text, tone];
+  return [played ? text.replace(t("state.running"), t("state.recording")) : text, STATES[state]];
 }
 
 export class Panel {
@@ -71,15 +57,15 @@ export class Panel {
       lamp.dataset.tone = "off";
       const dot = document.createElement("i");
       dot.setAttribute("aria-hidden", "true");
-      lamp.append(dot, name);
+      lamp.append(dot, t(name));
       byId("limits").append(lamp);
       return lamp;
     });
   }
 
   scene(scene) {
-    const source = { virtual: "virtual device", serial: scene.source.path, recording: "recording" }[scene.source.kind];
-    const parts = [`Profile ${scene.profile}`, scene.procedure, source].filter(Boolean);
+    const source = { virtual: t("source.virtual"), serial: scene.source.path, recording: t("source.recording") }[scene.source.kind];
+    const parts = [t("source.profile", { name: scene.profile }), scene.procedure, source].filter(Boolean);
     write(byId("subtitle"), parts.join(" · "));
     byId("subtitle").title = parts.join(" · ");
     byId("lateral-row").hidden = true;
@@ -88,9 +74,9 @@ export class Panel {
   }
 
   device(device) {
-    const name = /^0*$/.test(device.identity) ? "virtual" : device.identity;
+    const name = /^0*$/.test(device.identity) ? t("source.virtual_name") : device.identity;
     write(byId("device"), `${name}, ${device.firmware}, ${device.tick_hz / 1000} kHz`);
-    byId("device").title = `Configuration ${device.config_hash}, ${device.dac_bits}-bit converter`;
+    byId("device").title = t("source.device_title", { hash: device.config_hash, bits: device.dac_bits });
   }
 
   /** Notes which limits are in force, at every frame, so that none is missed. */
@@ -118,14 +104,14 @@ export class Panel {
       const tone = condition === "live" && nowMs - this.lit[i] < LAMP_MS ? "warn" : "off";
       if (lamp.dataset.tone !== tone) {
         lamp.dataset.tone = tone;
-        lamp.setAttribute("aria-label", `${LIMITS[i][1]}: ${tone === "warn" ? "in force" : "not in force"}`);
+        lamp.setAttribute("aria-label", t(tone === "warn" ? "limit.on" : "limit.off", { name: t(LIMITS[i][1]) }));
       }
     });
     const [state, tone] = stateWords(view, condition, this.played);
     chip("state", state, tone);
     // A screen reader is told what has changed, not each phase of an insertion.
     const banner = byId("banner");
-    write(byId("announcement"), banner.hidden ? (tone === "good" ? state.split(":")[0] : state) : banner.textContent);
+    write(byId("announcement"), banner.hidden ? (tone === "good" ? state.split(":")[0].trim() : state) : banner.textContent);
     for (const slider of this.sliders) sayValue(slider);
     const powered = condition === "live" && view.state !== "idle" && view.state !== "fault";
     byId("start").disabled = condition !== "paused" && (condition !== "live" || powered);
@@ -135,24 +121,24 @@ export class Panel {
 
   link(link, condition) {
     const lost = link.lost_frames + link.lost_samples;
-    write(byId("frames"), whole.format(link.frames));
-    write(byId("lost-frames"), whole.format(link.lost_frames), link.lost_frames ? "bad" : "");
-    write(byId("lost-samples"), whole.format(link.lost_samples), link.lost_samples ? "bad" : "");
-    if (condition === "lost") chip("link", "No link", "bad");
-    else if (condition === "stale" || !link.connected) chip("link", "Device silent", "bad");
-    else if (lost) chip("link", `Link: ${whole.format(lost)} lost`, "warn");
-    else chip("link", "Link: nothing lost", "good");
+    write(byId("frames"), count(link.frames));
+    write(byId("lost-frames"), count(link.lost_frames), link.lost_frames ? "bad" : "");
+    write(byId("lost-samples"), count(link.lost_samples), link.lost_samples ? "bad" : "");
+    if (condition === "lost") chip("link", t("link.none"), "bad");
+    else if (condition === "stale" || !link.connected) chip("link", t("link.silent"), "bad");
+    else if (lost) chip("link", t("link.lost", { count: count(lost) }), "warn");
+    else chip("link", t("link.good"), "good");
     const recording = link.recording;
     const name = recording ? recording.file.split(/[\\/]/).at(-1) : "";
-    if (condition === "lost") chip("recording", "Recording unknown", "off");
-    else if (recording) chip("recording", `Recording ${name}, ${(recording.bytes / 1e6).toFixed(1)} MB`, "bad");
-    else chip("recording", "Not recording", "off");
+    if (condition === "lost") chip("recording", t("recording.unknown"), "off");
+    else if (recording) chip("recording", t("recording.on", { name, megabytes: number(recording.bytes / 1e6, 1) }), "bad");
+    else chip("recording", t("recording.off"), "off");
   }
 
   timing(timing) {
-    const ticks = timing.missed_ticks ? `, ${whole.format(timing.missed_ticks)} late` : "";
-    const codes = timing.late_codes ? `, ${whole.format(timing.late_codes)} past the converter's instant` : "";
-    write(byId("tick"), `${timing.longest_tick_us.toFixed(1)} µs${ticks}${codes}`);
+    const ticks = timing.missed_ticks ? t("reading.late", { count: count(timing.missed_ticks) }) : "";
+    const codes = timing.late_codes ? t("reading.codes", { count: count(timing.late_codes) }) : "";
+    write(byId("tick"), `${number(timing.longest_tick_us, 1)} µs${ticks}${codes}`);
   }
 
   /** One sentence across the page, or nothing. */

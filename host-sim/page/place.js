@@ -1,6 +1,8 @@
 // Where the needle enters a body: the site, the point of entry, the direction and the turn of the limb. A new place is an edited patient: the
 // device gets the layers along the new line once the needle is outside.
 
+import { t } from "./language.js";
+
 const byId = (id) => document.getElementById(id);
 /** Sliders and the keys of a patient's [body] that they stand for. */
 const SLIDERS = { "place-along": "along_mm", "place-around": "around_deg", "place-azimuth": "azimuth_deg", "place-turn": "turn_deg" };
@@ -94,13 +96,13 @@ export class PlaceEditor {
     if (view.depth > 0) {
       if (!view.person) this.givesBack = true;
       if (this.hand.movable) this.hand.want(OUTSIDE_MM);
-      this.say(this.hand.movable ? "The needle is drawn out first." : "Draw the needle out first.");
+      this.say(this.hand.movable ? t("place.drawn_out") : t("place.draw_out"));
       return;
     }
     const message = this.wish.patient ? { do: "choose", patient: this.wish.patient } : { do: "edit", profile: this.edited(view) };
     this.wish = null;
     this.asked = this.link.send(message);
-    if (!this.asked) this.say("The program is unreachable; nothing was sent.");
+    if (!this.asked) this.say(t("patient.unreachable"));
   }
 
   /** The patient with the entry that is wished, for the needle as it is held now. */

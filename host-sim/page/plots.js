@@ -1,6 +1,7 @@
 // The two plots: depth and force against time, and force against depth. Both read a Trace and allocate nothing per frame.
 
 import { surface } from "./canvas.js";
+import { number, t } from "./language.js";
 
 export const WINDOW_S = 10;
 const GUTTER = { left: 52, right: 10, top: 8, bottom: 24 };
@@ -51,7 +52,7 @@ function ticks(range, most, draw) {
 /** Free space beside the name of a puncture, in points: half before it and half after. */
 const NAME_GAP = 8;
 
-const label = (value, step) => (step < 1 ? value.toFixed(1) : value.toFixed(0)).replace("-", "−");
+const label = (value, step) => number(value, step < 1 ? 1 : 0);
 
 export class TimePlot {
   constructor(canvas, colours) {
@@ -87,8 +88,8 @@ export class TimePlot {
     const wide = width - left - GUTTER.right;
     const each = (height - GUTTER.top - GUTTER.bottom - 14) / 2;
     const second = GUTTER.top + each + 14;
-    this.axes(g, "Depth, mm", this.depth, left, GUTTER.top, wide, each, this.colours.depth);
-    this.axes(g, "Force, N", this.force, left, second, wide, each, this.colours.force);
+    this.axes(g, t("plot.depth"), this.depth, left, GUTTER.top, wide, each, this.colours.depth);
+    this.axes(g, t("plot.force"), this.force, left, second, wide, each, this.colours.force);
     this.seconds(g, left, wide, height);
     this.drawMarks(g, now, left, wide, second - 7, height - GUTTER.bottom);
     g.save();
@@ -138,7 +139,7 @@ export class TimePlot {
     // Labels are about 40 points wide.
     for (let ago = 0; ago <= WINDOW_S; ago += wide < 280 ? 5 : 2) {
       g.textAlign = ago === 0 ? "right" : ago === WINDOW_S ? "left" : "center";
-      g.fillText(ago === 0 ? "now" : `−${ago} s`, left + wide * (1 - ago / WINDOW_S), height - 2);
+      g.fillText(ago === 0 ? t("plot.now") : `−${ago} s`, left + wide * (1 - ago / WINDOW_S), height - 2);
     }
   }
 
@@ -306,13 +307,13 @@ export class PhasePlot {
     g.font = `600 12px ${this.colours.font}`;
     g.fillStyle = this.colours.depth;
     g.textBaseline = "bottom";
-    g.fillText("Depth, mm", box.left + box.wide / 2, height - 1);
+    g.fillText(t("plot.depth"), box.left + box.wide / 2, height - 1);
     g.save();
     g.translate(12, box.top + box.high / 2);
     g.rotate(-Math.PI / 2);
     g.textBaseline = "middle";
     g.fillStyle = this.colours.force;
-    g.fillText("Force, N", 0, 0);
+    g.fillText(t("plot.force"), 0, 0);
     g.restore();
   }
 }

@@ -2,20 +2,20 @@
 // learning curve. The server judges; see host-sim/training/src/practice.rs.
 
 import { LearningCurve } from "./learning_curve.js";
-import { number } from "./panel.js";
+import { number, said, t } from "./language.js";
 import { mistakes, Tasks } from "./tasks.js";
 
 const byId = (id) => document.getElementById(id);
-/** Columns of the list: their heading, the name of the figure, its digits. */
+/** Columns of the list: the key of their heading, the name of the figure, its digits. */
 const COLUMNS = [
-  ["Time, s", "time_s", 1],
-  ["Force, N", "peak_force_n", 2],
-  ["In vein, s", "in_lumen_s", 1],
-  ["Angle off, °", "angle_rms_error_deg", 1],
-  ["Hits", "spared_hits", 0],
+  ["practice.time", "time_s", 1],
+  ["practice.force", "peak_force_n", 2],
+  ["practice.in_vein", "in_lumen_s", 1],
+  ["practice.angle", "angle_rms_error_deg", 1],
+  ["practice.hits", "spared_hits", 0],
 ];
-/** The meanings of short headings. */
-const TITLES = { spared_hits: "Touches of what is to be spared", angle_rms_error_deg: "Angle error along the way, root mean square" };
+/** Keys of the meanings of short headings. */
+const TITLES = { spared_hits: "practice.hits_title", angle_rms_error_deg: "practice.angle_title" };
 /** Columns that are only shown where the goal has a limit for them. */
 const WITH_TARGET_ONLY = new Set(["in_lumen_s"]);
 /** A figure that differs from the best one by less than this share is as good. */
@@ -50,12 +50,13 @@ export class Practice {
   /** The headings; below the name of a figure its limit. */
   head() {
     const cell = (name, key) => {
-      const head = Object.assign(document.createElement("th"), { textContent: name, scope: "col", title: TITLES[key] ?? "" });
+      const title = TITLES[key] ? t(TITLES[key]) : "";
+      const head = Object.assign(document.createElement("th"), { textContent: name, scope: "col", title });
       const target = this.targets[key];
-      if (target) head.append(document.createElement("br"), target.at_least === undefined ? `≤ ${target.at_most}` : `≥ ${target.at_least}`);
+      if (target) head.append(document.createElement("br"), target.at_least === undefined ? `≤ ${limit(target.at_most)}` : `≥ ${limit(target.at_least)}`);
       return head;
     };
-    byId("attempts-head").replaceChildren(cell(""), cell("Goal"), ...this.columns.map(([name, key]) => cell(name, key)));
+    byId("attempts-head").replaceChildren(cell(""), cell(t("practice.goal")), ...this.columns.map(([name, key]) => cell(t(name), key)));
   }
 
   /** Goes to the practice or back to the events. */
@@ -72,7 +73,7 @@ export class Practice {
     byId("list-views").hidden = false;
     byId("events-title").hidden = true;
     this.patient = message.patient;
-    byId("goal").textContent = `${message.goal}.`;
+    byId("goal").textContent = `${said(message.goal)}.`;
     this.targets = message.targets ?? {};
     this.tasks.follow(message.tasks ?? []);
     this.head();
@@ -92,12 +93,13 @@ export class Practice {
   say(attempt) {
     const verdict = byId("verdict");
     const { figures } = attempt;
-    const measured = `${number(figures.time_s, 1)} s, ${number(figures.peak_force_n, 2)} N`;
     verdict.dataset.tone = attempt.reached ? "good" : "bad";
-    const what = attempt.reached ? "Goal reached" : `Not reached: ${attempt.missing.join("; ")}`;
+    const missing = attempt.missing.map(said).join("; ");
+    const what = attempt.reached ? t("practice.goal_reached") : t("practice.not_reached", { missing });
     const others = mistakes(figures.tasks);
-    const also = others ? ` Not critical: ${others}.` : "";
-    verdict.textContent = `Attempt ${attempt.number}. ${what}. ${measured}.${also}`;
+    const also = others ? t("practice.not_critical", { mistakes: others }) : "";
+    const [time, force] = [number(figures.time_s, 1), number(figures.peak_force_n, 2)];
+    verdict.textContent = t("practice.verdict", { number: attempt.number, what, time, force, also });
   }
 
   /** The best insertion into this patient: reached, and the quickest; a person's where there is one, else the scripted hand's. */
@@ -118,8 +120,8 @@ export class Practice {
         cell.textContent = text;
         if (tone) cell.dataset.tone = tone;
       };
-      cell(`${attempt.number}${attempt.by_person ? "" : " demo"}${attempt === best ? " ★" : ""}`);
-      cell(attempt.reached ? "reached" : "missed", attempt.reached ? "good" : "bad");
+      cell(`${attempt.number}${attempt.by_person ? "" : t("practice.demo")}${attempt === best ? " ★" : ""}`);
+      cell(t(attempt.reached ? "practice.reached" : "practice.missed"), attempt.reached ? "good" : "bad");
       for (const [, key, digits] of this.columns) {
         const wanted = best && best !== attempt && best.patient === attempt.patient ? best.figures[key] : null;
         cell(...compared(attempt.figures[key], wanted, digits, this.targets[key]));
@@ -149,9 +151,10 @@ export class Practice {
   follow({ recording, recorded }) {
     const debrief = byId("debrief");
     if (debrief.hidden !== !recorded) debrief.hidden = !recorded;
-    const text = recording ? "End recording" : "Record";
+    const text = t(recording ? "practice.end" : "practice.record");
     if (this.record.textContent !== text) this.record.textContent = text;
-    this.name.disabled = Boolean(recording);
+    // The name, which may have got a number, is at the top of the page meanwhile.
+    if (this.name.hidden !== Boolean(recording)) this.name.hidden = Boolean(recording);
     this.recording = recording;
   }
 
@@ -161,6 +164,9 @@ export class Practice {
   }
 }
 
+/** The limit of a figure, with as many digits as it has. */
+const limit = (value) => number(value, Number.isInteger(value) ? 0 : 1);
+
 /** A figure, and whether it is beyond its limit, or better or worse than the wanted one: less is, unless the limit is a least one. */
 function compared(value, wanted, digits, target) {
   if (value === null || value === undefined) return ["–"];
@@ -168,5 +174,5 @@ function compared(value, wanted, digits, target) {
   if (target && (value < target.at_least || value > target.at_most)) return [`${text} ✗`, "bad"];
   if (wanted === null || wanted === undefined || Math.abs(value - wanted) <= SAME * Math.abs(wanted)) return [text];
   const better = target?.at_least === undefined ? value < wanted : value > wanted;
-  return better ? [`${text} better`, "good"] : [`${text} worse`, "bad"];
+  return better ? [t("practice.better", { value: text }), "good"] : [t("practice.worse", { value: text }), "bad"];
 }

@@ -3,6 +3,7 @@
 
 import { surface } from "./canvas.js";
 import { drawInset } from "./inset.js";
+import { capital, number, t, tissueName } from "./language.js";
 import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, halfHub, wholeLength } from "./needle.js";
 import { displace } from "./tissue.js";
 
@@ -235,7 +236,7 @@ export class Section {
       g.font = `600 12px ${this.colours.font}`;
       g.textAlign = "left";
       g.textBaseline = "middle";
-      this.onTissue(g, `${name}, to be spared`, x + (width_mm / 2) * this.scale + 6, y);
+      this.onTissue(g, t("section.spare", { name: tissueName(name) }), x + (width_mm / 2) * this.scale + 6, y);
     }
   }
 
@@ -319,12 +320,11 @@ export class Section {
     g.textBaseline = "middle";
     let free = 0;
     for (const [i, layer] of tissue.layers.entries()) {
-      const called = layer.structure ?? layer.name;
-      const name = called.charAt(0).toUpperCase() + called.slice(1);
+      const name = capital(tissueName(layer.structure ?? layer.name));
       // In a body the skin is not level: what counts is where the needle meets it.
-      const [mm, where] = tissue.outlines ? [layer.along, "along the needle"] : [layer.depth_mm, "under the skin"];
-      const deep = width < NARROW ? ` ${mm.toFixed(1)}` : `, ${mm.toFixed(1)} mm ${where}`;
-      const label = layer.depth_mm > 0 ? name + deep : name;
+      const [mm, key] = tissue.outlines ? [number(layer.along, 1), "section.along"] : [number(layer.depth_mm, 1), "section.under"];
+      const deep = width < NARROW ? `${name} ${mm}` : t(key, { name, mm });
+      const label = layer.depth_mm > 0 ? deep : name;
       const top = this.y(layer.depth_mm);
       const bottom = i + 1 < tissue.layers.length ? this.y(tissue.layers[i + 1].depth_mm) : height;
       const y = Math.max(Math.min((top + bottom) / 2, top + 16), free + 10);

@@ -1,12 +1,13 @@
 // The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. What was done is told by the server,
 // for the scripted hand does them too.
 
+import { capital, t, taskName } from "./language.js";
+
 const byId = (id) => document.getElementById(id);
 
-/** The name of a task as a person reads it: `tourniquet_on` is "Tourniquet on". */
-export const taskWords = (name) => name.charAt(0).toUpperCase() + name.slice(1).replaceAll("_", " ");
-
-const PLACES = { target: "with the tip in the target", outside: "before the needle is in", any: "at any place" };
+const PLACES = { target: "task.at_target", outside: "task.at_outside", any: "task.at_any" };
+/** Mistakes that are not critical, as clauses. */
+const MISTAKES = { missed: "practice.task_missed", wrong_place: "practice.task_place", wrong_order: "practice.task_order" };
 
 export class Tasks {
   /** @param {import("./link.js").Link} link where wishes go */
@@ -24,7 +25,7 @@ export class Tasks {
   }
 
   button(name, tip) {
-    const button = Object.assign(document.createElement("button"), { type: "button", textContent: taskWords(name), title: PLACES[tip] ?? "" });
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: capital(taskName(name)), title: PLACES[tip] ? t(PLACES[tip]) : "" });
     button.dataset.task = name;
     button.addEventListener("click", () => this.link.send({ do: "task", name }));
     return button;
@@ -45,5 +46,5 @@ export class Tasks {
 /** The mistakes of an insertion that are not critical, as a clause; empty where there is none. */
 export function mistakes(tasks) {
   const wrong = (tasks?.list ?? []).filter((one) => one.mistake && !one.is_critical);
-  return wrong.map((one) => `${taskWords(one.name).toLowerCase()} ${one.mistake === "missed" ? "missed" : `${one.mistake === "wrong_place" ? "at the wrong place" : "in the wrong order"}`}`).join(", ");
+  return wrong.map((one) => t(MISTAKES[one.mistake], { task: taskName(one.name) })).join(", ");
 }

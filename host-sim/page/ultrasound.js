@@ -2,6 +2,7 @@
 
 import { IMAGE_WIDTH_MM, LINES, SAMPLES } from "./picture.js";
 import { surface } from "./canvas.js";
+import { number, t } from "./language.js";
 
 /** The range of the probe, mm and rad. */
 const REACH = { along: [4, 22], across: [-8, 8], azimuth: [-Math.PI / 2, Math.PI / 2], lean: [-0.6, 0.6] };
@@ -157,11 +158,11 @@ export class Ultrasound {
   words_(g, left, top, depth) {
     if (!this.seen) return;
     const { share, tip, beside, tipShare, inserted } = this.seen;
-    const soFar = inserted > 0 ? `tip seen ${(100 * tipShare).toFixed(0)} % of the time` : "";
-    let now = "Needle outside";
+    const soFar = inserted > 0 ? t("probe.so_far", { percent: number(100 * tipShare, 0) }) : "";
+    let now = t("probe.outside");
     if (depth > 0) {
-      const where = tip ? "tip in view" : Math.abs(beside) > 0.3 ? `tip ${Math.abs(beside).toFixed(1)} mm beside the plane` : "tip out of view";
-      now = `Needle in plane ${(100 * share).toFixed(0)} %, ${where}`;
+      const away = Math.abs(beside) > 0.3 ? t("probe.tip_beside", { mm: number(Math.abs(beside), 1) }) : t("probe.no_tip");
+      now = t("probe.in_plane", { percent: number(100 * share, 0), where: tip ? t("probe.tip") : away });
     }
     const text = [now, soFar].filter(Boolean).join("; ");
     g.fillStyle = "#e8eff4";

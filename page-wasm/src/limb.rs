@@ -1,7 +1,7 @@
 //! A body of three dimensions as the picture shows it: the layers about the point of entry as curved tissue that gives way, everything else as
 //! surfaces that stay, all cut along the needle's plane.
 
-use crate::picture::{Given, Kind, SurfaceView};
+use crate::drawn::{Given, Kind, SurfaceView};
 use anatomy::{Block, Body, Line, Place, Role, Site, Structure, Tissue};
 use tissue::needle::WallName;
 use tissue::{Configuration, Layer, Relief, Vessel};
@@ -19,7 +19,7 @@ const THINNEST_MM: f64 = 0.35;
 /// Starts above everything, mm.
 const ABOVE_MM: f64 = 300.0;
 
-/// The numbers of tissues that the page has colours for; the first seven are those of `picture::TISSUES`.
+/// The numbers of tissues that the page has colours for; the first seven are those of `drawn::TISSUES`.
 pub(crate) fn code(tissue: Tissue) -> u32 {
     match tissue {
         Tissue::Skin => 0,
@@ -116,8 +116,7 @@ impl Limb {
         };
         let (mut layers, mut top) = (vec![], 0.0);
         for (number, structure) in self.layers().enumerate() {
-            let kind =
-                crate::picture::TISSUES.get(code(structure.tissue) as usize).copied().unwrap_or("other");
+            let kind = crate::drawn::TISSUES.get(code(structure.tissue) as usize).copied().unwrap_or("other");
             let mut layer = Layer::of(kind, top, thick(number));
             layer.rows = ((thick(number) / 3.0).round() as usize).clamp(1, 9);
             let own = given.iter().find(|given| given.kind == code(structure.tissue));

@@ -1,5 +1,6 @@
 //! Tissue, needle, probe and image together, from the anatomy that the page was told of.
 
+use crate::drawn::{Given, SurfaceView};
 use crate::limb::{self, Limb};
 use crate::slab::{bottom_mm, configure, views};
 use crate::still::{Closed, Still};
@@ -9,8 +10,6 @@ use tissue::needle::WallName;
 use tissue::{Configuration, Needle, PunctureState, Punctures, Tissue};
 use ultrasound::{Imager, InPlaneScore, Look, Medium, Mesh, Probe, Scene, Shaft};
 
-/// Tissues by the number that the page calls them by.
-pub(crate) const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
 /// Numbers for each layer in the input.
 const PER_LAYER: usize = 4;
 /// Places along the insertion where the vessel's walls in the needle's plane are known.
@@ -20,38 +19,6 @@ const IMAGE_WIDTH_MM: f32 = 24.0;
 /// Its smallest and largest depth, and how far it reaches below the innermost layer's top, mm.
 const IMAGE_DEPTH_MM: [f32; 2] = [16.0, 40.0];
 const IMAGE_BELOW_MM: f32 = 4.0;
-
-/// The way in which the page draws a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Skin behind the needle's plane.
-    SkinBehind = 0,
-    /// Skin before it.
-    SkinBefore = 1,
-    /// A layer cut along the plane.
-    Section = 2,
-    /// The vessel's wall behind the plane.
-    VesselBehind = 3,
-    /// The vessel's wall before it.
-    VesselBefore = 4,
-    /// A part inside the body, such as a bone, behind the plane.
-    InsideBehind = 5,
-    /// The same before it.
-    InsideBefore = 6,
-}
-
-/// A surface as the page draws it.
-#[derive(Clone, Debug)]
-pub struct SurfaceView {
-    /// As what.
-    pub kind: Kind,
-    /// Number of its layer in the scene.
-    pub layer: usize,
-    /// In a body, its tissue by the number that the page calls it by: those of the input, 9 an artery.
-    pub tissue: u32,
-    /// Three particles each.
-    pub triangles: Vec<[u32; 3]>,
-}
 
 /// Everything that is drawn of the body.
 pub struct Picture {
@@ -74,16 +41,6 @@ pub struct Picture {
     probe: Probe,
     score: InPlaneScore,
     shaft: Shaft,
-}
-
-/// A layer as the page hands it over.
-pub(crate) struct Given {
-    pub(crate) kind: u32,
-    pub(crate) depth_mm: f32,
-    /// The travel by which its wall is pushed in, mm; negative where it has no wall.
-    pub(crate) travel_mm: f32,
-    pub(crate) is_vessel: bool,
-    pub(crate) is_far: bool,
 }
 
 /// Deep enough for the innermost layer, focused in the middle.
@@ -246,6 +203,11 @@ impl Picture {
         let [down, slope] = self.on_skin([along_mm, across_mm], azimuth);
         let centre_mm = [along_mm, across_mm, down];
         self.probe = Probe { centre_mm, azimuth, lean: lean + slope, ..self.probe }.checked();
+    }
+
+    /// Returns the probe as it is held.
+    pub fn probe(&self) -> &Probe {
+        &self.probe
     }
 
     /// Returns the depth of the skin at a place along and across, mm, and, on a body, the lean that makes a probe of this turn stand

@@ -1,6 +1,6 @@
 //! Level layers and a straight vessel as the picture shows them, and the surfaces of any tissue.
 
-use crate::picture::{Given, Kind, SurfaceView, TISSUES};
+use crate::drawn::{Given, Kind, SurfaceView, TISSUES};
 use tissue::body::Part;
 use tissue::needle::WallName;
 use tissue::{Configuration, Layer, Tissue, Vessel};

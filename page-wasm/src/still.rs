@@ -1,7 +1,7 @@
 //! The parts of a body that stay as they are in the picture: the skin around the block of tissue, the section beyond it, bones, bursae and tubes.
 
+use crate::drawn::{Kind, SurfaceView};
 use crate::limb::{BLOCK_MM, Limb, code};
-use crate::picture::{Kind, SurfaceView};
 use anatomy::{Role, Tissue};
 use ultrasound::Medium;
 

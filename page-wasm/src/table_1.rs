@@ -1,6 +1,6 @@
 //! Table 1 of Paper 000 in place of the limb: skin, vessel and skin as three slabs, with the paper's spacing, volume and bending.
 
-use crate::picture::Given;
+use crate::drawn::Given;
 use tissue::Configuration;
 use tissue::needle::WallName;
 
@@ -28,7 +28,8 @@ pub(crate) fn configure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Kind, Picture};
+    use crate::drawn::Kind;
+    use crate::picture::Picture;
     use tissue::PunctureState;
 
     /// Skin, vessel at 4 mm, bottom skin at 7 mm, entered at 60°; the last number chooses the tissue.

@@ -1,18 +1,63 @@
-"""A recording as Foxglove's own reader (PyPI's `mcap`) sees it: named channels with JSON schemas, units in the names.
+"""A recording as Foxglove's own readers (PyPI's `mcap` and `mcap-protobuf-support`) see it: named channels with JSON schemas, units in
+the names, and needle and tissue in Foxglove's well-known messages.
 
 Run by `cargo xtask test clients` with host-sim's path.
 """
 
 import json
+import math
 import pathlib
 import subprocess
 import sys
 import tempfile
 
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+from mcap_protobuf.schema import build_file_descriptor_set
 
 SECONDS = 3
 COUNTS = {"/setup": 1, "/pose": 1_000 * SECONDS}
+
+
+# Transforms a second, and metres in a millimetre.
+TRANSFORM_HZ = 100
+M_PER_MM = 1e-3
+
+
+def check_foxglove(file):
+    """The schemas are Foxglove's own, and the transform is the needle's."""
+    depths, scenes, transforms = {}, [], []
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        for schema, channel, message in reader.iter_messages(topics=["/pose"]):
+            depths.setdefault(message.log_time, []).append(json.loads(message.data)["depth_mm"])
+        for schema, channel, message, said in reader.iter_decoded_messages(topics=["/tf", "/scene"]):
+            own = {"/tf": FrameTransform, "/scene": SceneUpdate}[channel.topic]
+            assert schema.name == own.DESCRIPTOR.full_name and schema.encoding == channel.message_encoding == "protobuf"
+            assert schema.data == build_file_descriptor_set(own).SerializeToString(deterministic=True), schema.name
+            assert said.SerializeToString(deterministic=True) == own.FromString(message.data).SerializeToString(deterministic=True)
+            (transforms if channel.topic == "/tf" else scenes).append((message.log_time, said))
+    assert abs(len(transforms) - TRANSFORM_HZ * SECONDS) <= 2, len(transforms)
+    for time, said in transforms:
+        assert said.parent_frame_id == "skin" and said.child_frame_id == "needle"
+        assert said.timestamp.ToNanoseconds() == time
+        place, turn = said.translation, said.rotation
+        tilt = 2 * math.atan2(turn.y, turn.w)
+        along = math.hypot(place.x, place.z)
+        assert any(math.isclose(along, abs(depth) * M_PER_MM, abs_tol=1e-9) for depth in depths[time]), (along, depths[time])
+        assert math.isclose(place.x * math.sin(tilt), -place.z * math.cos(tilt), abs_tol=1e-9), "the tip is on the needle's line"
+    assert max(said.translation.x for _, said in transforms) > 2 * M_PER_MM, "the needle goes in"
+    (_, scene), = scenes
+    needle, tissue = scene.entities
+    assert (needle.frame_id, tissue.frame_id) == ("needle", "skin") and needle.frame_locked and tissue.frame_locked
+    assert [round(each.size.z / M_PER_MM) for each in needle.cylinders] == [25, 7], "cannula and hub"
+    tops = [each.pose.position.z + each.size.z / 2 for each in tissue.cubes]
+    assert [round(top / M_PER_MM, 3) for top in tops] == [0, -2], "skin and fat of the adult"
+    vessel, = tissue.cylinders
+    assert math.isclose(vessel.pose.position.z, -6.3 * M_PER_MM, abs_tol=1e-6) and math.isclose(vessel.size.x, 3 * M_PER_MM, abs_tol=1e-6)
+    print(f"foxglove: pass ({len(transforms)} transforms, a scene of {len(scene.entities)} entities)")
 
 
 def main(program):
@@ -23,11 +68,14 @@ def main(program):
         counts, samples = {}, 0
         with file.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
+                counts[channel.topic] = counts.get(channel.topic, 0) + 1
+                if channel.topic in ("/tf", "/scene"):
+                    continue
                 assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json"), channel
                 said, wanted = json.loads(message.data), json.loads(schema.data)["properties"]
                 assert set(said) <= set(wanted), f"{channel.topic} holds {set(said) - set(wanted)} beside its schema"
-                counts[channel.topic] = counts.get(channel.topic, 0) + 1
                 samples += len(said["count"]) if channel.topic == "/samples" else 0
+        check_foxglove(file)
     for topic, count in COUNTS.items():
         assert abs(counts[topic] - count) <= 2, f"{counts[topic]} messages on {topic}"
     assert samples == 10_000 * SECONDS, f"{samples} samples"

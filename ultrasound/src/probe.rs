@@ -109,6 +109,12 @@ impl Probe {
         }
     }
 
+    /// Its directions of length 1: along the image, into the body, out of the image's plane.
+    pub fn directions(&self) -> [Vector; 3] {
+        let axes = self.axes();
+        [axes.lateral, axes.axial, axes.elevation]
+    }
+
     /// Half the beam's thickness at a depth as the standard deviation of a Gaussian, mm: thinnest at the focus, and wider away
     /// from it as a Gaussian beam of the wavelength is.
     pub fn beam_sigma_mm(&self, depth_mm: f32) -> f32 {

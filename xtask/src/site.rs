@@ -17,6 +17,8 @@ const CLASS_PAGE: &str = "class.js";
 /// The page, and what takes the place of some of its modules.
 const PAGE: &str = "host-sim/page";
 const IN_PLACE: &str = "site-wasm/page";
+/// The folder of its texts, a module for each language.
+const STRINGS: &str = "strings";
 /// The page of a real board, and the modules that it shares with the other pages.
 const BOARD: &str = "board-wasm/page";
 const BOARD_SHARES: [&str; 2] = ["guide_steps.js", "bytes.js"];
@@ -31,6 +33,8 @@ pub(crate) fn build() -> Result<PathBuf, Failure> {
     let pages = top.join(PAGE);
     let site = shell::target().join("site");
     let mut modules = scripts(&pages)?;
+    let texts = scripts(&pages.join(STRINGS))?;
+    modules.extend(texts.into_iter().map(|(name, text)| (format!("{STRINGS}/{name}"), text)));
     modules.extend(scripts(&top.join(IN_PLACE))?);
     let shared = modules.clone().into_iter().filter(|(name, _)| BOARD_SHARES.contains(&name.as_str()));
     let mut of_board: BTreeMap<String, String> = shared.collect();
@@ -42,7 +46,7 @@ pub(crate) fn build() -> Result<PathBuf, Failure> {
     of_board.insert("files.js".into(), binaries(&[("board.wasm", &board)])?);
     write_page(&site, &pages.join("index.html"), "main.js", &modules)?;
     write_page(&site, &top.join(BOARD).join("board.html"), "board.js", &of_board)?;
-    for file in ["style.css", "practice.css", "guide.css", "icon.svg"] {
+    for file in ["style.css", "practice.css", "patient.css", "guide.css", "icon.svg"] {
         write(&site, file, &read(&pages.join(file))?)?;
     }
     write(&site, "board.css", &read(&top.join(BOARD).join("board.css"))?)?;

@@ -162,11 +162,13 @@ fn browser() -> Result<(), Failure> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 9] = [
+const CLIENTS: [&str; 11] = [
     "pyigtl==0.3.4",
     "websockets==17.4",
     "mujoco==4.0.0",
     "mcap==1.6.0",
+    "mcap-protobuf-support==0.6.0",
+    "foxglove-schemas-protobuf==0.4.0",
     "numpy==2.4.6",
     "scipy==1.17.1",
     "pandas==3.1.1",

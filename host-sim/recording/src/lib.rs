@@ -1,7 +1,8 @@
-//! Recordings: an MCAP file whose messages are JSON, so that any MCAP tool reads them. One module writes, one reads, one
+//! Recordings: an MCAP file whose messages are JSON, so that any MCAP tool reads them, and Foxglove's own for its 3D panel. One module writes, one reads, one
 //! exports to the rig and CSV of the diagnosis, [`import`] reads those of other people.
 
 pub mod export;
+mod foxglove;
 pub mod import;
 mod intact;
 pub mod messages;

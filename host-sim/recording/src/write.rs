@@ -1,11 +1,14 @@
 //! Writes a recording while it happens. What is on disk can be read at any moment: a chunk is closed every quarter of a
 //! second, so that a full disk, a kill or a power cut cost no more than that.
 
+use super::foxglove;
 use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
-use device_sim::session::{ProbeView, TaskDone};
+use device_sim::library::Text;
+use device_sim::profile::Profile;
+use device_sim::session::{ProbeView, Source, TaskDone};
 use link::frames;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
@@ -22,6 +25,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 const MOST_OF_A_NAME: u32 = 9_999;
 /// Ticks from one flush to the next: 0.25 s.
 const FLUSH_TICKS: u64 = TICK_HZ as u64 / 4;
+/// Ticks from one transform for Foxglove to the next: 100 a second.
+const TRANSFORM_TICKS: u64 = TICK_HZ as u64 / 100;
 const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ as u64;
 
 /// A recording in progress.
@@ -30,6 +35,10 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     writer: Writer<Counted<W>>,
     /// By the order of [`CHANNELS`].
     channels: Vec<u16>,
+    /// By the order of [`foxglove::CHANNELS`].
+    drawn: Vec<u16>,
+    /// Tick of the last transform.
+    drawn_at: Option<u64>,
     /// Time of tick 0, ns since 1970.
     epoch_ns: u64,
     tick: u64,
@@ -84,6 +93,8 @@ impl<W: Write + Seek> Recorder<W> {
                 .map_err(|cause| lost(&file, &cause, 0))?,
             file,
             channels: Vec::new(),
+            drawn: Vec::new(),
+            drawn_at: None,
             epoch_ns: u64::try_from(since_1970.as_nanos()).unwrap_or(0),
             tick: 0,
             flushed: 0,
@@ -97,14 +108,26 @@ impl<W: Write + Seek> Recorder<W> {
                 .and_then(|id| recorder.writer.add_channel(id, topic, "json", &BTreeMap::new()));
             recorder.channels.push(added.map_err(|cause| recorder.lost(&cause))?);
         }
-        recorder.put(0, setup)?;
+        for (topic, name, schema) in foxglove::CHANNELS {
+            let added = recorder
+                .writer
+                .add_schema(name, "protobuf", schema)
+                .and_then(|id| recorder.writer.add_channel(id, topic, "protobuf", &BTreeMap::new()));
+            recorder.drawn.push(added.map_err(|cause| recorder.lost(&cause))?);
+        }
+        recorder.setup(setup)?;
         recorder.flush()?;
         Ok(recorder)
     }
 
     /// Set up anew: what follows is of another patient.
     pub fn setup(&mut self, setup: &Setup) -> Result<(), Failure> {
-        self.put(0, setup)
+        self.put(0, setup)?;
+        let text = Text { origin: setup.profile_origin.clone(), text: setup.profile_toml.clone() };
+        // A profile for a stronger device than the built-in one is recorded and not drawn.
+        let Ok(profile) = Profile::parse(text) else { return Ok(()) };
+        let scene = foxglove::scene(self.now_ns(), &profile.scene(Source::Virtual, None));
+        self.write(self.drawn[1], &scene)
     }
 
     /// Writes the device's identity and scale.
@@ -122,7 +145,15 @@ impl<W: Write + Seek> Recorder<W> {
 
     /// A pose.
     pub fn pose(&mut self, pose: &frames::Pose) -> Result<(), Failure> {
-        self.put(3, &Pose::from(pose))
+        let pose = Pose::from(pose);
+        self.put(3, &pose)?;
+        if self.drawn_at.is_some_and(|last| pose.tick.abs_diff(last) < TRANSFORM_TICKS) {
+            return Ok(());
+        }
+        self.drawn_at = Some(pose.tick);
+        let tilt_rad = f64::from(pose.tilt_mrad) / 1_000.0;
+        let transform = foxglove::transform(self.now_ns(), pose.depth_mm, tilt_rad);
+        self.write(self.drawn[0], &transform)
     }
 
     /// An event.
@@ -166,14 +197,21 @@ impl<W: Write + Seek> Recorder<W> {
         if serde_json::to_writer(&mut self.text, message).is_err() {
             return Err(Failure::failed("a message could not be put into words; report this"));
         }
-        let time = self.epoch_ns + self.tick * NS_PER_TICK;
-        let header = MessageHeader {
-            channel_id: self.channels[channel],
-            sequence: 0,
-            log_time: time,
-            publish_time: time,
-        };
-        self.writer.write_to_known_channel(&header, &self.text).map_err(|cause| self.lost(&cause))
+        let text = std::mem::take(&mut self.text);
+        let written = self.write(self.channels[channel], &text);
+        self.text = text;
+        written
+    }
+
+    /// Time of the newest samples, ns since 1970.
+    fn now_ns(&self) -> u64 {
+        self.epoch_ns + self.tick * NS_PER_TICK
+    }
+
+    fn write(&mut self, channel_id: u16, message: &[u8]) -> Result<(), Failure> {
+        let time = self.now_ns();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, message).map_err(|cause| self.lost(&cause))
     }
 
     fn flush(&mut self) -> Result<(), Failure> {

@@ -1,6 +1,7 @@
 //! Whom the needle goes into during a run, and changing it: what a person edits in the page becomes a checked profile, is asked of the
 //! device, and counts once the device has taken it whole. It sends nothing itself.
 
+use crate::saved_patients::SavedPatients;
 use control_core::{Device, Patient};
 use device_sim::failure::Failure;
 use device_sim::library::Text;
@@ -18,6 +19,7 @@ pub struct Bedside {
     /// Name or file of what the scripted hand does, where one does anything.
     procedure: Option<String>,
     setup: Setup,
+    saved: Option<SavedPatients>,
     asked: Option<Asked>,
 }
 
@@ -27,33 +29,40 @@ struct Asked {
     profile: Profile,
     /// The procedure of the scripted hand in it, if it differs from the default.
     procedure: Option<String>,
+    /// The name to save it under.
+    save_as: Option<String>,
 }
 
 impl Bedside {
     /// `profile` on `device`; `procedure` is what the scripted hand was asked to do.
     pub fn new(profile: Profile, source: Source, procedure: Option<String>, setup: Setup) -> Self {
         let device = profile.config.device;
-        Self { profile, device, source, procedure, setup, asked: None }
+        Self { profile, device, source, procedure, setup, saved: None, asked: None }
+    }
+
+    /// Edited patients can be saved in `folder`, and those in it chosen.
+    pub fn saving_in(mut self, saved: SavedPatients) -> Self {
+        self.saved = Some(saved);
+        self
     }
 
     /// Checks a wish; what to ask of the device, or in one sentence why not.
     pub fn ask(&mut self, wish: &PatientWish) -> Result<Patient, Failure> {
+        let mut save_as = None;
         let profile = match wish {
-            PatientWish::Named(name) => {
-                let built_in = profile::BUILT_IN.iter().find(|(known, _)| known == name);
-                let (name, text) = built_in.ok_or_else(|| {
-                    Failure::input(format_args!(
-                        "there is no patient called \"{name}\"; choose one of the list"
-                    ))
+            PatientWish::Named(name) => Profile::parse_for(self.named(name)?, &self.device)?,
+            PatientWish::Edited(json) => self.edited(json)?,
+            PatientWish::Saved { name, profile } => {
+                let saved = self.saved.as_ref().ok_or_else(|| {
+                    Failure::input("this program keeps no patients; send it to the device without saving")
                 })?;
-                let source = Text { origin: format!("profile {name}"), text: (*text).to_owned() };
-                Profile::parse_for(source, &self.device)?
-            }
-            PatientWish::Edited(json) => {
-                let text = toml::to_string(json).map_err(|cause| {
-                    Failure::input(format_args!("the edited patient is not a profile ({cause}); correct it"))
-                })?;
-                Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)?
+                let name = saved.free_name(name)?;
+                let mut json = profile.clone();
+                if let Some(key) = json.get_mut("name") {
+                    *key = name.as_str().into();
+                }
+                save_as = Some(name);
+                self.edited(&json)?
             }
         };
         // A patient that is chosen brings its own procedure; the scripted hand must find its way in any.
@@ -62,13 +71,41 @@ impl Bedside {
         let wanted = procedure.as_ref().or(self.procedure.as_ref());
         wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
-        self.asked = Some(Asked { profile, procedure });
+        self.asked = Some(Asked { profile, procedure, save_as });
         Ok(patient)
     }
 
-    /// The device has taken what was asked; whether anything was.
-    pub fn taken(&mut self) -> bool {
-        let Some(Asked { profile, procedure }) = self.asked.take() else { return false };
+    /// The text of a patient that can be chosen.
+    fn named(&self, name: &str) -> Result<Text, Failure> {
+        if let Some((_, text)) = profile::BUILT_IN.iter().find(|(known, _)| *known == name) {
+            return Ok(Text { origin: format!("profile {name}"), text: (*text).to_owned() });
+        }
+        self.saved.as_ref().and_then(|saved| saved.read(name)).unwrap_or_else(|| {
+            Err(Failure::input(format_args!("there is no patient called \"{name}\"; choose one of the list")))
+        })
+    }
+
+    /// An edited patient, checked.
+    fn edited(&self, json: &serde_json::Value) -> Result<Profile, Failure> {
+        let text = toml::to_string(json).map_err(|cause| {
+            Failure::input(format_args!("the edited patient is not a profile ({cause}); correct it"))
+        })?;
+        Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)
+    }
+
+    /// The device has taken what was asked; none if nothing was. A patient that was to be saved is: the file, or why there is none.
+    pub fn taken(&mut self) -> Option<PatientAnswer> {
+        let Asked { mut profile, procedure, save_as } = self.asked.take()?;
+        let mut answer = PatientAnswer { taken: true, ..PatientAnswer::default() };
+        if let (Some(saved), Some(name)) = (&self.saved, save_as) {
+            match saved.write(&name, &format!("# Edited and saved in the page.\n{}", profile.source.text)) {
+                Ok(file) => {
+                    profile.source.origin.clone_from(&file);
+                    answer.saved = Some(file);
+                }
+                Err(why) => answer.reason = why.to_string(),
+            }
+        }
         if procedure.is_some() {
             self.procedure = procedure;
         }
@@ -81,7 +118,7 @@ impl Bedside {
         if let Some(procedure) = self.procedure() {
             self.setup.procedure = Some(procedure.name);
         }
-        true
+        Some(answer)
     }
 
     /// The device has refused it.
@@ -112,8 +149,10 @@ impl Bedside {
 
     /// For the page.
     pub fn status(&self, answer: Option<PatientAnswer>) -> PatientStatus {
+        let built_in = profile::BUILT_IN.iter().map(|(name, _)| (*name).to_owned());
         PatientStatus {
-            names: profile::BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            names: built_in.chain(self.saved.iter().flat_map(SavedPatients::names)).collect(),
+            can_save: self.saved.is_some(),
             // What has been parsed as a profile is TOML, and TOML is JSON but for its dates.
             profile: toml::from_str(&self.profile.source.text).unwrap_or_default(),
             tasks: self.setup.tasks.clone(),
@@ -155,22 +194,50 @@ mod tests {
         let patient = bedside.ask(&PatientWish::Edited(json)).expect("it may run");
         assert!((patient.layers[0].friction.0.to_num::<f64>() - 0.03).abs() < 1e-4);
         assert_eq!(bedside.scene().layers[0].friction_n_per_mm, force_before, "not yet");
-        assert!(bedside.taken() && !bedside.taken(), "once");
+        assert!(bedside.taken().is_some() && bedside.taken().is_none(), "once");
         assert!((bedside.scene().layers[0].friction_n_per_mm - 0.03).abs() < 1e-4);
         assert!(bedside.setup().profile_toml.contains("0.03"), "the recording is told");
         bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
         bedside.refused();
-        assert!(!bedside.taken(), "what was refused never counts");
+        assert!(bedside.taken().is_none(), "what was refused never counts");
         bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
-        assert!(bedside.taken());
+        assert!(bedside.taken().is_some());
         assert_eq!(bedside.scene().profile, "firm-skin");
         bedside.ask(&PatientWish::Named("shoulder".into())).expect("built in");
-        assert!(bedside.taken());
+        assert!(bedside.taken().is_some());
         assert_eq!(
             bedside.setup().procedure.as_deref(),
             Some("shoulder-straight"),
             "it brings its procedure"
         );
+    }
+
+    #[test]
+    fn a_saved_patient_can_be_chosen_in_another_run() {
+        let folder = std::env::temp_dir().join(format!("bedside-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        let mut first = bedside();
+        let mut json = first.status(None).profile;
+        json["layer"][2]["depth_mm"] = serde_json::json!(6.0);
+        let wish = PatientWish::Saved { name: "anna".into(), profile: json };
+        let said = first.ask(&wish).expect_err("there is no folder").to_string();
+        assert!(said.contains("keeps no patients"), "{said}");
+        let mut first = bedside().saving_in(SavedPatients::new(&folder));
+        assert!(first.status(None).can_save);
+        first.ask(&wish).expect("it may run");
+        assert!(!first.status(None).names.contains(&"anna".into()), "the device has not taken it");
+        let file = first.taken().expect("asked").saved.expect("saved");
+        assert!(file.ends_with("anna.toml") && first.setup().profile_origin == file);
+        first.ask(&wish).expect("it may run");
+        let second = first.taken().expect("asked").saved.expect("saved");
+        assert!(second.ends_with("anna-2.toml"), "{second}");
+        let mut later = bedside().saving_in(SavedPatients::new(&folder));
+        assert!(later.status(None).names.ends_with(&["anna".into(), "anna-2".into()]));
+        later.ask(&PatientWish::Named("anna-2".into())).expect("in the list");
+        assert!(later.taken().is_some_and(|answer| answer.saved.is_none()));
+        assert_eq!(later.scene().profile, "anna-2");
+        assert!((later.scene().layers[2].depth_mm - 6.0).abs() < 1e-4);
+        std::fs::remove_dir_all(&folder).expect("it is ours");
     }
 
     #[test]
@@ -192,7 +259,7 @@ mod tests {
         ] {
             let said = bedside.ask(&wish).expect_err(hint).to_string();
             assert!(said.contains(hint) && !said.contains('\n'), "{hint}: {said}");
-            assert!(!bedside.taken());
+            assert!(bedside.taken().is_none());
         }
     }
 }

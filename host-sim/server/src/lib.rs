@@ -9,6 +9,7 @@ pub mod outlets;
 pub mod pace;
 pub mod rehearsal;
 pub mod replay;
+pub mod saved_patients;
 pub mod station;
 pub mod streams;
 pub mod visualizer;

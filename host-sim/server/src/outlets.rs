@@ -110,8 +110,9 @@ impl Outlets {
         self.recorder = begun.ok();
     }
 
-    /// Writes where the probe is, if a recording is going on.
+    /// Tells where the probe is, and writes it if a recording is going on.
     pub(crate) fn probe(&mut self, view: ProbeView) {
+        self.publisher.probe(view);
         let written = self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.probe(view));
         self.written(written);
     }

@@ -299,7 +299,7 @@ impl<'a> Station<'a> {
         match bedside.ask(wish) {
             Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
             Err(why) => {
-                let answer = PatientAnswer { taken: false, reason: why.to_string() };
+                let answer = PatientAnswer { reason: why.to_string(), ..PatientAnswer::default() };
                 self.outlets.publisher.patient(&bedside.status(Some(answer)));
             }
         }
@@ -309,8 +309,8 @@ impl<'a> Station<'a> {
     fn patient_answer(&mut self) -> Option<bool> {
         let answer = self.driver.take_change()?;
         let bedside = self.bedside.as_mut()?;
-        let taken = answer.is_ok() && bedside.taken();
-        if taken {
+        let taken = answer.is_ok().then(|| bedside.taken()).flatten();
+        if taken.is_some() {
             self.outlets.publisher.scene(&bedside.scene());
             if let Some(practice) = &mut self.practice {
                 practice.patient(bedside.profile(), &bedside.setup().tasks, &self.outlets.publisher);
@@ -323,9 +323,13 @@ impl<'a> Station<'a> {
         } else {
             bedside.refused();
         }
-        let answer = PatientAnswer { taken, reason: answer.err().unwrap_or_default() };
+        let is_taken = taken.is_some();
+        let answer = taken.unwrap_or_else(|| PatientAnswer {
+            reason: answer.err().unwrap_or_default(),
+            ..PatientAnswer::default()
+        });
         self.outlets.publisher.patient(&bedside.status(Some(answer)));
-        Some(taken)
+        Some(is_taken)
     }
 
     fn is_over(&self) -> bool {

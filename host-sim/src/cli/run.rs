@@ -22,6 +22,7 @@ use recording::write::Recorder;
 use server::bedside::Bedside;
 use server::outlets::Outlets;
 use server::pace::Pace;
+use server::saved_patients::SavedPatients;
 use server::station::{Outcome, Station};
 use server::visualizer;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -161,7 +162,8 @@ impl Run {
             tasks: procedure.tasks.clone(),
         };
         let hand = is_virtual.then(|| wanted.clone());
-        let bedside = Bedside::new(profile.clone(), source, hand, setup.clone());
+        let bedside = Bedside::new(profile.clone(), source, hand, setup.clone())
+            .saving_in(SavedPatients::new(PATIENTS));
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
         let stop = Arc::new(AtomicBool::new(false));
@@ -269,6 +271,8 @@ impl Run {
 
 /// Port of the page.
 const PORT: u16 = 8710;
+/// The folder of the patients that were saved in the page, in the one that the program was started in.
+const PATIENTS: &str = "patients";
 
 /// Reads an address with or without a port.
 fn address(text: &str) -> Result<SocketAddr, String> {

@@ -45,6 +45,13 @@ impl Page {
         self.devtools.call("Emulation.setEmulatedMedia", features).map(drop)
     }
 
+    /// The languages that the person prefers, as `de-CH,de`; the next load of a page hears of them.
+    pub fn languages(&mut self, tags: &str) -> Result<(), Failure> {
+        let agent = self.text("navigator.userAgent")?;
+        let asked = json!({ "userAgent": agent, "acceptLanguage": tags });
+        self.devtools.call("Emulation.setUserAgentOverride", asked).map(drop)
+    }
+
     /// The value of a JavaScript expression; a promise is waited for.
     pub fn evaluate(&mut self, expression: &str) -> Result<Value, Failure> {
         let ask = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });

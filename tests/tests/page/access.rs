@@ -79,7 +79,7 @@ fn hit(page: &mut Page, size: Size, what: &str) -> Result<(), Failure> {
 fn keys(page: &mut Page) -> Result<(), Failure> {
     page.click("patient")?;
     page.wait("the editor", SOON, "document.querySelector('dialog[open]') !== null")?;
-    page.evaluate("document.querySelector('#patient-fields input').focus()")?;
+    page.evaluate("document.querySelector('#patient-editor input').focus()")?;
     page.press("Escape", "Escape", 27)?;
     page.wait("a stop from within a dialog", SOON, STOPPED)?;
     let closed = page.evaluate("document.querySelector('dialog[open]') === null")?;

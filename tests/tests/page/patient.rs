@@ -62,10 +62,11 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
     };
     page.evaluate(&edit("-5"))?;
     page.wait(
-        "a refusal with its reason",
+        "a refusal at the figure, in its words",
         SOON,
         "document.getElementById('patient-answer').dataset.tone === 'bad' && \
-         document.getElementById('patient-answer').textContent.includes('friction_n_per_mm is -5')",
+         document.querySelector('#patient-fields [data-key=friction_n_per_mm][aria-invalid]')?.parentElement.nextSibling.textContent \
+         .startsWith('Friction: −5\\u00a0N/mm is out of range; choose 0 to ')",
     )?;
     page.photograph(&scratch.join("patient.png"))?;
     page.evaluate(&edit("0.03"))?;
@@ -125,7 +126,7 @@ fn only_what_a_recording_has(page: &mut Page) -> Result<(), Failure> {
     let shown = page.evaluate(
         "[...document.querySelectorAll('button, input, select')].filter(e => e.checkVisibility()).map(e => e.id)",
     )?;
-    let expected = json!(["start", "stop", "view-section", "view-body", "scrub-place"]);
+    let expected = json!(["language", "start", "stop", "view-section", "view-body", "scrub-place"]);
     check("no dead controls", shown == expected, &shown)?;
     let says = page.text("[...['start', 'stop'].map(id => document.getElementById(id).firstChild.data), document.getElementById('hand-note').textContent].join()")?;
     check("words of a recording", says == "Play,Pause,Recording", &says)?;

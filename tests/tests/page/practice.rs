@@ -46,6 +46,9 @@ fn visit() -> Result<(), Failure> {
         &format!("{ROWS}.length > 0 && {ROWS}[0].textContent.includes('demo') && {ROWS}[0].textContent.includes('reached')"),
     )?;
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
+    // The scripted hand may have put the tourniquet on for its next insertion, which is this one; it does nothing from now on.
+    insert(&mut page, IN_VEIN_MM)?;
+    page.wait("a verdict", SOON, &format!("{VERDICT} !== ''"))?;
     record(&mut page, "monday")?;
     tasks_count(&mut page)?;
     page.wait("a success", SOON, &format!("/^Attempt \\d+\\. Goal reached\\./.test({VERDICT})"))?;

@@ -204,6 +204,14 @@ pub enum FromPage {
         /// Key by key as in a profile's file.
         profile: serde_json::Value,
     },
+    /// The patient as a person has edited it, to be kept under a name. An older one is never replaced: `anna` becomes `anna-2` where
+    /// there is one.
+    SavePatient {
+        /// Name of the file without folder and ending, as that of a recording.
+        name: String,
+        /// Key by key as in a profile's file.
+        profile: serde_json::Value,
+    },
     /// So much of the device's compensation is to be in force.
     Compensate {
         /// Share of what the device has stored, 0 to 1.
@@ -242,6 +250,7 @@ impl From<FromPage> for Control {
             FromPage::Tilt { rad } => Self::Tilt { rad },
             FromPage::Choose { patient } => Self::Patient(PatientWish::Named(patient)),
             FromPage::Edit { profile } => Self::Patient(PatientWish::Edited(profile)),
+            FromPage::SavePatient { name, profile } => Self::Patient(PatientWish::Saved { name, profile }),
             FromPage::Compensate { share } => Self::Compensate { share },
             FromPage::Record { name } => Self::Record { name },
             FromPage::EndRecording => Self::EndRecording,
@@ -279,6 +288,9 @@ impl FromPage {
                 "a recording's name has 1 to 60 letters, digits, blanks or ._- and begins with a letter or a digit"
                     .into(),
             ),
+            Self::SavePatient { name, .. } if !is_file_name(&name) => Err(
+                "a patient's name has 1 to 60 letters, digits, blanks or ._- and begins with a letter or a digit".into(),
+            ),
             Self::Probe(view) if !view.is_plausible() => Err("the probe is not on the limb".into()),
             Self::Task { name } if !crate::procedure::task::is_name(&name) => Err(
                 "a task's name has 1 to 40 lower-case letters, digits or _; use a name of the procedure's file".into(),
@@ -292,7 +304,7 @@ impl FromPage {
 }
 
 /// Returns true for a plain name that leads to no other folder.
-fn is_file_name(name: &str) -> bool {
+pub fn is_file_name(name: &str) -> bool {
     let is_plain = |c: char| c.is_alphanumeric() || " ._-".contains(c);
     (1..=60).contains(&name.chars().count())
         && name.chars().all(is_plain)
@@ -323,6 +335,8 @@ mod tests {
             r#"{"do":"seek","at_s":-1}"#,
             r#"{"do":"record","name":"../monday"}"#,
             r#"{"do":"record","name":""}"#,
+            r#"{"do":"save_patient","name":"../anna","profile":{}}"#,
+            r#"{"do":"save_patient","name":"anna"}"#,
             r#"{"do":"compensate","share":1.01}"#,
             r#"{"do":"probe","along_mm":13}"#,
             r#"{"do":"probe","along_mm":13,"across_mm":0,"azimuth_rad":9,"lean_rad":0,"share_in_plane":1,"tip_seen":true}"#,

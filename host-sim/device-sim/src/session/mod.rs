@@ -56,6 +56,7 @@ struct Hub {
 struct HubState {
     subscribers: Vec<Weak<Mutex<Buffer>>>,
     hello: Option<Hello>,
+    probe: Option<ProbeView>,
     timing: Option<Timing>,
     last_pose: Option<Pose>,
     events: VecDeque<Happening>,
@@ -78,6 +79,7 @@ struct Buffer {
     poses: VecDeque<Pose>,
     events: VecDeque<Happening>,
     tasks: VecDeque<TaskDone>,
+    probe: Option<ProbeView>,
     timing: Option<Timing>,
     skipped_samples: u64,
     jumps: u64,
@@ -120,6 +122,7 @@ impl Session {
             practice: state.practice.clone(),
             attempts: state.attempts.clone(),
             hello: state.hello.clone(),
+            probe: state.probe,
             timing: state.timing,
             events: state.events.clone(),
             tasks: state.tasks.clone(),
@@ -163,6 +166,7 @@ impl Subscription {
             poses: taken.poses.into(),
             events: taken.events.into(),
             tasks: taken.tasks.into(),
+            probe: taken.probe,
             timing: taken.timing,
             link,
             skipped_samples: taken.skipped_samples,
@@ -288,6 +292,12 @@ impl Publisher {
         self.each(|buffer| {
             append(&mut buffer.tasks, std::slice::from_ref(task), WAITING_EVENTS);
         });
+    }
+
+    /// The place of the ultrasound probe, as a page shows it.
+    pub fn probe(&self, view: ProbeView) {
+        lock(&self.hub.state).probe = Some(view);
+        self.each(|buffer| buffer.probe = Some(view));
     }
 
     /// Times of the stages.

@@ -31,8 +31,10 @@ impl Happening {
 /// Whom the needle goes into, as a page shows and edits it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PatientStatus {
-    /// Patients that come with the program.
+    /// Patients that can be chosen: those that come with the program, then those that were saved.
     pub names: Vec<String>,
+    /// True if an edited patient can be saved.
+    pub can_save: bool,
     /// The profile that counts, key by key as in its file.
     pub profile: serde_json::Value,
     /// The tasks that the procedure asks for.
@@ -42,12 +44,14 @@ pub struct PatientStatus {
 }
 
 /// The answer to a request for another patient.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PatientAnswer {
     /// True if the device has taken it, whole.
     pub taken: bool,
-    /// The reason if it has not, in one sentence.
+    /// The reason if it has not, or if it could not be saved, in one sentence.
     pub reason: String,
+    /// The file that it was saved in, if that was asked for.
+    pub saved: Option<String>,
 }
 
 /// The state of the link, in totals since the session began.
@@ -120,6 +124,8 @@ pub struct Batch {
     pub events: Vec<Happening>,
     /// Tasks that were done (a subscriber's first batch repeats the last 256).
     pub tasks: Vec<TaskDone>,
+    /// The place of the ultrasound probe, where it has moved.
+    pub probe: Option<ProbeView>,
     /// The latest times of the stages, where there were any.
     pub timing: Option<Timing>,
     /// The present state of the link.
@@ -131,10 +137,17 @@ pub struct Batch {
 /// Another patient.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PatientWish {
-    /// One that comes with the program.
+    /// One that comes with the program or was saved.
     Named(String),
     /// An edited profile, key by key as in a profile's file.
     Edited(serde_json::Value),
+    /// The same, to be saved under a name.
+    Saved {
+        /// Name of the file without folder and ending.
+        name: String,
+        /// Key by key as in a profile's file.
+        profile: serde_json::Value,
+    },
 }
 
 /// The ultrasound probe on the skin and what its image shows of the needle.

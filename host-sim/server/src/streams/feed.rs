@@ -2,9 +2,10 @@
 
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages;
-use device_sim::session::{Happening, Subscription};
+use device_sim::session::{Happening, ProbeView, Scene, Subscription};
 use serde::Serialize;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
@@ -23,6 +24,20 @@ pub struct Snapshot {
     pub fault: Option<String>,
     /// The events.
     pub events: Events,
+    /// The scene; none before the first look.
+    pub scene: Option<SharedScene>,
+    /// The ultrasound probe as a page holds it; none before it has.
+    pub probe: Option<ProbeView>,
+}
+
+/// A scene that equals itself and no other: it is compared with each pose.
+#[derive(Clone, Debug)]
+pub struct SharedScene(pub Arc<Scene>);
+
+impl PartialEq for SharedScene {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 /// The number of events since the device connected, and the last of them.
@@ -45,13 +60,11 @@ impl Events {
     }
 
     /// Returns their number.
-    #[cfg(any(test, feature = "foxglove"))]
     pub fn total(&self) -> u64 {
         self.total
     }
 
     /// Those after the first `told`, oldest first; a stream that is far behind misses the oldest of them.
-    #[cfg(any(test, feature = "foxglove"))]
     pub fn since(&self, told: u64) -> impl Iterator<Item = &messages::Event> {
         let new = self.total.saturating_sub(told).min(self.last.len() as u64) as usize;
         self.last.range(self.last.len() - new..)
@@ -115,10 +128,14 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
         let batch = subscription.drain();
         let faults = batch.events.iter().filter_map(fault).next_back();
         let connected = batch.link.connected;
+        let scene = batch.scene.clone().map(|scene| SharedScene(Arc::new(scene)));
+        let probe = batch.probe;
         let (_, frame) = condenser.take(batch);
         publish.send_if_modified(|snapshot| {
             let before = snapshot.clone();
             snapshot.connected = connected;
+            snapshot.scene = scene.or_else(|| snapshot.scene.take());
+            snapshot.probe = probe.or(snapshot.probe);
             if let Some(fault) = faults {
                 snapshot.fault = fault;
             }

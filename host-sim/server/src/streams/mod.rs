@@ -12,6 +12,7 @@ mod foxglove;
 mod openigtlink;
 mod spec;
 mod udp;
+mod ultrasound_image;
 mod websocket;
 
 pub use feed::{NeedlePose, Snapshot};

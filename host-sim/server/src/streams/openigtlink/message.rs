@@ -63,7 +63,7 @@ pub(super) fn transform(pose: &NeedlePose) -> Vec<u8> {
 }
 
 /// A whole message; `t_s` becomes the protocol's seconds with 32 binary places.
-fn message(kind: &str, name: &str, t_s: f64, body: &[u8]) -> Vec<u8> {
+pub(super) fn message(kind: &str, name: &str, t_s: f64, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + body.len());
     bytes.extend(1_u16.to_be_bytes());
     bytes.extend(padded::<12>(kind));

@@ -1,12 +1,15 @@
-//! OpenIGTLink, 3D Slicer's way: the needle's pose as TRANSFORM messages, the device's condition as STATUS messages.
+//! OpenIGTLink, 3D Slicer's way: the needle's pose and the probe's as TRANSFORM messages, the ultrasound image as IMAGE messages, the
+//! device's condition as STATUS messages.
 //!
-//! [`message`] is the protocol's bytes. Written here because the crate of that name brings a TLS library and a logger for what
+//! [`message`] is the protocol's bytes, `image` those of an image and its probe. Written here because the crate of that name brings a TLS library and a logger for what
 //! is a header of 58 bytes.
 
+mod image;
 mod message;
 
 use super::feed::Snapshot;
 use super::spec::Token;
+use super::ultrasound_image::{self, Images};
 use super::{MOST_CLIENTS, SEND_TIMEOUT};
 use message::{Status, transform};
 use std::io;
@@ -37,6 +40,7 @@ pub(super) async fn serve(
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
     let places = Arc::new(Semaphore::new(MOST_CLIENTS));
+    let images = ultrasound_image::begin(newest.clone())?;
     tokio::spawn(async move {
         loop {
             let Ok((stream, _)) = listener.accept().await else {
@@ -45,17 +49,17 @@ pub(super) async fn serve(
             };
             // One too many is closed at once.
             let Ok(place) = places.clone().try_acquire_owned() else { continue };
-            let (newest, token) = (newest.clone(), token.clone());
+            let (newest, images, token) = (newest.clone(), images.clone(), token.clone());
             tokio::spawn(async move {
                 let _place = place;
-                client(stream, newest, token).await;
+                client(stream, newest, images, token).await;
             });
         }
     });
     Ok(bound)
 }
 
-async fn client(stream: TcpStream, newest: watch::Receiver<Snapshot>, token: Option<Token>) {
+async fn client(stream: TcpStream, newest: watch::Receiver<Snapshot>, images: Images, token: Option<Token>) {
     let _ = stream.set_nodelay(true);
     let (mut reader, writer) = stream.into_split();
     if let Some(token) = token
@@ -65,7 +69,7 @@ async fn client(stream: TcpStream, newest: watch::Receiver<Snapshot>, token: Opt
     }
     tokio::select! {
         () = throw_away(reader) => {}
-        () = stream_to(writer, newest) => {}
+        () = stream_to(writer, newest, images.watch()) => {}
     }
 }
 
@@ -85,7 +89,11 @@ async fn throw_away(mut reader: OwnedReadHalf) {
     while matches!(reader.read(&mut bytes).await, Ok(count) if count > 0) {}
 }
 
-async fn stream_to(mut writer: OwnedWriteHalf, mut newest: watch::Receiver<Snapshot>) {
+async fn stream_to(
+    mut writer: OwnedWriteHalf,
+    mut newest: watch::Receiver<Snapshot>,
+    mut images: ultrasound_image::Watched,
+) {
     let mut told: Option<(Status, Instant)> = None;
     newest.mark_changed();
     loop {
@@ -100,6 +108,9 @@ async fn stream_to(mut writer: OwnedWriteHalf, mut newest: watch::Receiver<Snaps
         }
         if let Some(pose) = &snapshot.pose {
             out.extend(transform(pose));
+        }
+        if let Some(image) = images.next() {
+            out.extend(image::messages(&image));
         }
         if !matches!(timeout(SEND_TIMEOUT, writer.write_all(&out)).await, Ok(Ok(()))) {
             return;
