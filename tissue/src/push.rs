@@ -168,11 +168,10 @@ mod tests {
         let forces = at(None).forces();
         // One inside, two of the faces that are tied, one of the skin.
         for number in [300, 741 - 3, 741 + 3, 120] {
-            for axis in 0..3 {
+            for (axis, force) in forces[number].into_iter().enumerate() {
                 let by = 4e-3;
                 let slope = (at(Some((number, axis, by))).energy() - at(Some((number, axis, -by))).energy())
                     / (2.0 * f64::from(by));
-                let force = forces[number][axis];
                 assert!(
                     (force + slope).abs() < 0.01 * force.abs() + 200.0,
                     "{number} {axis}: {force}, {slope}"

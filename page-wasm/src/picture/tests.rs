@@ -1,6 +1,7 @@
 //! The picture from the numbers of a page.
 
 use super::*;
+use crate::drawn::Kind;
 
 /// The adult profile: skin, fat, vein from 4.8 to 7.8 mm.
 const ADULT: [f32; 21] = [
