@@ -14,6 +14,7 @@ mod log;
 mod rate;
 mod runaway;
 mod second_board;
+mod settled;
 mod silicon;
 mod store;
 mod sustained;
