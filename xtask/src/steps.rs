@@ -23,7 +23,7 @@ pub(crate) struct Step {
 
 /// In the order that finds the most for the least time.
 pub(crate) const STEPS: [Step; 14] = [
-    step("fmt", "the sources are formatted", 5.0, fmt),
+    step("fmt", "the sources are formatted", 3.0, fmt),
     step("words", "comments and documents are in plain English", 1.0, words::check),
     step("arrows", "no files of a crate use each other in a circle", 2.0, arrows::check),
     step("clippy", "no warning from the compiler or clippy", 130.0, clippy),
@@ -41,7 +41,7 @@ pub(crate) const STEPS: [Step; 14] = [
 
 /// The inner loop.
 pub(crate) const QUICK: [Step; 5] = [
-    step("fmt", "the sources are formatted", 5.0, fmt),
+    step("fmt", "the sources are formatted", 3.0, fmt),
     step("words", "comments and documents are in plain English", 1.0, words::check),
     step("arrows", "no files of a crate use each other in a circle", 2.0, arrows::check),
     step("clippy", "no warning from the compiler or clippy", 94.0, clippy),

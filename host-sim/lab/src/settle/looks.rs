@@ -6,21 +6,34 @@ use super::Name;
 /// Confidence below which a diagnosis names nothing.
 const LEAST: f64 = 2.0 / 3.0;
 
-/// Names of the last round with a confidence that counts the looks, and those that are then too unsure to be names.
+/// The part of the error that a run may make that its first diagnosis takes; the others share the rest.
+const FIRST: f64 = 0.5;
+
+/// Names of the last round with a confidence that counts the looks of a run of at most `most` rounds, and those that are then too unsure
+/// to be names.
 ///
-/// A run could have stopped for a name in any round up to the one since which the name stands, so that the probability of an error in
-/// one of those looks is at most their number times that of one (Bonferroni).
-pub(super) fn corrected(rounds: &[Vec<Name>]) -> (Vec<Name>, Vec<Name>) {
+/// A run could have stopped for a name in the round since which the name stands. An error is spent on each round in turn (a union bound):
+/// if each name's error is no more than its share, the run's errors together are no more than that.
+pub(super) fn corrected(rounds: &[Vec<Name>], most: usize) -> (Vec<Name>, Vec<Name>) {
     let Some(last) = rounds.last() else { return (Vec::new(), Vec::new()) };
-    let with_looks = |name: &Name| {
-        let looks = looks(name, rounds);
-        Name { confidence: (1.0 - looks as f64 * (1.0 - name.confidence)).max(0.0), ..name.clone() }
+    let counted = |name: &Name| {
+        let error = (1.0 - name.confidence) / share(since(name, rounds), most);
+        Name { confidence: (1.0 - error).max(0.0), ..name.clone() }
     };
-    last.iter().map(with_looks).partition(|name| name.confidence >= LEAST)
+    last.iter().map(counted).partition(|name| name.confidence >= LEAST)
+}
+
+/// The share of a run's error that its diagnosis of this number, from 1, takes.
+fn share(round: usize, most: usize) -> f64 {
+    match (round, most) {
+        (_, 0 | 1) => 1.0,
+        (1, _) => FIRST,
+        _ => (1.0 - FIRST) / (most - 1) as f64,
+    }
 }
 
 /// The round, from 1, since which every round gives the name or one of its class.
-fn looks(name: &Name, rounds: &[Vec<Name>]) -> usize {
+fn since(name: &Name, rounds: &[Vec<Name>]) -> usize {
     let is_same = |other: &Name| other.class.iter().any(|one| name.class.contains(one));
     let without = rounds.iter().rposition(|names| !names.iter().any(is_same));
     without.map_or(1, |round| round + 2)
@@ -36,20 +49,27 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_stands_from_the_first_round_keeps_its_confidence() {
+    fn a_single_diagnosis_keeps_its_confidence() {
         let twins = name(&["electrical_lag", "command_delay"], 0.72);
-        let (names, unsure) = corrected(&[vec![twins], vec![name(&["command_delay"], 0.98)]]);
-        assert_eq!((names, unsure), (vec![name(&["command_delay"], 0.98)], vec![]));
+        assert_eq!(corrected(&[vec![twins.clone()]], 1), (vec![twins], vec![]));
     }
 
     #[test]
-    fn a_name_that_comes_up_late_has_been_looked_for_often() {
+    fn a_name_that_stands_from_the_first_round_counts_twice() {
+        let twins = name(&["electrical_lag", "command_delay"], 0.72);
+        let (names, unsure) = corrected(&[vec![twins], vec![name(&["command_delay"], 0.98)]], 5);
+        assert!((names[0].confidence - 0.96).abs() < 1e-12);
+        assert!(unsure.is_empty());
+    }
+
+    #[test]
+    fn a_name_that_comes_up_late_counts_eight_times() {
         let rounds = [vec![], vec![name(&["cogging"], 0.9)], vec![], vec![], vec![name(&["cogging"], 0.78)]];
-        let (names, unsure) = corrected(&rounds);
+        let (names, unsure) = corrected(&rounds, 5);
         assert!(names.is_empty());
         assert!(unsure[0].confidence < 0.01);
-        let (names, _) = corrected(&[vec![], vec![name(&["cogging"], 0.95)]]);
-        assert!((names[0].confidence - 0.9).abs() < 1e-12);
+        let (names, _) = corrected(&[vec![], vec![name(&["cogging"], 0.98)]], 5);
+        assert!((names[0].confidence - 0.84).abs() < 1e-12);
     }
 
     /// A run stops at the first of five looks that gives a name; where nothing is there, each look gives one with the probability that
@@ -75,7 +95,7 @@ mod tests {
                     break;
                 }
             }
-            let sure = corrected(&rounds).0.first().map_or(0.0, |name| name.confidence);
+            let sure = corrected(&rounds, 5).0.first().map_or(0.0, |name| name.confidence);
             for (count, least) in counted.iter_mut().zip([LEAST, 0.8, 0.9]) {
                 *count += i32::from(sure >= least);
             }

@@ -2,6 +2,7 @@
 //! name is left or nothing tells the rest apart. What was settled is fed forward by the device, as far as it can be.
 
 mod feel;
+mod following;
 mod looks;
 mod page;
 mod play;
@@ -14,10 +15,11 @@ use crate::characterise::programme::{Programme, programmes};
 use crate::characterise::written;
 use crate::compensate;
 use device_sim::failure::Failure;
-use diagnosis::report::{Report, Verdict};
+use diagnosis::report::Report;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request};
-use experiment::{Case, Design, Input, design};
+use experiment::{Design, Input};
+use following::following;
 use play::Limited;
 use std::path::{Path, PathBuf};
 
@@ -25,12 +27,8 @@ use std::path::{Path, PathBuf};
 pub const MOST_ROUNDS: usize = 5;
 /// See [`MOST_ROUNDS`].
 pub const MOST_MOTION_S: f64 = 180.0;
-/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers, to judge.
-const INPUT_S: f64 = 16.0;
-/// The same of the first round, of which the input is general.
+/// The longest input of the first round, s, which is general.
 const GENERAL_S: f64 = 12.0;
-/// A round that is shorter than this, s, shows nothing new.
-const LEAST_ROUND_S: f64 = 10.0;
 
 /// The source of each round's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +67,13 @@ pub struct Settings {
     pub device: String,
     /// Folder for all files.
     pub out: PathBuf,
+}
+
+impl Settings {
+    /// The most rounds that inputs of this kind have.
+    fn most_rounds(&self) -> usize {
+        if self.inputs == Inputs::Characterise { 1 } else { self.rounds }
+    }
 }
 
 /// One round.
@@ -116,9 +121,9 @@ pub struct Settled {
 
 impl Settled {
     /// Takes the names from the rounds so far.
-    fn count_looks(&mut self) {
+    fn count_looks(&mut self, most: usize) {
         let rounds: Vec<Vec<Name>> = self.rounds.iter().map(|round| round.names.clone()).collect();
-        (self.names, self.unsure) = looks::corrected(&rounds);
+        (self.names, self.unsure) = looks::corrected(&rounds, most);
     }
 
     /// Sentences, without their full stops, on the names that are not sure enough.
@@ -221,7 +226,7 @@ impl Run<'_> {
             };
             progress(Progress::Said(&report.sentence))?;
             settled.rounds.push(round(asked, &report));
-            settled.count_looks();
+            settled.count_looks(self.settings.most_rounds());
             let folder = folder.join("report");
             match following(&self.limited, &report, &folder, self.settings, settled)? {
                 Ok(next) => asked = next,
@@ -263,84 +268,6 @@ impl Run<'_> {
                 self.request.rig.display()
             ))
         })
-    }
-}
-
-/// The round that follows, or the conclusion if none does.
-fn following(
-    limited: &Limited,
-    report: &Report,
-    folder: &Path,
-    settings: &Settings,
-    settled: &Settled,
-) -> Result<Result<Asked, String>, Failure> {
-    let (played, rounds) = (settled.motion_s(), settled.rounds.len());
-    let left_s = settings.motion_s - played;
-    if let Some(conclusion) = is_settled(report, rounds) {
-        return Ok(Err(conclusion));
-    }
-    if rounds >= settings.rounds {
-        return Ok(Err(format!("the limit of rounds, {rounds}, was reached")));
-    }
-    if left_s < LEAST_ROUND_S {
-        return Ok(Err(format!(
-            "{played:.0} s of motion were played, and {:.0} s are allowed",
-            settings.motion_s
-        )));
-    }
-    next(limited, report, folder, settings, (rounds as u64 + settings.seed, left_s))
-}
-
-/// The conclusion if each name is single, or nothing is there to be named; `rounds` were played.
-fn is_settled(report: &Report, rounds: usize) -> Option<String> {
-    let explained = matches!(report.verdict, Verdict::NoMismatch | Verdict::ParametersOnly);
-    if explained && rounds >= 2 {
-        return Some("two rounds or more leave nothing that an effect would explain".to_owned());
-    }
-    let rivals = report.contenders.iter().filter(|one| one.name.is_some()).count();
-    if rivals > 0 || matches!(report.verdict, Verdict::InsufficientExcitation) {
-        return None;
-    }
-    let names: Vec<&str> = report.effects.iter().map(|effect| effect.name.as_str()).collect();
-    Some(match names[..] {
-        [] => "no effect contends: the simulation leaves out nothing that these inputs show".to_owned(),
-        _ => format!("{} is left, and no rival", names.join(" and ")),
-    })
-}
-
-/// The next round, or why there is none; `number` seeds it and `left_s` is the motion that is left.
-fn next(
-    limited: &Limited,
-    report: &Report,
-    folder: &Path,
-    settings: &Settings,
-    (seed, left_s): (u64, f64),
-) -> Result<Result<Asked, String>, Failure> {
-    let most_s = INPUT_S.min(0.5 * left_s);
-    match settings.inputs {
-        Inputs::Characterise => {
-            Ok(Err("the set of characterise was played, shortened to the motion allowed".into()))
-        }
-        Inputs::Multisines => limited.multisine(seed, most_s).map(Ok),
-        Inputs::Designed if report.verdict == Verdict::InsufficientExcitation => {
-            limited.general("the recordings so far could not tell", most_s).map(Ok)
-        }
-        Inputs::Designed => {
-            let (travel, speed, force) = limited.limits();
-            let case = match Case::read(folder, Some(travel), Some(speed), Some(force)) {
-                Ok(case) => case,
-                Err(sentence) => return Ok(Err(sentence)),
-            };
-            let design = match design(&case, most_s, seed) {
-                Ok(design) => design,
-                Err(sentence) => return Ok(Err(sentence)),
-            };
-            if !design.decides() {
-                let sentence = design.limits_in_words().unwrap_or_default();
-                return Ok(Err(sentence));
-            }
-            limited.designed(design).map(Ok)
-        }
     }
 }
 
