@@ -12,6 +12,7 @@ mod export;
 mod fit_force;
 mod import;
 mod layers;
+mod man;
 pub(crate) mod output;
 mod progress;
 mod recordings;
@@ -34,6 +35,9 @@ pub(crate) struct Cli {
     /// Print results and errors only: no progress, no addresses, no advice
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Print each stage with its time to standard error, also where that is no terminal
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    verbose: bool,
     /// Do not open a browser when serving a page
     #[arg(long, global = true)]
     no_browser: bool,
@@ -62,11 +66,12 @@ enum Command {
     Simulate(simulate::Simulate),
     FitForce(fit_force::FitForce),
     Completions(completions::Completions),
+    Man(man::Man),
 }
 
 impl Cli {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        output::set(self.quiet, self.no_browser);
+        output::set(self.quiet, self.verbose, self.no_browser);
         match self.command {
             // As if `run` had been said: its defaults stand in one place.
             None => Self::parse_from(["host-sim", "run"]).run(),
@@ -89,6 +94,7 @@ impl Cli {
             Some(Command::Simulate(command)) => command.run(),
             Some(Command::FitForce(command)) => command.run(),
             Some(Command::Completions(command)) => command.run(),
+            Some(Command::Man(command)) => command.run(),
         }
     }
 }

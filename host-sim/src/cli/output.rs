@@ -8,17 +8,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const OPENS_BROWSER: bool = option_env!("HOST_SIM_OPENS_BROWSER").is_some();
 
 static QUIET: AtomicBool = AtomicBool::new(false);
+static VERBOSE: AtomicBool = AtomicBool::new(false);
 static NO_BROWSER: AtomicBool = AtomicBool::new(false);
 
 /// Notes what the command line asks for; what was asked for once stays so.
-pub(crate) fn set(quiet: bool, no_browser: bool) {
+pub(crate) fn set(quiet: bool, verbose: bool, no_browser: bool) {
     QUIET.fetch_or(quiet, Ordering::Relaxed);
+    VERBOSE.fetch_or(verbose, Ordering::Relaxed);
     NO_BROWSER.fetch_or(no_browser, Ordering::Relaxed);
 }
 
 /// Returns true if only results and errors are printed.
 pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
+}
+
+/// Returns true if each stage is printed with its time.
+pub(crate) fn is_verbose() -> bool {
+    VERBOSE.load(Ordering::Relaxed)
+}
+
+/// Returns true if standard output takes colours: a terminal whose user has not set `NO_COLOR` (no-color.org).
+fn takes_colours() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
 /// Says where a page is, and opens it where this program does so.
@@ -36,7 +48,7 @@ pub(crate) fn page_for_others(url: &str) {
     if let Ok(code) = qrcode::QrCode::new(url) {
         let text = code.render::<qrcode::render::unicode::Dense1x2>().build();
         // Black on white, whatever the terminal's own colours are: cameras fail on the negative.
-        let (black_on_white, plain) = match std::io::stdout().is_terminal() {
+        let (black_on_white, plain) = match takes_colours() {
             true => ("\x1b[30;107m", "\x1b[0m"),
             false => ("", ""),
         };

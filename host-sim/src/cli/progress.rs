@@ -1,4 +1,4 @@
-//! Progress of long work: one line on a terminal, nothing in a pipe.
+//! Progress of long work: one line on a terminal, nothing in a pipe; with `--verbose` a line for each stage.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -6,10 +6,16 @@ use std::time::{Duration, Instant};
 /// Redrawn no more often than this.
 const INTERVAL: Duration = Duration::from_millis(100);
 
+/// With `--verbose`, a stage that goes on is printed again after this.
+const AGAIN: Duration = Duration::from_secs(5);
+
 /// A line that is drawn over.
 pub(crate) struct Progress {
     what: &'static str,
     on: bool,
+    verbose: bool,
+    /// The unit or stage of the last line.
+    stage: String,
     drawn: Option<Instant>,
     begun: Instant,
 }
@@ -20,6 +26,8 @@ impl Progress {
         Self {
             what,
             on: std::io::stderr().is_terminal() && !super::output::is_quiet(),
+            verbose: super::output::is_verbose(),
+            stage: String::new(),
             drawn: None,
             begun: Instant::now(),
         }
@@ -27,9 +35,13 @@ impl Progress {
 
     /// Shows `done` of `all`, where that is known.
     pub(crate) fn show(&mut self, done: f64, all: Option<f64>, unit: &str) {
-        if !self.on || self.drawn.is_some_and(|drawn| drawn.elapsed() < INTERVAL) {
+        let is_due = |interval| self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
+        let is_wanted =
+            if self.verbose { self.stage != unit || is_due(AGAIN) } else { self.on && is_due(INTERVAL) };
+        if !is_wanted {
             return;
         }
+        unit.clone_into(&mut self.stage);
         self.drawn = Some(Instant::now());
         let line = match all {
             Some(all) => {
@@ -40,7 +52,10 @@ impl Progress {
             None => format!("{}: {done:.1} {unit}", self.what),
         };
         // A terminal that went away is no reason to stop.
-        let _ = write!(std::io::stderr(), "\r\x1b[K{line}");
+        let _ = match self.verbose {
+            true => writeln!(std::io::stderr(), "{:8.1} s  {line}", self.begun.elapsed().as_secs_f64()),
+            false => write!(std::io::stderr(), "\r\x1b[K{line}"),
+        };
     }
 }
 
@@ -55,7 +70,7 @@ fn left(elapsed: f64, part: f64) -> Option<String> {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if self.drawn.is_some() {
+        if self.drawn.is_some() && !self.verbose {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
     }

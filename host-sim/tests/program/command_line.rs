@@ -40,6 +40,40 @@ fn a_minute_takes_seconds_and_loses_nothing() {
 }
 
 #[test]
+fn every_command_of_the_help_has_a_manual_page() {
+    let out = folder("man");
+    run_well(&["man", "--out", text(&out)]);
+    let help = run_well(&["--help"]);
+    let commands =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() > 15 && names.contains(&"diagnose"), "{names:?}");
+    for name in names.iter().filter(|name| **name != "help") {
+        let page = std::fs::read_to_string(out.join(format!("host-sim-{name}.1"))).expect(name);
+        assert!(page.contains(".SH SYNOPSIS") && page.contains("Example"), "{name}: {page}");
+    }
+    assert!(out.join("host-sim.1").is_file());
+    refused(&run(&["man", "--out", "/proc/none"]), 1, &["/proc/none", "choose another --out"]);
+}
+
+#[test]
+fn verbose_prints_stages_with_their_time_into_a_pipe() {
+    let arguments = ["run", "--headless", "--fast", "--seconds", "2"];
+    let stderr = |flag: &[&str]| {
+        let output = host_sim(&[flag, &arguments].concat()).output().expect("it runs");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).expect("text")
+    };
+    assert_eq!(stderr(&[]), "", "nothing in a pipe unless it is asked for");
+    let said = stderr(&["-v"]);
+    let (time, what) =
+        said.lines().next().and_then(|line| line.split_once(" s  ")).expect("a line with its time");
+    assert!(time.trim().parse::<f64>().is_ok() && what.starts_with("running: "), "{said}");
+    assert!(!said.contains('\x1b'), "no colours and no cursor in a pipe: {said:?}");
+    refused(&run(&["-v", "--quiet", "profiles"]), 2, &["cannot be used with"]);
+}
+
+#[test]
 fn the_same_run_gives_the_same_csv() {
     let dir = folder("same");
     let csv = |name: &str| {

@@ -36,7 +36,7 @@ struct Answer {
 /// A plant with the answer of each arm.
 struct Judged {
     kind: Kind,
-    name: &'static str,
+    names: Vec<&'static str>,
     answers: Vec<Answer>,
 }
 
@@ -56,14 +56,16 @@ impl Answer {
         })
     }
 
-    /// True if the one name that is given is the true one, alone in its class.
-    fn is_right(&self, truth: &str) -> bool {
-        self.error.is_none() && self.names.len() == 1 && self.names[0].0 == [truth.to_owned()]
+    /// True if the names that are given are the true ones, each alone in its class, and no others.
+    fn is_right(&self, truth: &[&str]) -> bool {
+        let is_given = |name: &&str| self.names.iter().any(|(class, _)| *class == [*name]);
+        self.error.is_none() && self.names.len() == truth.len() && truth.iter().all(is_given)
     }
 
-    /// True if a class without the true name is given as sure.
-    fn is_surely_wrong(&self, truth: &str) -> bool {
-        self.names.iter().any(|(class, sure)| *sure >= SURE && !class.iter().any(|name| name == truth))
+    /// True if a class without a true name is given as sure.
+    fn is_surely_wrong(&self, truth: &[&str]) -> bool {
+        let is_true = |name: &String| truth.contains(&name.as_str());
+        self.names.iter().any(|(class, sure)| *sure >= SURE && !class.iter().any(is_true))
     }
 }
 
@@ -72,7 +74,8 @@ impl Answer {
 struct Figures {
     twins: Rate,
     singles: Rate,
-    /// The true name is in the class of a name.
+    pairs: Rate,
+    /// Every true name is in the class of a name.
     in_class: Rate,
     wrong: Rate,
     nulls_named: Rate,
@@ -85,16 +88,18 @@ struct Figures {
 impl Figures {
     fn add(&mut self, plant: &Judged, answer: &Answer) {
         match plant.kind {
-            Kind::Twin => self.twins.add(answer.is_right(plant.name)),
-            Kind::Single => self.singles.add(answer.is_right(plant.name)),
+            Kind::Twin => self.twins.add(answer.is_right(&plant.names)),
+            Kind::Single => self.singles.add(answer.is_right(&plant.names)),
+            Kind::Pair => self.pairs.add(answer.is_right(&plant.names)),
             Kind::Null => self.nulls_named.add(!answer.names.is_empty()),
             Kind::Outside => self.outside_named.add(!answer.names.is_empty()),
         }
-        if !plant.name.is_empty() {
-            let holds = |(class, _): &(Vec<String>, f64)| class.iter().any(|name| name == plant.name);
-            self.in_class.add(answer.names.iter().any(holds));
+        if !plant.names.is_empty() {
+            let is_held =
+                |truth: &&str| answer.names.iter().any(|(class, _)| class.iter().any(|name| name == truth));
+            self.in_class.add(plant.names.iter().all(is_held));
         }
-        self.wrong.add(answer.is_surely_wrong(plant.name));
+        self.wrong.add(answer.is_surely_wrong(&plant.names));
         self.errors += usize::from(answer.error.is_some());
         if answer.error.is_none() {
             self.rounds.push(answer.rounds as f64);
@@ -119,7 +124,7 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
             // Recordings of a plant take 100 MB.
             let _ = std::fs::remove_dir_all(&folder);
         }
-        Judged { kind: plant.kind, name: plant.name, answers }
+        Judged { kind: plant.kind, names: plant.names.clone(), answers }
     });
     let judged: Vec<Judged> = judged.into_iter().flatten().collect();
     let text = table::markdown(&judged, options.seed, count);
@@ -146,7 +151,7 @@ fn json_of(plant: &Judged) -> Value {
         })
     };
     let answers: Vec<Value> = ARMS.iter().zip(&plant.answers).map(answer).collect();
-    json!({ "kind": plant.kind.words(), "truth": plant.name, "answers": answers })
+    json!({ "kind": plant.kind.words(), "truth": plant.names, "answers": answers })
 }
 
 /// `host-sim`, beside this program.
@@ -225,19 +230,22 @@ mod tests {
 
     #[test]
     fn only_the_true_name_alone_is_right() {
-        assert!(answer(&[&["cogging"]], 0.95).is_right("cogging"));
-        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_right("cogging"));
-        assert!(!answer(&[&["cogging"], &["command_delay"]], 0.95).is_right("cogging"));
-        assert!(!answer(&[], 0.0).is_right("cogging"));
+        assert!(answer(&[&["cogging"]], 0.95).is_right(&["cogging"]));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_right(&["cogging"]));
+        assert!(!answer(&[&["cogging"], &["command_delay"]], 0.95).is_right(&["cogging"]));
+        assert!(!answer(&[], 0.0).is_right(&["cogging"]));
+        let both = answer(&[&["cogging"], &["command_delay"]], 0.95);
+        assert!(both.is_right(&["command_delay", "cogging"]));
+        assert!(!both.is_right(&["command_delay", "torque_ripple"]));
     }
 
     #[test]
     fn a_name_is_surely_wrong_if_its_class_lacks_the_truth() {
-        assert!(answer(&[&["cogging"]], 0.95).is_surely_wrong("torque_ripple"));
-        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_surely_wrong("torque_ripple"));
-        assert!(!answer(&[&["cogging"]], 0.85).is_surely_wrong("torque_ripple"));
+        assert!(answer(&[&["cogging"]], 0.95).is_surely_wrong(&["torque_ripple"]));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_surely_wrong(&["torque_ripple"]));
+        assert!(!answer(&[&["cogging"]], 0.85).is_surely_wrong(&["torque_ripple"]));
         assert!(
-            answer(&[&["cogging"]], 0.95).is_surely_wrong(""),
+            answer(&[&["cogging"]], 0.95).is_surely_wrong(&[]),
             "any sure name is wrong where nothing is concealed"
         );
     }

@@ -11,6 +11,8 @@ pub(crate) enum Kind {
     Twin,
     /// An effect without one.
     Single,
+    /// Two effects.
+    Pair,
     /// Nothing but values that are off.
     Null,
     /// A force outside the library.
@@ -22,6 +24,7 @@ impl Kind {
         match self {
             Self::Twin => "twins",
             Self::Single => "singles",
+            Self::Pair => "pairs",
             Self::Null => "nulls",
             Self::Outside => "outside",
         }
@@ -32,8 +35,8 @@ impl Kind {
 #[derive(Clone, Debug)]
 pub(crate) struct Plant {
     pub(crate) kind: Kind,
-    /// The effect; empty where nothing is to be named.
-    pub(crate) name: &'static str,
+    /// The effects; none where nothing is to be named.
+    pub(crate) names: Vec<&'static str>,
     /// The rig file.
     pub(crate) toml: String,
 }
@@ -56,8 +59,8 @@ const TWINS: [&str; 14] = [
     "command_delay",
 ];
 const SINGLES: [&str; 4] = ["cogging", "torque_ripple", "command_deadband", "asymmetric_friction"];
-/// Kinds in turn: six of ten plants have a twin, two have none, one is a null and one is outside.
-const TURN: [Kind; 10] = [
+/// Kinds in turn: of twelve plants six have a twin, two have none, two hold a pair, one is a null and one is outside.
+const TURN: [Kind; 12] = [
     Kind::Twin,
     Kind::Single,
     Kind::Twin,
@@ -68,6 +71,19 @@ const TURN: [Kind; 10] = [
     Kind::Twin,
     Kind::Single,
     Kind::Twin,
+    Kind::Pair,
+    Kind::Pair,
+];
+/// Effects of which a pair holds two different ones.
+const IN_PAIRS: [&str; 8] = [
+    "cogging",
+    "torque_ripple",
+    "command_deadband",
+    "asymmetric_friction",
+    "stribeck_friction",
+    "command_delay",
+    "mass_imbalance",
+    "friction_drift",
 ];
 
 /// The numbers of a rig that sizes are drawn from, and its text.
@@ -104,11 +120,15 @@ impl Base {
 pub(crate) fn draw(base: &Base, seed: u64, index: usize) -> Plant {
     let mut rng = Rng::new(seed).fork(&format!("settle {index}"));
     let kind = TURN[index % TURN.len()];
-    let (name, effect) = match kind {
-        Kind::Twin => named(TWINS[rng.below(TWINS.len())], base, &mut rng),
-        Kind::Single => named(SINGLES[rng.below(SINGLES.len())], base, &mut rng),
-        Kind::Null => ("", String::new()),
-        Kind::Outside => ("", outside(base, &mut rng)),
+    let (names, effects) = match kind {
+        Kind::Twin => named(&[TWINS[rng.below(TWINS.len())]], base, &mut rng),
+        Kind::Single => named(&[SINGLES[rng.below(SINGLES.len())]], base, &mut rng),
+        Kind::Pair => {
+            let (first, step) = (rng.below(IN_PAIRS.len()), 1 + rng.below(IN_PAIRS.len() - 1));
+            named(&[IN_PAIRS[first], IN_PAIRS[(first + step) % IN_PAIRS.len()]], base, &mut rng)
+        }
+        Kind::Null => (Vec::new(), String::new()),
+        Kind::Outside => (Vec::new(), outside(base, &mut rng)),
     };
     let mut toml = String::from("format = 1\nname = \"concealed\"\nkind = \"rotary\"\n[model]\n");
     // Within what the rig declares: a third of 15 % for the inertia, a quarter of 50 % for friction.
@@ -121,8 +141,8 @@ pub(crate) fn draw(base: &Base, seed: u64, index: usize) -> Plant {
     let _ =
         writeln!(toml, "limit = {:?}\n[encoder]\ncounts_per_unit = {:?}", base.limit, base.counts_per_unit);
     let _ = writeln!(toml, "turn = {:?}", std::f64::consts::TAU);
-    toml += &effect;
-    Plant { kind, name, toml }
+    toml += &effects;
+    Plant { kind, names, toml }
 }
 
 /// The text of an effect with its shape and coefficients.
@@ -137,13 +157,18 @@ fn text(name: &str, shape: &[(&str, f64)], coefficients: &[(&str, f64)]) -> Stri
     )
 }
 
-/// An effect of the library, of a size that is a part of the dry friction or of the drive.
-fn named(name: &'static str, base: &Base, rng: &mut Rng) -> (&'static str, String) {
+/// Effects of the library and their text.
+fn named(names: &[&'static str], base: &Base, rng: &mut Rng) -> (Vec<&'static str>, String) {
+    (names.to_vec(), names.iter().map(|name| effect(name, base, rng)).collect())
+}
+
+/// The text of an effect of the library, of a size that is a part of the dry friction or of the drive.
+fn effect(name: &str, base: &Base, rng: &mut Rng) -> String {
     let force = base.dry * rng.log_range(0.15, 0.6);
     let phase = rng.range(0.0, std::f64::consts::TAU);
     let wave = |amplitude: f64| (amplitude * phase.cos(), amplitude * phase.sin());
     let turn = ("turn", std::f64::consts::TAU);
-    let effect = match name {
+    match name {
         "command_delay" => text(name, &[("delay", rng.log_range(1e-3, 4e-3))], &[]),
         "electrical_lag" => text(name, &[("time_constant", rng.log_range(1e-3, 4e-3))], &[]),
         "presliding_friction" => {
@@ -186,8 +211,7 @@ fn named(name: &'static str, base: &Base, rng: &mut Rng) -> (&'static str, Strin
         }
         "command_deadband" => text(name, &[("half_width", force / base.gain)], &[]),
         _ => text(name, &[], &[("coulomb_difference", force), ("viscous_difference", 0.0)]),
-    };
-    (name, effect)
+    }
 }
 
 /// A force that no effect of the library is.
@@ -218,11 +242,13 @@ mod tests {
         for index in 0..200 {
             let plant = draw(&base, 7, index);
             let rig = diagnosis::rig::Rig::parse(&plant.toml, "a plant").unwrap_or_else(|e| panic!("{e}"));
-            assert_eq!(rig.effects.len(), usize::from(plant.kind != Kind::Null), "{}", plant.toml);
-            if !plant.name.is_empty() {
-                assert_eq!(rig.effects[0].name.to_string(), plant.name);
+            let count = plant.names.len() + usize::from(plant.kind == Kind::Outside);
+            assert_eq!(rig.effects.len(), count, "{}", plant.toml);
+            for (effect, name) in rig.effects.iter().zip(&plant.names) {
+                assert_eq!(effect.name.to_string(), *name);
             }
-            seen.insert(plant.name);
+            assert!(plant.kind != Kind::Pair || plant.names[0] != plant.names[1]);
+            seen.insert(plant.names.clone());
             assert_eq!(draw(&base, 7, index).toml, plant.toml, "a seed draws the same");
         }
         assert!(seen.len() > 15, "{seen:?}");

@@ -29,7 +29,8 @@ pub(super) fn markdown(judged: &[Judged], seed: u64, drawn: usize) -> String {
     row("right single name, twins and singles", &|f| both(f).text());
     row("right single name, twins", &|f| f.twins.text());
     row("right single name, singles", &|f| f.singles.text());
-    row("true name in a named class", &|f| f.in_class.text());
+    row("right names of a pair", &|f| f.pairs.text());
+    row("true names in named classes", &|f| f.in_class.text());
     row("wrong name ≥ 0.9, all plants", &|f| f.wrong.text());
     row("nulls named", &|f| f.nulls_named.text());
     row("outside named", &|f| f.outside_named.text());
@@ -40,7 +41,8 @@ pub(super) fn markdown(judged: &[Judged], seed: u64, drawn: usize) -> String {
     out.push_str(&ARMS.join(" | "));
     out.push_str(" |\n| --- | --- | --- | --- |\n");
     for plant in judged {
-        let truth = if plant.name.is_empty() { plant.kind.words() } else { plant.name };
+        let named = plant.names.join(" + ");
+        let truth = if named.is_empty() { plant.kind.words() } else { &named };
         let cells: Vec<String> = plant.answers.iter().map(answered).collect();
         let _ = writeln!(out, "| {truth} | {} |", cells.join(" | "));
     }
