@@ -14,5 +14,6 @@ mod layout;
 mod needle;
 mod patient;
 mod practice;
+mod report;
 mod update;
 mod views;
