@@ -1,7 +1,7 @@
 //! Layers as the page hands them over, and surfaces as it draws them.
 
 /// Tissues by the number that the page calls them by.
-pub(crate) const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+pub const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
 
 /// The way in which the page draws a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -40,7 +40,7 @@ impl Bedside {
         Self { profile, device, source, procedure, setup, saved: None, asked: None }
     }
 
-    /// Edited patients can be saved in `folder`, and those in it chosen.
+    /// Lets edited patients be saved, and saved ones be chosen.
     pub fn saving_in(mut self, saved: SavedPatients) -> Self {
         self.saved = Some(saved);
         self

@@ -3,6 +3,7 @@
 
 use super::feed::Snapshot;
 use device_sim::session::{ProbeView, Scene};
+use page_wasm::drawn::TISSUES;
 use page_wasm::picture::Picture;
 use std::io;
 use std::sync::Arc;
@@ -29,8 +30,7 @@ const PROBE: ProbeView = ProbeView {
     share_in_plane: 0.0,
     tip_seen: false,
 };
-/// Tissues by the numbers that [`Picture::new`] reads.
-const TISSUES: [&str; 7] = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage"];
+/// The numbers of a vessel and of its far wall, which [`Picture::new`] reads beside those of [`TISSUES`].
 const VESSEL: f32 = 7.0;
 const FAR_WALL: f32 = 8.0;
 
