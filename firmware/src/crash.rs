@@ -5,16 +5,12 @@
 
 use crate::board::Wires;
 use crate::chip::{self, Wiring};
+use crate::last_words::LAST_WORDS;
 use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use firmware::reset::{Crash, CrashKind, LastWords};
+use firmware::reset::{Crash, CrashKind};
 use stm32f4xx_hal::pac::RCC;
-
-/// What survives a reset: start-up code leaves this section alone, any bits are valid in it, and it says itself which mean
-/// something.
-#[unsafe(link_section = ".uninit.last_words")]
-pub(crate) static LAST_WORDS: LastWords = LastWords::new();
 
 /// Amplifier off, then zero torque.
 fn safe_state() {

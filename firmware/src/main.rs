@@ -16,10 +16,13 @@ mod board;
 mod chip;
 #[cfg(target_os = "none")]
 mod crash;
+#[cfg(target_os = "none")]
+mod last_words;
 
 /// The words that the tasks share.
 #[cfg(target_os = "none")]
-static SHARED: firmware::tasks::shared::Shared = firmware::tasks::shared::Shared::new(&crash::LAST_WORDS);
+static SHARED: firmware::tasks::shared::Shared =
+    firmware::tasks::shared::Shared::new(&last_words::LAST_WORDS);
 
 // Before each line of the log: milliseconds since the tasks were started. They wrap after 49 days, and are 0 in start-up.
 #[cfg(target_os = "none")]

@@ -21,6 +21,9 @@ mod chip;
 #[cfg(target_os = "none")]
 #[path = "../src/crash.rs"]
 mod crash;
+#[cfg(target_os = "none")]
+#[path = "../src/last_words.rs"]
+mod last_words;
 
 /// Which board this image is for, to be found in its bytes.
 #[cfg(target_os = "none")]
@@ -30,7 +33,8 @@ static BOARD: &str =
 
 /// The words that the tasks would share.
 #[cfg(target_os = "none")]
-static SHARED: firmware::tasks::shared::Shared = firmware::tasks::shared::Shared::new(&crash::LAST_WORDS);
+static SHARED: firmware::tasks::shared::Shared =
+    firmware::tasks::shared::Shared::new(&last_words::LAST_WORDS);
 
 #[cfg(target_os = "none")]
 #[embedded_test::tests]

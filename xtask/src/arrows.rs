@@ -152,6 +152,20 @@ mod tests {
     }
 
     #[test]
+    fn files_that_a_macro_declares_count_and_those_of_tests_do_not() {
+        let found = circles(&[
+            (
+                "lib.rs",
+                "macro_rules! all { ($($m:ident;)*) => { $(mod $m;)* } }\nall! { a; b; }\n#[cfg(test)]\nmod c;",
+            ),
+            ("a.rs", "use crate::b::B;\npub struct A(B);"),
+            ("b.rs", "pub struct B;\nfn f() { crate::a::g(); }"),
+            ("c.rs", "use crate::a::A;\npub struct C(A);"),
+        ]);
+        assert_eq!(found, [["a.rs", "b.rs"]]);
+    }
+
+    #[test]
     fn tests_comments_and_strings_are_no_uses() {
         let found = circles(&[
             ("lib.rs", "mod a;\nmod b;"),

@@ -14,6 +14,7 @@ mod law;
 mod load;
 mod state;
 mod travel_profile;
+mod variable;
 mod waves;
 
 pub(crate) use command::CommandLaw;
@@ -22,7 +23,8 @@ pub use formula::{Formula, FormulaId, FormulaText};
 pub use law::Law;
 pub(crate) use law::{sinc, wave_mean};
 pub use state::State;
-pub use table::{Table, Variable};
+pub use table::Table;
+pub use variable::Variable;
 
 use definition::Definition;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -11,7 +11,7 @@ use super::supply::{self, Supply, SupplyLevel};
 use super::tick_timer::TickTimer;
 use super::watchdog::Watchdog;
 use super::{Stm32F4, Wiring, usb};
-use crate::crash::LAST_WORDS;
+use crate::last_words::LAST_WORDS;
 use control_core::ceilings::Ceilings;
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};

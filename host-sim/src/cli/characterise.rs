@@ -2,7 +2,7 @@
 
 use super::confirm::needle_is_out;
 use super::progress::Progress;
-use super::run::stop_on_signals;
+use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;

@@ -1,7 +1,7 @@
 //! `host-sim class`: the instructor's page; and the flags by which `run` joins a class.
 
 use super::output;
-use super::run::stop_on_signals;
+use super::serving::stop_on_signals;
 use clap::Args;
 use control_core::Device;
 use device_sim::failure::Failure;

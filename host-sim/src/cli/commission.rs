@@ -1,7 +1,7 @@
 //! `host-sim commission`: how a device is wired and built, found out before anybody holds its needle.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::run::stop_on_signals;
+use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::device::Port;
 use device_sim::failure::Failure;

@@ -1,7 +1,7 @@
 //! `host-sim compensate`: what a diagnosis found, fed forward by the device.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::run::stop_on_signals;
+use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::device::Port;
 use device_sim::failure::Failure;

@@ -17,6 +17,7 @@ pub(crate) mod output;
 mod progress;
 mod recordings;
 mod run;
+mod serving;
 mod settle;
 mod simulate;
 mod streams;

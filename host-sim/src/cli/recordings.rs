@@ -1,6 +1,6 @@
 //! `host-sim replay` and `export`: what can be done with a recording.
 
-use super::run::{serve, stop_on_signals};
+use super::serving::{serve, stop_on_signals};
 use clap::Args;
 use device_sim::failure::Failure;
 use device_sim::session::{self, Source};

@@ -3,6 +3,7 @@
 use super::class::ClassFlags;
 use super::output;
 use super::progress::Progress;
+use super::serving::stop_on_signals;
 use super::streams::StreamFlags;
 use super::training::without_insertion;
 use clap::{Args, ValueEnum};
@@ -283,14 +284,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
         .ok_or_else(|| "it is no address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
 }
 
-/// Serves the page and prints its address.
-pub(crate) fn serve(session: Session, port: u16) -> Result<visualizer::Server, Failure> {
-    let server = visualizer::serve(session, port).map_err(Failure::failed)?;
-    output::page("visualizer", &server.url());
-    Ok(server)
-}
-
-/// The same with the debrief of what is recorded in the page.
+/// Serves the page, with the debrief of what is recorded in the page.
 fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Failure> {
     let write: visualizer::Debrief = Arc::new(|file| {
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
@@ -305,17 +299,6 @@ fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualize
         output::page_for_others(&url);
     }
     Ok(server)
-}
-
-/// Ends the run cleanly on Ctrl-C and SIGTERM: torque off, recording closed, last line printed.
-pub(crate) fn stop_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // Not more: some send a signal twice, and the first must be able to close the recording.
-        signal_hook::flag::register(signal, stop.clone()).map_err(|cause| {
-            Failure::failed(format_args!("signal handlers cannot be installed ({cause})"))
-        })?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

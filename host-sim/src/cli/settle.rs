@@ -1,7 +1,7 @@
 //! `host-sim settle`: the device asks itself what the recordings cannot tell.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::run::stop_on_signals;
+use super::serving::stop_on_signals;
 use clap::{Args, ValueEnum};
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;

@@ -43,17 +43,17 @@ impl Crate {
         Self { modules }
     }
 
-    /// The uses of every file; files that only tests declare are left out, and so is what a module uses of the modules
-    /// that it is made of.
+    /// The uses of every file, also of one that a macro declares; files that only tests declare are left out, and so is what a module
+    /// uses of the modules that it is made of.
     pub(super) fn uses(&self) -> Uses {
-        let declared = self.modules.keys().filter(|path| self.is_declared(path));
-        declared.map(|path| (self.modules[path].file.clone(), self.uses_of(path))).collect()
+        let used = self.modules.keys().filter(|path| !self.is_for_tests(path));
+        used.map(|path| (self.modules[path].file.clone(), self.uses_of(path))).collect()
     }
 
-    fn is_declared(&self, path: &[String]) -> bool {
-        let Some((name, above)) = path.split_last() else { return true };
-        self.modules.get(above).is_some_and(|module| module.source.modules().any(|declared| declared == name))
-            && self.is_declared(above)
+    fn is_for_tests(&self, path: &[String]) -> bool {
+        let Some((name, above)) = path.split_last() else { return false };
+        self.modules.get(above).is_some_and(|module| module.source.is_for_tests(name))
+            || self.is_for_tests(above)
     }
 
     fn uses_of(&self, from: &[String]) -> BTreeMap<String, String> {

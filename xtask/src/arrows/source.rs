@@ -13,16 +13,22 @@ pub(super) struct Use {
 /// The code of a file, with everything else cut away.
 pub(super) struct Source {
     words: Vec<String>,
+    /// Modules in files of their own that only tests have.
+    for_tests: Vec<String>,
 }
 
 impl Source {
     pub(super) fn new(text: &str) -> Self {
-        Self { words: without_tests(&words(text)) }
+        let all = words(text);
+        let words = without_tests(&all);
+        let kept: Vec<String> = modules(&words).collect();
+        let for_tests = modules(&all).filter(|name| !kept.contains(name)).collect();
+        Self { words, for_tests }
     }
 
-    /// Modules that the file declares as files of their own.
-    pub(super) fn modules(&self) -> impl Iterator<Item = &str> {
-        self.words.windows(3).filter(|w| w[0] == "mod" && w[2] == ";").map(|w| w[1].as_str())
+    /// True if only tests have the module, which is a file of its own.
+    pub(super) fn is_for_tests(&self, module: &str) -> bool {
+        self.for_tests.iter().any(|name| name == module)
     }
 
     /// True if the file defines an item of this name.
@@ -71,6 +77,11 @@ impl Source {
         }
         all
     }
+}
+
+/// Modules that are declared as files of their own.
+fn modules(words: &[String]) -> impl Iterator<Item = String> {
+    words.windows(3).filter(|w| w[0] == "mod" && w[2] == ";").map(|w| w[1].clone())
 }
 
 fn is_name(word: &str) -> bool {
