@@ -84,6 +84,11 @@ impl Chromium {
         Ok(browser)
     }
 
+    /// The process that was started; the others are its children and theirs.
+    pub(super) fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// A new connection to it.
     pub fn devtools(&self) -> Result<DevTools, Failure> {
         DevTools::connect(&self.address)

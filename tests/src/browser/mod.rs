@@ -1,15 +1,17 @@
 //! A real browser for the test of the page: Debian's Chromium without a screen, driven over its DevTools protocol.
 //!
 //! [`chromium`] starts and ends it, [`devtools`] speaks to it, [`page`] says what a test means: click, drag, read;
-//! [`program`] starts what serves the page. Nothing here knows what the page under test shows.
+//! [`program`] starts what serves the page, [`processor_time`] says what a picture costs. Nothing here knows what the page under test shows.
 
 pub mod chromium;
 pub mod devtools;
 pub mod page;
+pub mod processor_time;
 pub mod program;
 
 pub use chromium::Chromium;
 pub use page::Page;
+pub use processor_time::loop_time;
 pub use program::{Places, Program};
 
 /// The browser's failure, in one sentence.
