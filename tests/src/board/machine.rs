@@ -26,6 +26,7 @@ use super::pins::{PartPin, Pins};
 use super::processor::{DAC, EXTI, INSTRUCTIONS_PER_SECOND, OTG, Probe, Probed};
 use super::tilt::Accelerometer;
 use super::usb_port::{self, UsbPort};
+use super::warm_core::{ImageKey, WarmCore};
 
 /// The clock that every board brings, and its rail.
 pub(super) const CLOCK_HZ: u64 = 8_000_000;
@@ -36,13 +37,14 @@ const MCU: &str = "stm32f407";
 #[derive(Debug)]
 pub(super) struct Machine {
     pub(super) mcu: Wired<Wired<Wired<Stm32f427, UsbPort>, Dac>, Exti>,
+    image: ImageKey,
     probe: Probe,
     pub(super) flash: Flash,
     pins: Pins,
 }
 
 impl Machine {
-    pub(super) fn new(wiring: &Wiring, probe: Probe, flash: Flash) -> Result<Self, Error> {
+    pub(super) fn new(wiring: &Wiring, image: ImageKey, probe: Probe, flash: Flash) -> Result<Self, Error> {
         let mut part = Stm32f427::new()?;
         part.set_supply(wiring.supply);
         for converter in &mut part.adc {
@@ -66,7 +68,7 @@ impl Machine {
         let with_usb = Wired::new(part, usb, UsbPort::default())?;
         let with_dac = Wired::new(with_usb, dac, Dac::default())?;
         let mcu = Wired::new(with_dac, exti, Exti::default())?;
-        let mut machine = Self { mcu, probe, flash, pins: wiring.pins };
+        let mut machine = Self { mcu, image, probe, flash, pins: wiring.pins };
         // Where no strap holds it up, the pin is charged all the same until a pull has emptied it.
         if let Some(strap) = wiring.pins.strap {
             machine.drive(0, strap, Some(Level::High));
@@ -151,9 +153,10 @@ impl Board for Machine {
             armv7m::MpuRegions::Eight,
         );
         let (make, probe, flash) = (core.processor.clone(), self.probe.clone(), self.flash.clone());
+        let image = self.image;
         core.processor = Arc::new(move |endian| {
-            make(endian)
-                .map(|core| Box::new(Probed::new(core, probe.clone(), flash.clone())) as Box<dyn Processor>)
+            let core = WarmCore::lend(image, || make(endian))?;
+            Ok(Box::new(Probed::new(core, probe.clone(), flash.clone())) as Box<dyn Processor>)
         });
         vec![Target::new(MCU, &mut self.mcu, core)]
     }

@@ -24,6 +24,7 @@ mod stopped;
 pub mod tilt;
 mod tracks;
 mod usb_port;
+mod warm_core;
 pub mod wires;
 mod world;
 
@@ -47,6 +48,7 @@ pub use world::{EncoderRead, Log, Output};
 use machine::Machine;
 use pins::Pins;
 use run::{Done, Order, Run};
+use warm_core::ImageKey;
 use world::{PAINT, World};
 
 /// A millisecond of virtual time.
@@ -203,6 +205,7 @@ impl Board {
         let bytes = std::fs::read(path)
             .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
         let symbols = elf::symbols(&bytes);
+        let key = ImageKey::of(&bytes);
         // The linker's own names have no type, so the emulator's reader finds them.
         let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
         let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
@@ -211,8 +214,8 @@ impl Board {
         if wiring.commissioned {
             record::commission(&mut flash.array());
         }
-        let machine =
-            Machine::new(&wiring, probe.clone(), flash.clone()).map_err(|error| refuse(error.to_string()))?;
+        let machine = Machine::new(&wiring, key, probe.clone(), flash.clone())
+            .map_err(|error| refuse(error.to_string()))?;
         let session =
             Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
         let find = |name: &str| places.get(name).ok();

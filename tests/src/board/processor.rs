@@ -16,6 +16,7 @@ use rigless::time::VirtualNanos;
 use super::cache::InstructionCache;
 use super::flash::{FLASH_OPTCR, Flash, WRITABLE};
 use super::pins::{PartPin, register};
+use super::warm_core::WarmCore;
 
 /// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
 /// count a time.
@@ -141,10 +142,10 @@ impl Probe {
 /// The emulator's core, wrapped.
 #[derive(Debug)]
 pub(super) struct Probed {
-    core: Box<dyn Processor>,
+    core: WarmCore,
     probe: Probe,
     flash: Flash,
-    /// Instructions' time in which nothing ran.
+    /// Instructions' time in which nothing ran, and that of the instructions before a reset.
     stalled: u64,
     /// The addresses of breakpoints that stop the core.
     breakpoints: BTreeSet<u32>,
@@ -167,7 +168,7 @@ struct Run {
 }
 
 impl Probed {
-    pub(super) fn new(core: Box<dyn Processor>, probe: Probe, flash: Flash) -> Self {
+    pub(super) fn new(core: WarmCore, probe: Probe, flash: Flash) -> Self {
         Self { core, probe, flash, stalled: 0, breakpoints: BTreeSet::new(), counting: None }
     }
 
@@ -359,6 +360,7 @@ impl Processor for Probed {
             identity,
             code_written: false,
             stepping: false,
+            asked: Vec::new(),
         };
         self.settle_breakpoints();
         let watched = !self.breakpoints.is_empty() || self.probe.tally().upset.is_some();
@@ -367,13 +369,17 @@ impl Processor for Probed {
         // What kept the core from its instructions is time that has passed.
         let standstill = bus.standstill;
         self.stalled += standstill;
+        for queued in bus.asked {
+            self.core.must_know(queued);
+        }
         (exit, retired + standstill)
     }
 
     fn reset(&mut self) {
         self.counting = None;
         self.flash.array().restarted();
-        self.core.reset();
+        // The time that has passed goes on where the core's own count does not.
+        self.stalled += self.core.reset();
     }
 
     fn retired(&self) -> u64 {
@@ -473,6 +479,8 @@ struct Rerouted<'a> {
     code_written: bool,
     /// True if the core is inspected after every instruction.
     stepping: bool,
+    /// What the run asked of the core in this stretch.
+    asked: Vec<Queued>,
 }
 
 impl CoreBus for Rerouted<'_> {
@@ -519,7 +527,9 @@ impl CoreBus for Rerouted<'_> {
     }
 
     fn queued(&mut self) -> Vec<Queued> {
-        self.bus.queued()
+        let queued = self.bus.queued();
+        self.asked.extend_from_slice(&queued);
+        queued
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {

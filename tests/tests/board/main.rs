@@ -12,6 +12,7 @@ mod instructions;
 mod lamps;
 mod log;
 mod rate;
+mod repeated;
 mod runaway;
 mod second_board;
 mod settled;
