@@ -110,175 +110,109 @@ pub enum Refusal {
     },
 }
 
-/// A value of the configuration that has a range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "each is the name of a field of the configuration")]
-pub enum Field {
-    RollerRadius,
-    CountsPerTurn,
-    FullScaleTorque,
-    TorqueLimit,
-    SlewPerTick,
-    FadeInMs,
-    MaxCountsPerTick,
-    Travel,
-    StiffnessLimit,
-    HeartbeatMs,
-    Damping,
-    LevelLength,
-    LevelCap,
-    AnchorMs,
-    FrictionStiffness,
-    FrictionLimit,
-    Compliance,
-    PunctureTravel,
-    UnloadStiffness,
-    BaseForce,
-    Friction,
-    LayerDepth,
-    DurationSeconds,
-    ServoStiffness,
-    Speed,
-    Ratio,
-    Steps,
-    DwellMs,
-    Frequency,
-    ContinuousTorque,
-    WindingTimeS,
-    PassivityDamping,
-    SkinTilt,
-    DacZero,
-    LargestForce,
-    SpringBack,
-    Scale,
-    TrackingStiffness,
-    RelaxMs,
-    BristleStiffness,
-    BristleDamping,
-    ViscousFriction,
-    SlidingFriction,
-    StickingFriction,
-    StribeckSpeed,
-    LateralForce,
-    LargestAngle,
-    CuttingForce,
-    Withdrawal,
-    TableDepth,
-    TableSpeed,
-    TableAngle,
-    TableForce,
-    TableRupture,
-    AfterPuncture,
-    VesselWidth,
-    VesselOffset,
-    CompensationVersion,
-    WaveOrder,
-    WaveAmplitude,
-    Ripple,
-    DryFriction,
-    RestSpeed,
-    FullSpeed,
-    Weight,
-    DriveOffset,
-    Deadband,
-    AngleGain,
-    FrictionGain,
-    WeightGain,
-    DriveGain,
-    SpeedCeiling,
-    EncoderSign,
-    MotorSign,
-    Converter,
-    MovingMass,
-    MechanismFriction,
-    DriveDelayUs,
-    SlidingShare,
-    FrictionLimitOut,
+/// Declares [`Field`], each field with its words.
+macro_rules! fields {
+    ($($name:ident: $words:literal,)*) => {
+        /// A value of the configuration that has a range.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[expect(missing_docs, reason = "each is the name of a field of the configuration")]
+        pub enum Field {
+            $($name,)*
+        }
+
+        /// The key in the device's or the patient's file, or words with a unit if no key holds the value in this unit.
+        impl fmt::Display for Field {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$name => $words,)*
+                })
+            }
+        }
+    };
 }
 
-/// The key in the device's or the patient's file, or words with a unit if no key holds the value in this unit.
-impl fmt::Display for Field {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::RollerRadius => "roller_radius_mm",
-            Self::CountsPerTurn => "counts_per_turn",
-            Self::FullScaleTorque => "full_scale_torque_mnm",
-            Self::TorqueLimit => "torque_mnm",
-            Self::SlewPerTick => "slew_mnm_per_tick",
-            Self::FadeInMs => "fade_in_ms",
-            Self::MaxCountsPerTick => "max_counts_per_tick",
-            Self::Travel => "travel_mm",
-            Self::StiffnessLimit | Self::FrictionStiffness | Self::BristleStiffness => "stiffness_n_per_mm",
-            Self::HeartbeatMs => "heartbeat_ms",
-            Self::Damping | Self::BristleDamping => "damping_n_s_per_mm",
-            Self::LevelLength => "level_length_mm",
-            Self::LevelCap => "level_cap",
-            Self::AnchorMs => "anchor_ms",
-            Self::FrictionLimit => "limit_n",
-            Self::FrictionLimitOut => "limit_out_n",
-            Self::Compliance => "compliance_mm2_per_n",
-            Self::PunctureTravel => "puncture_mm",
-            Self::UnloadStiffness => "unload_n_per_mm",
-            Self::BaseForce => "base_n",
-            Self::Friction => "friction_n_per_mm",
-            Self::LayerDepth => "depth_mm",
-            Self::DurationSeconds => "the duration in s",
-            Self::ServoStiffness => "the servo's stiffness in N/mm",
-            Self::Speed => "the speed in mm/s",
-            Self::Ratio => "the ratio of the steps",
-            Self::Steps => "the number of steps",
-            Self::DwellMs => "the dwell in ms",
-            Self::Frequency => "the frequency in Hz",
-            Self::ContinuousTorque => "continuous_torque_mnm",
-            Self::WindingTimeS => "winding_time_s",
-            Self::PassivityDamping => "passivity_damping_n_s_per_mm",
-            Self::SkinTilt => "the tilt on the skin in mrad",
-            Self::DacZero => "dac_zero_codes",
-            Self::LargestForce => "largest_force_n",
-            Self::SpringBack => "spring_back",
-            Self::Scale => "force_scale",
-            Self::TrackingStiffness => "tracking_n_per_mm",
-            Self::RelaxMs => "relax_ms",
-            Self::ViscousFriction => "viscous_n_s_per_mm",
-            Self::SlidingFriction => "sliding_n",
-            Self::StickingFriction => "sticking_n",
-            Self::StribeckSpeed => "stribeck_mm_s",
-            Self::LateralForce => "the lateral force in N per mrad",
-            Self::LargestAngle => "the largest angle in mrad",
-            Self::CuttingForce => "cutting",
-            Self::Withdrawal => "withdrawal",
-            Self::TableDepth => "depth_step_mm",
-            Self::TableRupture => "gives_way",
-            Self::AfterPuncture => "after_puncture",
-            Self::TableSpeed => "speeds_mm_s",
-            Self::TableAngle => "the angles in mrad",
-            Self::TableForce => "the forces in N",
-            Self::VesselWidth => "width_mm",
-            Self::VesselOffset => "offset_mm",
-            Self::CompensationVersion => "compensation.version",
-            Self::WaveOrder => "the order of a wave",
-            Self::WaveAmplitude => "the amplitude of a wave in mN·m",
-            Self::Ripple => "the ripple",
-            Self::DryFriction => "the dry friction in mN·m",
-            Self::RestSpeed => "the speed at rest in mm/s",
-            Self::FullSpeed => "the speed of full friction in mm/s",
-            Self::Weight => "the weight in mN·m",
-            Self::DriveOffset => "the drive's offset in mN·m",
-            Self::Deadband => "the deadband in mN·m",
-            Self::AngleGain => "gains.angle",
-            Self::FrictionGain => "gains.friction",
-            Self::WeightGain => "gains.weight",
-            Self::DriveGain => "gains.drive",
-            Self::SpeedCeiling => "the speed of max_counts_per_tick in mm/s",
-            Self::EncoderSign => "encoder_reversed",
-            Self::MotorSign => "motor_reversed",
-            Self::Converter => "dac_bits",
-            Self::MovingMass => "mass_g",
-            Self::MechanismFriction => "dry_friction_n",
-            Self::DriveDelayUs => "delay_us",
-            Self::SlidingShare => "sliding",
-        })
-    }
+// The order is that of the numbers in the link's frames.
+fields! {
+    RollerRadius: "roller_radius_mm",
+    CountsPerTurn: "counts_per_turn",
+    FullScaleTorque: "full_scale_torque_mnm",
+    TorqueLimit: "torque_mnm",
+    SlewPerTick: "slew_mnm_per_tick",
+    FadeInMs: "fade_in_ms",
+    MaxCountsPerTick: "max_counts_per_tick",
+    Travel: "travel_mm",
+    StiffnessLimit: "stiffness_n_per_mm",
+    HeartbeatMs: "heartbeat_ms",
+    Damping: "damping_n_s_per_mm",
+    LevelLength: "level_length_mm",
+    LevelCap: "level_cap",
+    AnchorMs: "anchor_ms",
+    FrictionStiffness: "stiffness_n_per_mm",
+    FrictionLimit: "limit_n",
+    Compliance: "compliance_mm2_per_n",
+    PunctureTravel: "puncture_mm",
+    UnloadStiffness: "unload_n_per_mm",
+    BaseForce: "base_n",
+    Friction: "friction_n_per_mm",
+    LayerDepth: "depth_mm",
+    DurationSeconds: "the duration in s",
+    ServoStiffness: "the servo's stiffness in N/mm",
+    Speed: "the speed in mm/s",
+    Ratio: "the ratio of the steps",
+    Steps: "the number of steps",
+    DwellMs: "the dwell in ms",
+    Frequency: "the frequency in Hz",
+    ContinuousTorque: "continuous_torque_mnm",
+    WindingTimeS: "winding_time_s",
+    PassivityDamping: "passivity_damping_n_s_per_mm",
+    SkinTilt: "the tilt on the skin in mrad",
+    DacZero: "dac_zero_codes",
+    LargestForce: "largest_force_n",
+    SpringBack: "spring_back",
+    Scale: "force_scale",
+    TrackingStiffness: "tracking_n_per_mm",
+    RelaxMs: "relax_ms",
+    BristleStiffness: "stiffness_n_per_mm",
+    BristleDamping: "damping_n_s_per_mm",
+    ViscousFriction: "viscous_n_s_per_mm",
+    SlidingFriction: "sliding_n",
+    StickingFriction: "sticking_n",
+    StribeckSpeed: "stribeck_mm_s",
+    LateralForce: "the lateral force in N per mrad",
+    LargestAngle: "the largest angle in mrad",
+    CuttingForce: "cutting",
+    Withdrawal: "withdrawal",
+    TableDepth: "depth_step_mm",
+    TableSpeed: "speeds_mm_s",
+    TableAngle: "the angles in mrad",
+    TableForce: "the forces in N",
+    TableRupture: "gives_way",
+    AfterPuncture: "after_puncture",
+    VesselWidth: "width_mm",
+    VesselOffset: "offset_mm",
+    CompensationVersion: "compensation.version",
+    WaveOrder: "the order of a wave",
+    WaveAmplitude: "the amplitude of a wave in mN·m",
+    Ripple: "the ripple",
+    DryFriction: "the dry friction in mN·m",
+    RestSpeed: "the speed at rest in mm/s",
+    FullSpeed: "the speed of full friction in mm/s",
+    Weight: "the weight in mN·m",
+    DriveOffset: "the drive's offset in mN·m",
+    Deadband: "the deadband in mN·m",
+    AngleGain: "gains.angle",
+    FrictionGain: "gains.friction",
+    WeightGain: "gains.weight",
+    DriveGain: "gains.drive",
+    SpeedCeiling: "the speed of max_counts_per_tick in mm/s",
+    EncoderSign: "encoder_reversed",
+    MotorSign: "motor_reversed",
+    Converter: "dac_bits",
+    MovingMass: "mass_g",
+    MechanismFriction: "dry_friction_n",
+    DriveDelayUs: "delay_us",
+    SlidingShare: "sliding",
+    FrictionLimitOut: "limit_out_n",
 }
 
 impl fmt::Display for Refusal {
@@ -333,17 +267,29 @@ impl fmt::Display for Refusal {
                 f,
                 "the compensation demands {torque:.3} mN·m; at most {limit:.3} mN·m, a quarter of the torque ceiling, is allowed; lower its gains"
             ),
-            Refusal::CompensationUnstable { stiffness, limit } => write!(
-                f,
-                "with this compensation more than {limit:.3} N/mm would ring, but the device allows {stiffness:.3} N/mm; lower its gains or the device's stiffness"
-            ),
-            Refusal::WouldRing { stiffness, limit } => write!(
-                f,
-                "with this friction, mass and delay more than {limit:.3} N/mm would ring, but the device allows {stiffness:.3} N/mm; lower the device's stiffness"
-            ),
+            Refusal::CompensationUnstable { stiffness, limit } => {
+                rings(f, "this compensation", stiffness, limit, "lower its gains or the device's stiffness")
+            }
+            Refusal::WouldRing { stiffness, limit } => {
+                rings(f, "this friction, mass and delay", stiffness, limit, "lower the device's stiffness")
+            }
             Refusal::Empty => f.write_str("there is no layer; add one"),
         }
     }
+}
+
+/// Says that the device allows more stiffness than is stable with `cause`; both in N/mm.
+fn rings(
+    f: &mut fmt::Formatter<'_>,
+    cause: &str,
+    stiffness: &I16F16,
+    limit: &I16F16,
+    remedy: &str,
+) -> fmt::Result {
+    write!(
+        f,
+        "with {cause} more than {limit:.3} N/mm would ring, but the device allows {stiffness:.3} N/mm; {remedy}"
+    )
 }
 
 /// Refuses a value outside its range.

@@ -5,6 +5,8 @@
 mod common;
 
 use common::{Random, Setup, record, rig};
+use diagnosis::report::Named;
+use std::time::Instant;
 
 const ALL: &[&str] = &[
     "none",
@@ -43,85 +45,62 @@ fn main() {
         Err(_) => vec![1.0, 0.3],
     };
     let seeds: u64 = std::env::var("SEEDS").ok().and_then(|x| x.parse().ok()).unwrap_or(1);
+    let wanted = |effect: &&&str| arguments.is_empty() || arguments.iter().any(|a| a == **effect);
     let (mut right, mut whole) = (0, 0);
-    for effect in ALL {
-        if !arguments.is_empty() && !arguments.iter().any(|a| a == effect) {
-            continue;
-        }
-        for size in &sizes {
-            for closed in [false, true] {
-                for seed in 0..seeds {
-                    let setup = Setup {
-                        effect,
-                        size: *size,
-                        closed,
-                        rate: [1000.0, 2000.0, 500.0][(seed % 3) as usize],
-                        seconds: 12.0,
-                        disturbance: 0.05,
-                        seed: seed + 1,
-                    };
-                    let mut random = Random::new(seed + 77);
-                    let mut off =
-                        [0.15, 0.4, 0.4, 0.08].map(|sd| (sd * random.normal()).clamp(-1.5 * sd, 1.5 * sd));
-                    if *effect == "none" {
-                        off = [0.0; 4];
-                    }
-                    let extra = if *effect == "asymmetric_friction" { "" } else { "offset = 0.0" };
-                    let rig = rig(off, extra);
-                    let fit = record(&setup, 1);
-                    let held = record(&setup, 2);
-                    let start = std::time::Instant::now();
-                    let outcome = diagnosis::diagnose_recordings(&rig, &[fit], &[held], &|_, _| ());
-                    let r = match outcome {
-                        Ok(outcome) => outcome.report,
-                        Err(error) => {
-                            println!("{effect:28} {size:4} error {error}");
-                            continue;
-                        }
-                    };
-                    let names: Vec<String> = r
-                        .effects
-                        .iter()
-                        .map(|e| {
-                            let class: Vec<&str> = e.class[1..].iter().map(|n| n.as_str()).collect();
-                            let main: Vec<String> = e
-                                .parameters
-                                .iter()
-                                .take(2)
-                                .map(|(k, p)| format!("{k} {:.3e}", p.value))
-                                .collect();
-                            format!(
-                                "{}({:.2}){}{{{}}}",
-                                e.name,
-                                e.confidence,
-                                if class.is_empty() {
-                                    String::new()
-                                } else {
-                                    format!("|{}", class.join("|"))
-                                },
-                                main.join(" ")
-                            )
-                        })
-                        .collect();
-                    let hit =
-                        r.effects.len() == 1 && r.effects[0].class.iter().any(|n| n.as_str() == *effect);
+    for effect in ALL.iter().filter(wanted) {
+        for (size, closed) in sizes.iter().flat_map(|size| [(*size, false), (*size, true)]) {
+            for seed in 0..seeds {
+                if let Some(hit) = one(effect, size, closed, seed) {
                     whole += 1;
                     right += usize::from(hit);
-                    println!(
-                        "{}{effect:27} {size:4} {} {:18} nom {:5.1}% refit {:5.1}% patched {:5.1}% un {:.2} {:4.1}s {}",
-                        if hit { '*' } else { ' ' },
-                        if closed { "closed" } else { "open  " },
-                        format!("{:?}", r.verdict),
-                        100.0 * r.fit.nominal.holdout / r.fit.force_rms.holdout,
-                        100.0 * r.fit.refit.holdout / r.fit.force_rms.holdout,
-                        100.0 * r.fit.patched.holdout / r.fit.force_rms.holdout,
-                        r.unexplained_fraction,
-                        start.elapsed().as_secs_f64(),
-                        names.join(" ")
-                    );
                 }
             }
         }
     }
     println!("{right} of {whole} named alone");
+}
+
+/// Diagnoses one case and prints its line: true if its effect is named alone, none if it was refused.
+fn one(effect: &'static str, size: f64, closed: bool, seed: u64) -> Option<bool> {
+    let rate = [1000.0, 2000.0, 500.0][(seed % 3) as usize];
+    let setup = Setup { effect, size, closed, rate, seconds: 12.0, disturbance: 0.05, seed: seed + 1 };
+    let mut random = Random::new(seed + 77);
+    let mut off = [0.15, 0.4, 0.4, 0.08].map(|sd| (sd * random.normal()).clamp(-1.5 * sd, 1.5 * sd));
+    if effect == "none" {
+        off = [0.0; 4];
+    }
+    let extra = if effect == "asymmetric_friction" { "" } else { "offset = 0.0" };
+    let rig = rig(off, extra);
+    let (fit, held) = (record(&setup, 1), record(&setup, 2));
+    let start = Instant::now();
+    let report = match diagnosis::diagnose_recordings(&rig, &[fit], &[held], &|_, _| ()) {
+        Ok(outcome) => outcome.report,
+        Err(error) => {
+            println!("{effect:28} {size:4} error {error}");
+            return None;
+        }
+    };
+    let hit = matches!(&report.effects[..], [one] if one.class.iter().any(|name| name.as_str() == effect));
+    let percent = |force: f64| 100.0 * force / report.fit.force_rms.holdout;
+    println!(
+        "{}{effect:27} {size:4} {} {:18} nom {:5.1}% refit {:5.1}% patched {:5.1}% un {:.2} {:4.1}s {}",
+        if hit { '*' } else { ' ' },
+        if closed { "closed" } else { "open  " },
+        format!("{:?}", report.verdict),
+        percent(report.fit.nominal.holdout),
+        percent(report.fit.refit.holdout),
+        percent(report.fit.patched.holdout),
+        report.unexplained_fraction,
+        start.elapsed().as_secs_f64(),
+        report.effects.iter().map(named).collect::<Vec<_>>().join(" ")
+    );
+    Some(hit)
+}
+
+/// An effect's name, confidence, class and first two parameters.
+fn named(effect: &Named) -> String {
+    let class: String = effect.class[1..].iter().map(|name| format!("|{}", name.as_str())).collect();
+    let first = effect.parameters.iter().take(2);
+    let parameters: Vec<String> = first.map(|(key, p)| format!("{key} {:.3e}", p.value)).collect();
+    format!("{}({:.2}){class}{{{}}}", effect.name, effect.confidence, parameters.join(" "))
 }

@@ -4,9 +4,6 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 #![allow(unexpected_cfgs, reason = "the macro of embedded-test asks for one of its own")]
 
-#[cfg(not(target_os = "none"))]
-fn main() {}
-
 #[cfg(target_os = "none")]
 use defmt_rtt as _;
 
@@ -211,3 +208,6 @@ mod tests {
         assert!(longest < timing::OUTPUT_CYCLES, "it masks the tick beyond its latch");
     }
 }
+
+#[cfg(not(target_os = "none"))]
+fn main() {}

@@ -79,6 +79,11 @@ impl Normal {
         Self { n, gram: vec![0.0; n * n], right: vec![0.0; n], energy: 0.0, rows: 0 }
     }
 
+    /// Number of columns.
+    pub(crate) fn width(&self) -> usize {
+        self.n
+    }
+
     pub(crate) fn add(&mut self, row: &[f64], target: f64) {
         for i in 0..self.n {
             if row[i] == 0.0 {

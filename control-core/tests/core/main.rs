@@ -7,6 +7,7 @@ mod laws;
 mod needle;
 mod orders;
 mod protections;
+mod ranges;
 mod refusals;
 mod sparte;
 mod stability;

@@ -1,5 +1,6 @@
 //! The patched rig, and the place where an effect acts.
 
+use crate::effects::{Effect, Law};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::total;
 use crate::estimation::nominal::{Key, Nominal};
@@ -42,40 +43,49 @@ pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], la
         let late_s = rows * skew::row_s(&fit[0]) + rig.actuator.delay_s.unwrap_or(0.0);
         rig.actuator.delay_s = Some(late_s).filter(|late_s| *late_s > 0.0);
     }
-    let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
-    let theta = last.fit.theta(0);
-    for (index, effect) in last.model.effects.iter().enumerate() {
-        let mut effect = effect.clone();
-        let definition = effect.name.definition();
-        if definition.is_of_jumps() {
-            // The steps of the recording with the most, as they happened.
-            let steps =
-                |track: &&BlockedRecording| track.jumps.lost.windows(2).filter(|w| w[0] != w[1]).count();
-            let track = fit.iter().max_by_key(steps).expect("something was fitted");
-            let jumped = track.jumps.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
-            let jumps: Vec<_> = jumped.map(|(i, w)| (track.blocks.start[i + 1], w[1] - w[0])).collect();
-            definition.put_jumps(&mut effect, &jumps);
-        } else if let Some(law) = crate::effects::Law::new(&effect) {
-            for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
-                let Key::Term { effect: e, term } = column.key else { continue };
-                if e != index {
-                    continue;
-                }
-                let name = law.names()[term].clone();
-                let unit = if law.in_sensor() {
-                    1.0
-                } else if definition.is_relative_to_gain() {
-                    1.0 / ratio
-                } else {
-                    inertia
-                };
-                effect.coefficients.insert(name, theta * unit);
-            }
-        }
-        rig.effects.push(effect);
-    }
+    let effects = last.model.effects.iter().enumerate();
+    rig.effects.extend(effects.map(|(index, effect)| fitted(effect, index, fit, last, inertia)));
     rig.name = format!("{} (patched)", rig.name);
     rig
+}
+
+/// The effect at `index` of a model with its fitted coefficients in the units of a rig, or with the jumps that were found.
+fn fitted(
+    effect: &Effect,
+    index: usize,
+    fit: &[BlockedRecording],
+    last: &FittedModel,
+    inertia: f64,
+) -> Effect {
+    let ratio = last.fit.value(Key::Gain).unwrap_or(1.0);
+    let theta = last.fit.theta(0);
+    let mut effect = effect.clone();
+    let definition = effect.name.definition();
+    if definition.is_of_jumps() {
+        // The steps of the recording with the most, as they happened.
+        let steps = |track: &&BlockedRecording| track.jumps.lost.windows(2).filter(|w| w[0] != w[1]).count();
+        let track = fit.iter().max_by_key(steps).expect("something was fitted");
+        let jumped = track.jumps.lost.windows(2).enumerate().filter(|(_, w)| w[0] != w[1]);
+        let jumps: Vec<_> = jumped.map(|(i, w)| (track.blocks.start[i + 1], w[1] - w[0])).collect();
+        definition.put_jumps(&mut effect, &jumps);
+        return effect;
+    }
+    let Some(law) = Law::new(&effect) else { return effect };
+    for (column, theta) in last.fit.prepared[0].columns.iter().zip(&theta) {
+        let Key::Term { effect: of, term } = column.key else { continue };
+        if of != index {
+            continue;
+        }
+        let unit = if law.in_sensor() {
+            1.0
+        } else if definition.is_relative_to_gain() {
+            1.0 / ratio
+        } else {
+            inertia
+        };
+        effect.coefficients.insert(law.names()[term].clone(), theta * unit);
+    }
+    effect
 }
 
 /// Returns the stretches of time, and the states, in which an effect of the model acts most.

@@ -119,6 +119,12 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
         out.push_str("\"/>");
     }
     close(out, &x_label);
+    caption(out, &lines, variable, other, kind);
+    out.push_str("</figure></section>");
+}
+
+/// The picture's caption, with the key to its lines where there are several.
+fn caption(out: &mut String, lines: &[Line], variable: Variable, other: Option<Variable>, kind: Kind) {
     let _ = write!(out, "<figcaption>force over {}, with its 95 % band", variable.in_words());
     if let Some(other) = other {
         out.push_str("; ");
@@ -133,5 +139,5 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
             );
         }
     }
-    out.push_str("</figcaption></figure></section>");
+    out.push_str("</figcaption>");
 }

@@ -67,47 +67,9 @@ pub struct Outcome {
 /// The verdict in one sentence that a technician understands.
 pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
     let fit = &report.fit;
-    let percent = |x: f64| if fit.force_rms.holdout > 0.0 { 100.0 * x / fit.force_rms.holdout } else { 0.0 };
+    let percent = |x: f64| percent_of_force(report, x);
     match report.verdict {
-        Verdict::MissingPhysics => {
-            let mut out = String::new();
-            for (i, effect) in report.effects.iter().enumerate() {
-                if i > 0 {
-                    out.push_str(if i + 1 == report.effects.len() { " and " } else { ", " });
-                }
-                let _ = write!(out, "{} ({:.0} % sure", effect.name.in_words(), 100.0 * effect.confidence);
-                if effect.class.len() > 1 {
-                    let others: Vec<&str> = effect.class[1..].iter().map(|n| n.in_words()).collect();
-                    let _ = write!(out, "; it could also be {}", others.join(" or "));
-                }
-                out.push(')');
-            }
-            let region = report.effects.first().and_then(|e| e.place.states.first());
-            let region = region.map_or(String::new(), |r| {
-                format!(
-                    "; strongest for {} {} to {}{}",
-                    r.variable,
-                    in_sentence(r.low),
-                    in_sentence(r.high),
-                    unit(&r.variable, kind)
-                )
-            });
-            let (before, after) = (percent(fit.refit.holdout), percent(fit.patched.holdout));
-            let rest = remains::of_noise(report)
-                .filter(|ratio| *ratio >= remains::MORE)
-                .map_or(String::new(), |ratio| {
-                    format!(", still {} the sensor's noise", remains::times(ratio))
-                });
-            if fit.holdout_gain_ci95[0] > 0.0 {
-                format!(
-                    "The simulation leaves out {out}{region}; with it the held-out force error falls from {before:.1} % to {after:.1} %{rest}"
-                )
-            } else {
-                format!(
-                    "The simulation leaves out {out}{region}; that this lowers the held-out force error, {before:.1} %, is not proven"
-                )
-            }
-        }
+        Verdict::MissingPhysics => left_out(report, kind),
         Verdict::NoMismatch => format!(
             "The simulation is right to within {:.1} % of the force{}",
             percent(fit.patched.holdout),
@@ -136,6 +98,53 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
             "These recordings cannot tell: {}",
             report.reason.as_deref().unwrap_or("they excite too little")
         ),
+    }
+}
+
+/// A force on the held-out recordings as a percentage of the force that moves them.
+fn percent_of_force(report: &Report, force: f64) -> f64 {
+    let whole = report.fit.force_rms.holdout;
+    if whole > 0.0 { 100.0 * force / whole } else { 0.0 }
+}
+
+/// The sentence of a verdict that names effects.
+fn left_out(report: &Report, kind: Kind) -> String {
+    let fit = &report.fit;
+    let percent = |x: f64| percent_of_force(report, x);
+    let mut out = String::new();
+    for (i, effect) in report.effects.iter().enumerate() {
+        if i > 0 {
+            out.push_str(if i + 1 == report.effects.len() { " and " } else { ", " });
+        }
+        let _ = write!(out, "{} ({:.0} % sure", effect.name.in_words(), 100.0 * effect.confidence);
+        if effect.class.len() > 1 {
+            let others: Vec<&str> = effect.class[1..].iter().map(|n| n.in_words()).collect();
+            let _ = write!(out, "; it could also be {}", others.join(" or "));
+        }
+        out.push(')');
+    }
+    let region = report.effects.first().and_then(|e| e.place.states.first());
+    let region = region.map_or(String::new(), |r| {
+        format!(
+            "; strongest for {} {} to {}{}",
+            r.variable,
+            in_sentence(r.low),
+            in_sentence(r.high),
+            unit(&r.variable, kind)
+        )
+    });
+    let (before, after) = (percent(fit.refit.holdout), percent(fit.patched.holdout));
+    let rest = remains::of_noise(report)
+        .filter(|ratio| *ratio >= remains::MORE)
+        .map_or(String::new(), |ratio| format!(", still {} the sensor's noise", remains::times(ratio)));
+    if fit.holdout_gain_ci95[0] > 0.0 {
+        format!(
+            "The simulation leaves out {out}{region}; with it the held-out force error falls from {before:.1} % to {after:.1} %{rest}"
+        )
+    } else {
+        format!(
+            "The simulation leaves out {out}{region}; that this lowers the held-out force error, {before:.1} %, is not proven"
+        )
     }
 }
 

@@ -18,11 +18,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         Rejection::MayGainNothing { gain: Gain { sum, low, high, .. } } => format!(
             "its gain on held-out recordings, {sum:.0} nats, may be zero (95 %: {low:.0} to {high:.0})"
         ),
-        Rejection::NotSure { fit_z, holdout_z, share } => format!(
-            "its gain is {fit_z:.1} standard errors on left-out blocks of the fitted recordings and {holdout_z:.1} on held-out ones, not {SURE_Z} on both, and it explains {:.0} % of what the noise leaves, less than {:.0} %",
-            100.0 * share.max(0.0),
-            100.0 * UNSURE_SHARE
-        ),
+        Rejection::NotSure { fit_z, holdout_z, share } => not_sure(*fit_z, *holdout_z, *share),
         Rejection::FewMoments { fit_z, holdout_z } => format!(
             "its gain rests on few moments of the fitted recordings: {fit_z:.1} standard errors there, less than {UNLIKELY_Z}, and {holdout_z:.1} on held-out ones, less than {SURE_Z}"
         ),
@@ -66,6 +62,14 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
         Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
     }
+}
+
+fn not_sure(fit_z: f64, holdout_z: f64, share: f64) -> String {
+    format!(
+        "its gain is {fit_z:.1} standard errors on left-out blocks of the fitted recordings and {holdout_z:.1} on held-out ones, not {SURE_Z} on both, and it explains {:.0} % of what the noise leaves, less than {:.0} %",
+        100.0 * share.max(0.0),
+        100.0 * UNSURE_SHARE
+    )
 }
 
 fn rather(what: &Rather) -> String {

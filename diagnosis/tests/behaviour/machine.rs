@@ -74,7 +74,7 @@ impl Excitation {
         if x < 0.5 { 4.0 * x - 1.0 } else { 3.0 - 4.0 * x }
     }
 
-    /// What a position loop follows, rad.
+    /// The place that a position loop follows, rad.
     pub(crate) fn reference(&self, t: f64) -> f64 {
         8.0 * self.triangle(t) * (1.0 + 0.5 * (0.31 * t).sin()) + 0.5 * (2.0 * t).sin() + 0.12 * self.wave(t)
     }
@@ -107,7 +107,7 @@ pub(crate) struct Machine<'a> {
     dt: f64,
     /// The encoder's zero, rad.
     zero: f64,
-    /// Where the angle begins, by the encoder, rad.
+    /// The angle at the start, by the encoder, rad.
     start: f64,
     q: f64,
     v: f64,
@@ -202,7 +202,7 @@ impl<'a> Machine<'a> {
         }
     }
 
-    /// What the drive makes of a command.
+    /// The command as the drive passes it on.
     fn effective(&mut self, now: &Moment, u: f64) -> f64 {
         let (s, dt) = (self.setup.size, self.dt);
         match self.setup.effect {

@@ -172,6 +172,50 @@ fn csv(recording: &Recording) -> String {
     out
 }
 
+/// Rig, fitted and held-out file, and the sentence that refuses them.
+const MISTAKES: [(&str, &str, &str, &str); 10] = [
+    ("rig.toml", "fit.csv", "fit.csv", "is given to fit and, as fit.csv, to hold out"),
+    (
+        "rig.toml",
+        "fit.csv",
+        "copy.csv",
+        "fit.csv is given to fit and, as copy.csv, to hold out: it would judge what it was fitted to",
+    ),
+    (
+        "rig.toml",
+        "semicolons.csv",
+        "holdout.csv",
+        "semicolons.csv, line 1: fields stand between semicolons; let host-sim import read the file",
+    ),
+    ("rig.toml", "tabs.csv", "holdout.csv", "tabs.csv, line 1: fields stand between tabs"),
+    (
+        "rig.toml",
+        "commented.csv",
+        "holdout.csv",
+        "commented.csv, line 1: a comment line where the header belongs",
+    ),
+    ("rig.toml", "remark.csv", "holdout.csv", "remark.csv, line 5: a comment line; take it out"),
+    (
+        "misspelt.toml",
+        "fit.csv",
+        "holdout.csv",
+        "[model] viscuos is not a key of a rig file; do you mean [model] viscous",
+    ),
+    (
+        "misplaced.toml",
+        "fit.csv",
+        "holdout.csv",
+        "[encoder] limit is not a key of a rig file; it belongs in [actuator], as limit",
+    ),
+    (
+        "weight.toml",
+        "fit.csv",
+        "holdout.csv",
+        "model.weight acts through the tilt and fit.csv has no column tilt_rad",
+    ),
+    ("unfilled.toml", "fit.csv", "holdout.csv", "model.inertia is still to be filled in"),
+];
+
 #[test]
 fn files_and_keys_that_are_mistaken_are_refused_with_their_place() {
     let dir = folder("mistakes");
@@ -190,49 +234,7 @@ fn files_and_keys_that_are_mistaken_are_refused_with_their_place() {
     write("misplaced.toml", &format!("{RIG}limit = 1.0\n"));
     write("weight.toml", &RIG.replace("coulomb = 0.02", "coulomb = 0.02\nweight = 0.1"));
     write("unfilled.toml", &RIG.replace("inertia = 2.0e-3", "inertia = nan"));
-    let cases = [
-        ("rig.toml", "fit.csv", "fit.csv", "is given to fit and, as fit.csv, to hold out"),
-        (
-            "rig.toml",
-            "fit.csv",
-            "copy.csv",
-            "fit.csv is given to fit and, as copy.csv, to hold out: it would judge what it was fitted to",
-        ),
-        (
-            "rig.toml",
-            "semicolons.csv",
-            "holdout.csv",
-            "semicolons.csv, line 1: fields stand between semicolons; let host-sim import read the file",
-        ),
-        ("rig.toml", "tabs.csv", "holdout.csv", "tabs.csv, line 1: fields stand between tabs"),
-        (
-            "rig.toml",
-            "commented.csv",
-            "holdout.csv",
-            "commented.csv, line 1: a comment line where the header belongs",
-        ),
-        ("rig.toml", "remark.csv", "holdout.csv", "remark.csv, line 5: a comment line; take it out"),
-        (
-            "misspelt.toml",
-            "fit.csv",
-            "holdout.csv",
-            "[model] viscuos is not a key of a rig file; do you mean [model] viscous",
-        ),
-        (
-            "misplaced.toml",
-            "fit.csv",
-            "holdout.csv",
-            "[encoder] limit is not a key of a rig file; it belongs in [actuator], as limit",
-        ),
-        (
-            "weight.toml",
-            "fit.csv",
-            "holdout.csv",
-            "model.weight acts through the tilt and fit.csv has no column tilt_rad",
-        ),
-        ("unfilled.toml", "fit.csv", "holdout.csv", "model.inertia is still to be filled in"),
-    ];
-    for (rig, fit, holdout, sentence) in cases {
+    for (rig, fit, holdout, sentence) in MISTAKES {
         let request =
             Request { rig: path(rig), fit: vec![path(fit)], holdout: vec![path(holdout)], effects: None };
         let error = diagnose(&request, &|_, _| ()).expect_err(sentence).to_string();

@@ -34,15 +34,18 @@ impl Cut {
     }
 }
 
+/// Questions that the paper leaves open, and the answers chosen here.
+const OPEN: [&str; 5] = [
+    "The force function is “described in Figure 3”, which is a picture of a screen. Here the force is a table over depth, speed and angle, which fit-force fits to insertions.",
+    "Five of nine cells of speed and angle were measured. The other four are taken as separable; nothing in the paper says that they are.",
+    "No real insertion was compared with: every curve here comes from the phantom's table.",
+    "What a needle feels in a track that it has made already, and beside it: here a layer gives way once, and in its track the force is the lower hull of the table.",
+    "Whether speed matters is disputed between sources: it is a parameter of the table.",
+];
+
 pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     let profile = Profile::find("phantom")?;
-    let mut cuts = Vec::new();
-    for (speed, angle) in SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a))) {
-        let procedure = Procedure::find(&format!("insertion-{speed}mms-{angle}deg"), &profile)?;
-        let file = dir.join(format!("paper-000-{speed}mms-{angle}deg.mcap"));
-        let trace = Trace::of(&rehearsal::record(&profile, procedure, &file)?)?;
-        cuts.push(Cut { speed, angle, trace, file });
-    }
+    let cuts = record(&profile, dir)?;
     let mut sheet = Sheet::new(
         "A Hybrid Virtual Reality-Haptic Simulation Framework for Layer-aware Needle Insertion in Extended Reality (paper 000)",
         "The paper prints its protocol and Table 1, and no force: its force function is a picture of a screen, and its measurements are curves \
@@ -67,6 +70,31 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     numbers(&mut sheet, &compared);
     sheet.paragraph(&fit);
     sheet.heading("Fig. 2 and 4: force against depth");
+    let mut figures = force_figures(&profile, &cuts);
+    figures.push(table_1::side_by_side(dir)?);
+    sheet.figures(&figures);
+    sheet.heading("Table 1");
+    put_table_1(&mut sheet);
+    table_1::pushes(&mut sheet, dir)?;
+    sheet.heading("What the paper leaves open");
+    OPEN.iter().for_each(|words| sheet.paragraph(words));
+    Ok(sheet)
+}
+
+/// Records an insertion at every speed and angle.
+fn record(profile: &Profile, dir: &Path) -> Result<Vec<Cut>, Failure> {
+    let mut cuts = Vec::new();
+    for (speed, angle) in SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a))) {
+        let procedure = Procedure::find(&format!("insertion-{speed}mms-{angle}deg"), profile)?;
+        let file = dir.join(format!("paper-000-{speed}mms-{angle}deg.mcap"));
+        let trace = Trace::of(&rehearsal::record(profile, procedure, &file)?)?;
+        cuts.push(Cut { speed, angle, trace, file });
+    }
+    Ok(cuts)
+}
+
+/// Force against depth, as (picture, words): the cells that the paper measured, then the others.
+fn force_figures(profile: &Profile, cuts: &[Cut]) -> Vec<(String, String)> {
     let of = |wanted: &dyn Fn(&Cut) -> bool, name: &dyn Fn(&Cut) -> String, title: &str| {
         let curves = cuts.iter().filter(|c| wanted(c)).zip(0..);
         Chart {
@@ -81,7 +109,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
                     points: c.trace.force_over_depth(0..c.trace.deepest()),
                 })
                 .collect(),
-            marks: cuts.iter().find(|c| wanted(c)).map_or_else(Vec::new, |c| marks(&profile, c)),
+            marks: cuts.iter().find(|c| wanted(c)).map_or_else(Vec::new, |c| marks(profile, c)),
             ..Chart::default()
         }
         .svg()
@@ -89,8 +117,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     let speed = |c: &Cut| format!("{} mm/s", c.speed);
     let angle = |c: &Cut| format!("{}°", c.angle);
     let no_data = "The paper did not measure this; the table is taken as separable there.";
-    let (svg, words) = table_1::side_by_side(dir)?;
-    sheet.figures(&[
+    vec![
         (
             of(&|c| c.angle == 60, &speed, "Fig. 2 (a): 60°"),
             "As the paper measured it: three speeds at 60°.".into(),
@@ -101,9 +128,11 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         ),
         (of(&|c| c.angle == 45 && c.speed < 5, &speed, "45°, no data in the paper"), no_data.into()),
         (of(&|c| c.angle == 30 && c.speed < 5, &speed, "30°, no data in the paper"), no_data.into()),
-        (svg, words),
-    ]);
-    sheet.heading("Table 1");
+    ]
+}
+
+/// The constraints of the tissue's picture as the paper prints them.
+fn put_table_1(sheet: &mut Sheet) {
     sheet.paragraph(
         "Constraints of the tissue's picture, as the paper prints them. It gives no unit to L₀, no compliance, no count of particles and no time \
          step; its bending values are rest angles. They are one of the configurations of the tissue picture (`paper_000` in the folder tissue), where L₀ is \
@@ -123,18 +152,6 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
             cells("Skin (bottom)", ["0.012; here 12 mm", "1.0", "180°"]),
         ],
     );
-    table_1::pushes(&mut sheet, dir)?;
-    sheet.heading("What the paper leaves open");
-    for words in [
-        "The force function is “described in Figure 3”, which is a picture of a screen. Here the force is a table over depth, speed and angle, which fit-force fits to insertions.",
-        "Five of nine cells of speed and angle were measured. The other four are taken as separable; nothing in the paper says that they are.",
-        "No real insertion was compared with: every curve here comes from the phantom's table.",
-        "What a needle feels in a track that it has made already, and beside it: here a layer gives way once, and in its track the force is the lower hull of the table.",
-        "Whether speed matters is disputed between sources: it is a parameter of the table.",
-    ] {
-        sheet.paragraph(words);
-    }
-    Ok(sheet)
 }
 
 /// Where the layers are met and where they give way on one of the curves, mm along the needle.

@@ -14,7 +14,7 @@ use device_sim::driver::Driver;
 use device_sim::failure::Failure;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{Model, Profile};
-use device_sim::session::{self, Session, Source};
+use device_sim::session::{self, Session, Source, Subscription};
 use host_sim::serial::SerialPort;
 use recording::messages::Setup;
 use recording::read::Recording;
@@ -118,6 +118,17 @@ impl From<ModelName> for Model {
     }
 }
 
+/// The device, the patient and the procedure of a run.
+struct Chosen {
+    device: Device,
+    /// The device's part as its file has it.
+    part: Option<DevicePart>,
+    profile: Profile,
+    /// Name or file of the procedure.
+    wanted: String,
+    procedure: Procedure,
+}
+
 impl Run {
     fn address(&self) -> SocketAddr {
         self.listen.unwrap_or_else(|| (Ipv4Addr::LOCALHOST, self.port).into())
@@ -125,9 +136,41 @@ impl Run {
 
     pub(crate) fn run(self) -> Result<(), Failure> {
         let seconds = self.check()?;
-        let is_virtual = self.device == "virtual";
+        let chosen = self.choose()?;
+        let serial = if self.is_virtual() { None } else { Some(SerialPort::find(&self.device)?) };
+
+        let setup = self.setup(&chosen);
+        let (session, publisher) =
+            session::open(chosen.profile.scene(self.source(), setup.procedure.clone()));
+        // The port is taken before the file is made: a page that cannot be served must not cost a recording.
+        let _streams = self.streams.serve(&session)?;
+        let _class = self.class.join(&session, chosen.device)?;
+        let looks = (!self.headless).then(|| session.subscribe());
+        let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
+        let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
+        let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
+        let stop = Arc::new(AtomicBool::new(false));
+        stop_on_signals(&stop)?;
+
+        let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
+        let station = self.station(&chosen, setup, outlets, looks, &stop);
+        let outcome = self.play(station, serial, chosen, seconds)?;
+        self.report(&outcome);
+        Ok(())
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.device == "virtual"
+    }
+
+    fn source(&self) -> Source {
+        if self.is_virtual() { Source::Virtual } else { Source::Serial { path: self.device.clone() } }
+    }
+
+    /// Reads the device's file and finds the patient and the procedure.
+    fn choose(&self) -> Result<Chosen, Failure> {
         let mut part = self.device_config.as_deref().map(DevicePart::read).transpose()?;
-        if let Some(part) = part.as_mut().filter(|_| is_virtual) {
+        if let Some(part) = part.as_mut().filter(|_| self.is_virtual()) {
             // It is built as its file says.
             part.device.commissioned = true;
         }
@@ -139,71 +182,77 @@ impl Run {
         };
         let wanted = self.procedure.clone().unwrap_or_else(|| profile.procedure.clone());
         let procedure = Procedure::find(&wanted, &profile)?;
-        let mut serial = if is_virtual { None } else { Some(SerialPort::find(&self.device)?) };
+        Ok(Chosen { device, part, profile, wanted, procedure })
+    }
 
-        let source = if is_virtual { Source::Virtual } else { Source::Serial { path: self.device.clone() } };
-        let shown_procedure = is_virtual.then(|| procedure.name.clone());
-        let (session, publisher) = session::open(profile.scene(source.clone(), shown_procedure.clone()));
-        // The port is taken before the file is made: a page that cannot be served must not cost a recording.
-        let _streams = self.streams.serve(&session)?;
-        let _class = self.class.join(&session, device)?;
-        let looks = (!self.headless).then(|| session.subscribe());
-        let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
-        let setup = Setup {
+    /// Returns the description of the run that a recording begins with.
+    fn setup(&self, chosen: &Chosen) -> Setup {
+        Setup {
             program: recording::version::program(),
             source: if self.deformed {
                 "virtual, depth from the deformed tissue".into()
             } else {
                 self.device.clone()
             },
-            profile_toml: profile.source.text.clone(),
-            profile_origin: profile.source.origin.clone(),
-            procedure: shown_procedure,
-            device_toml: part.as_ref().map(|part| part.source.text.clone()),
-            tasks: procedure.tasks.clone(),
-        };
-        let hand = is_virtual.then(|| wanted.clone());
-        let bedside = Bedside::new(profile.clone(), source, hand, setup.clone())
-            .saving_in(SavedPatients::new(PATIENTS));
-        let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
-        let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
-        let stop = Arc::new(AtomicBool::new(false));
-        stop_on_signals(&stop)?;
+            profile_toml: chosen.profile.source.text.clone(),
+            profile_origin: chosen.profile.source.origin.clone(),
+            procedure: self.is_virtual().then(|| chosen.procedure.name.clone()),
+            device_toml: chosen.part.as_ref().map(|part| part.source.text.clone()),
+            tasks: chosen.procedure.tasks.clone(),
+        }
+    }
 
-        let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
-        let driver = Driver::new(profile.config.patient.clone());
-        let driver = part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
-        let station = Station::new(driver, outlets, &stop).with_bedside(bedside);
+    /// Builds the loop between the device and its outlets. `looks` is what the page's practice sees.
+    fn station<'a>(
+        &self,
+        chosen: &Chosen,
+        setup: Setup,
+        outlets: Outlets,
+        looks: Option<Subscription>,
+        stop: &'a AtomicBool,
+    ) -> Station<'a> {
+        let hand = self.is_virtual().then(|| chosen.wanted.clone());
+        let bedside = Bedside::new(chosen.profile.clone(), self.source(), hand, setup)
+            .saving_in(SavedPatients::new(PATIENTS));
+        let driver = Driver::new(chosen.profile.config.patient.clone());
+        let driver = chosen.part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
+        let station = Station::new(driver, outlets, stop).with_bedside(bedside);
         let station = match looks {
             Some(subscription) => station.with_practice(subscription),
             None => station,
         };
-        let station = if is_virtual || self.headless {
+        if self.is_virtual() || self.headless {
             if self.zero { station.zeroing_first() } else { station }
         } else {
             // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
             note!("the torque is off: press Start in the page");
             station.wait_for_a_person()
-        };
+        }
+    }
+
+    /// Runs the device on the serial port or, without one, a virtual device.
+    fn play(
+        &self,
+        station: Station<'_>,
+        serial: Option<SerialPort>,
+        chosen: Chosen,
+        seconds: Option<f64>,
+    ) -> Result<Outcome, Failure> {
         let mut bar = Progress::new("running");
         let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
-        let outcome = match &mut serial {
-            Some(port) => station.run_in_real_time(port, seconds, progress)?,
-            None => {
-                let mut device = VirtualDevice::built(&profile, procedure, part.as_ref());
-                if self.deformed {
-                    device = device.with_deformed(&profile)?;
-                }
-                if !self.fast {
-                    device.take_times();
-                }
-                let pace = if self.fast { Pace::Free } else { Pace::real_time() };
-                station.run_in_step(device, pace, progress)?
-            }
-        };
-        drop(bar);
-        self.report(&outcome);
-        Ok(())
+        if let Some(mut port) = serial {
+            return station.run_in_real_time(&mut port, seconds, progress);
+        }
+        let Chosen { profile, procedure, part, .. } = chosen;
+        let mut device = VirtualDevice::built(&profile, procedure, part.as_ref());
+        if self.deformed {
+            device = device.with_deformed(&profile)?;
+        }
+        if !self.fast {
+            device.take_times();
+        }
+        let pace = if self.fast { Pace::Free } else { Pace::real_time() };
+        station.run_in_step(device, pace, progress)
     }
 
     /// Returns the requested patient, or the default one of the requested law.
@@ -228,15 +277,15 @@ impl Run {
     fn check(&self) -> Result<Option<f64>, Failure> {
         self.streams.check()?;
         self.class.check()?;
-        if self.angle.is_some() && self.device != "virtual" {
+        if self.angle.is_some() && !self.is_virtual() {
             return Err(Failure::input("--angle is for the virtual device: a hand turns a real needle"));
         }
-        if self.deformed && self.device != "virtual" {
+        if self.deformed && !self.is_virtual() {
             return Err(Failure::input(
                 "--deformed is for the virtual device: the board takes no surface from a PC that may stall",
             ));
         }
-        if self.fast && self.device != "virtual" {
+        if self.fast && !self.is_virtual() {
             return Err(Failure::input("--fast is for the virtual device: a real one runs in real time"));
         }
         match self.seconds {

@@ -96,28 +96,13 @@ impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let formats = super::export::formats(&self.export)?;
         let mut models = models(&self.rig)?;
-        let read = |paths: &[PathBuf]| -> Result<Vec<Recording>, Failure> {
-            paths.iter().map(|path| Recording::read(path).map_err(Failure::input)).collect()
-        };
-        let recordings = read(&self.recording)?;
+        let recordings = read_all(&self.recording)?;
         let mut notes = Vec::new();
-        let mut fitted_rig = None;
         let last = models.last().map_or_else(String::new, |(name, _)| name.clone());
+        let mut fitted_rig = None;
         if let (false, Some((_, rig))) = (self.fit.is_empty(), models.last()) {
-            let fitted = value_fit::fit(rig, &read(&self.fit)?);
-            notes.push(format!(
-                "The motion-fitted simulation is the {last} one with the values that bring its free run closest to {}: they serve trajectories, and are no evidence of physics",
-                self.fit.iter().map(|path| file_name(path)).collect::<Vec<_>>().join(", ")
-            ));
-            let whole = |path: &PathBuf| path.canonicalize().ok();
-            for path in
-                self.recording.iter().filter(|path| self.fit.iter().any(|fit| whole(fit) == whole(path)))
-            {
-                notes.push(format!(
-                    "{} was fitted by motion too: what the motion-fitted simulation is off there judges nothing",
-                    file_name(path)
-                ));
-            }
+            let fitted = value_fit::fit(rig, &read_all(&self.fit)?);
+            notes.extend(self.notes_on_fit(&last));
             models.push((MOTION_FITTED.into(), fitted.clone()));
             fitted_rig = Some(fitted);
         }
@@ -127,30 +112,10 @@ impl Simulate {
             notes.extend(one.worse_for_less_force());
             notes.extend(one.worse(MOTION_FITTED, &last));
         }
-        let json = serde_json::to_string_pretty(&motion_picture::summary(&compared, &notes))
-            .map_err(Failure::failed)?;
         let page = simulation_page::page(&models[0].1.name, &compared, &notes, &self.next(&last));
-        let mut files = vec![
-            ("simulation.html".to_owned(), page.into_bytes()),
-            ("simulation.json".to_owned(), (json + "\n").into_bytes()),
-        ];
-        for (k, one) in compared.iter().enumerate() {
-            let name =
-                if compared.len() == 1 { "simulation".into() } else { format!("simulation-{}", k + 1) };
-            files.push((format!("{name}.csv"), motion_picture::csv(one).into_bytes()));
-            files.push((format!("{name}.mcap"), simulated::mcap(one)?));
-        }
+        let mut files = files(page, &compared, &notes)?;
         files.extend(fitted_rig.map(|rig| ("fitted-rig.toml".to_owned(), rig.to_toml().into_bytes())));
-        let write = || {
-            std::fs::create_dir_all(&self.out)?;
-            files.iter().try_for_each(|(name, bytes)| std::fs::write(self.out.join(name), bytes))
-        };
-        write().map_err(|cause| {
-            Failure::failed(format_args!(
-                "{}: cannot be written ({cause}); free some space or choose another --out",
-                self.out.display()
-            ))
-        })?;
+        self.write(&files)?;
         if let Some((_, last)) = models.last() {
             super::export::write(last, &formats, &self.out)?;
         }
@@ -163,4 +128,54 @@ impl Simulate {
         say!("page: {}", self.out.join("simulation.html").display());
         Ok(())
     }
+
+    /// Returns the notes on the model whose values were fitted by motion from the one called `last`.
+    fn notes_on_fit(&self, last: &str) -> Vec<String> {
+        let mut notes = vec![format!(
+            "The motion-fitted simulation is the {last} one with the values that bring its free run closest to {}: they serve trajectories, and are no evidence of physics",
+            self.fit.iter().map(|path| file_name(path)).collect::<Vec<_>>().join(", ")
+        )];
+        let whole = |path: &PathBuf| path.canonicalize().ok();
+        let is_fitted = |path: &&PathBuf| self.fit.iter().any(|fit| whole(fit) == whole(path));
+        notes.extend(self.recording.iter().filter(is_fitted).map(|path| {
+            format!(
+                "{} was fitted by motion too: what the motion-fitted simulation is off there judges nothing",
+                file_name(path)
+            )
+        }));
+        notes
+    }
+
+    fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+        let write = || {
+            std::fs::create_dir_all(&self.out)?;
+            files.iter().try_for_each(|(name, bytes)| std::fs::write(self.out.join(name), bytes))
+        };
+        write().map_err(|cause| {
+            Failure::failed(format_args!(
+                "{}: cannot be written ({cause}); free some space or choose another --out",
+                self.out.display()
+            ))
+        })
+    }
+}
+
+fn read_all(paths: &[PathBuf]) -> Result<Vec<Recording>, Failure> {
+    paths.iter().map(|path| Recording::read(path).map_err(Failure::input)).collect()
+}
+
+/// Returns the names and contents of the files: the page, its figures, and a CSV and an MCAP for each recording.
+fn files(page: String, compared: &[Comparison], notes: &[String]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    let json =
+        serde_json::to_string_pretty(&motion_picture::summary(compared, notes)).map_err(Failure::failed)?;
+    let mut files = vec![
+        ("simulation.html".to_owned(), page.into_bytes()),
+        ("simulation.json".to_owned(), (json + "\n").into_bytes()),
+    ];
+    for (k, one) in compared.iter().enumerate() {
+        let name = if compared.len() == 1 { "simulation".into() } else { format!("simulation-{}", k + 1) };
+        files.push((format!("{name}.csv"), motion_picture::csv(one).into_bytes()));
+        files.push((format!("{name}.mcap"), simulated::mcap(one)?));
+    }
+    Ok(files)
 }

@@ -6,7 +6,7 @@ use diagnosis::recording::Recording;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-fn angle(t: f64) -> f64 {
+pub(crate) fn angle(t: f64) -> f64 {
     0.8 * (TAU * 0.9 * t).sin() + 0.3 * (TAU * 2.3 * t).sin()
 }
 
@@ -14,7 +14,7 @@ fn torque(t: f64) -> f64 {
     0.4 * (TAU * 0.9 * t).cos()
 }
 
-fn foreign(name: &str) -> PathBuf {
+pub(crate) fn foreign(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign").join(name)
 }
 
@@ -278,95 +278,6 @@ fn a_turned_sign_values_for_the_rig_and_a_cut_for_holding_out_are_taken_as_given
     let rig = diagnosis::rig::Rig::parse(&rig, "rig.toml").expect("the rig is complete");
     assert_eq!((rig.model.inertia, rig.actuator.gain), (0.02, 1.5));
     assert_eq!(rig.encoder.counts_per_unit, 1e6);
-}
-
-#[test]
-fn what_only_a_person_can_know_is_asked_with_the_option_that_says_it() {
-    let out = folder("import-refused");
-    let written = |name: &str, content: &[u8]| {
-        let path = out.join(name);
-        std::fs::write(&path, content).expect("written");
-        path
-    };
-    let table = |header: &str| {
-        let rows: String = (0..400)
-            .map(|i| format!("{},{},{}\n", i as f64 * 0.005, angle(i as f64 * 0.005), i % 7))
-            .collect();
-        format!("{header}\n{rows}")
-    };
-    let cases: Vec<(PathBuf, &[&str], &str)> = vec![
-        (
-            written("a.csv", table("t,theta,u").as_bytes()),
-            &[],
-            "the position column theta does not say its unit; say it with --column position=theta:UNIT, in rad, deg",
-        ),
-        (
-            written("b.csv", table("t,theta_deg,foo").as_bytes()),
-            &[],
-            "none of its columns is known as the command; say which with --column command=NAME[:UNIT]; its columns are t, theta_deg, foo; or give --undriven",
-        ),
-        (
-            written("c.csv", table("t,pos_m,pos_mm").as_bytes()),
-            &["--undriven"],
-            "pos_m and pos_mm could both be the position; say which with --column position=pos_m",
-        ),
-        (
-            written("d.csv", table("x,theta_deg,u").as_bytes()),
-            &["--column", "position=theta_deg"],
-            "or give --rate HZ",
-        ),
-        (
-            written("e.csv", table("t,theta_deg,u").as_bytes()),
-            &["--column", "position=thetta:deg"],
-            "has no column \"thetta\"; its columns are t, theta_deg, u",
-        ),
-        (
-            written("f.csv", table("t,theta_deg,u").as_bytes()),
-            &["--column", "position=theta_deg:s"],
-            "a position is not measured in s",
-        ),
-        (
-            foreign("coarse.csv"),
-            &[],
-            "has steps of 20, which could be ms or µs; say which with --column time=t:ms",
-        ),
-        (written("g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"), &[], "is no usable MATLAB file"),
-        (written("v73.mat", b"MATLAB 7.3 MAT-file"), &[], "save('FILE.mat', '-v7')"),
-        (foreign("sheet.xlsx"), &[], "is an Excel workbook; save its sheet as CSV"),
-        (
-            written("same.csv", table("t,value,u").as_bytes()),
-            &["--column", "position=value:rad", "--column", "command=value:Nm"],
-            "--column gives value two roles, position and command",
-        ),
-        (
-            written("spaces.csv", table("t,the angle,the torque").as_bytes()),
-            &["--column", "command=the torque"],
-            "say it with --column 'position=the angle:UNIT'",
-        ),
-        (
-            foreign("bare.txt"),
-            &["--column", "command=column3"],
-            "its columns are column1 (0, 0.005, 0.01, …), column2 (0, ",
-        ),
-        (
-            written("both.csv", table("t,theta,foo").as_bytes()),
-            &[],
-            "--undriven where nothing drives the axis; and the position column theta",
-        ),
-        (written("h.csv", b"nothing here\nbut words\n"), &[], "no row of numbers was found"),
-        (written("i.npz", b"PK\x03\x04 q.npy and no more"), &[], "is no usable NumPy file"),
-    ];
-    for (path, options, sentence) in cases {
-        let result = out.join("result");
-        let mut arguments = vec!["import", text(&path), "--out", text(&result)];
-        arguments.extend(options);
-        let output = host_sim(&arguments).output().expect("it runs");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{}: {said}", path.display());
-        assert!(said.contains(sentence), "{} should say \"{sentence}\": {said}", path.display());
-        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-        assert!(!result.exists(), "nothing is half written");
-    }
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod guide_page;
 mod hand;
 mod hostile;
 mod import;
+mod import_refused;
 mod link_faults;
 mod papers_page;
 mod patients;

@@ -2,6 +2,7 @@
 //! rival's library goes through the same low-pass, so that both sides of an equation see the same filter.
 
 use crate::generator::case::Case;
+use crate::generator::simulate;
 use crate::signal::{derivative, low_pass, rms};
 
 /// One grid point of what a rival may use.
@@ -43,38 +44,18 @@ pub(crate) fn table(case: &Case, k: usize) -> Table {
     let (rate, band) = (case.machine.rate, case.machine.residual_bandwidth());
     let (Some(first), Some(last)) = (source.first(), source.last()) else { return Table::default() };
     let n = ((last.stamp - first.stamp) * rate) as usize;
-    let columns: [fn(&crate::generator::simulate::Row) -> f64; 4] =
-        [|r| r.counts, |r| r.command, |r| r.tilt, |r| r.force];
-    let mut even: [Vec<f64>; 4] = Default::default();
-    let mut j = 0;
-    for i in 0..n {
-        let t = first.stamp + i as f64 / rate;
-        while j + 2 < source.len() && source[j + 1].stamp <= t {
-            j += 1;
-        }
-        let (a, b) = (&source[j], &source[j + 1]);
-        let share = (t - a.stamp) / (b.stamp - a.stamp);
-        for (c, column) in columns.iter().enumerate() {
-            let value = if c == 1 {
-                // Held commands: the mean around the grid point.
-                0.5 * (source[j.saturating_sub(1)].command + a.command)
-            } else {
-                column(a) + (column(b) - column(a)) * share
-            };
-            even[c].push(value);
-        }
-    }
-    let start = even[0].first().copied().unwrap_or(0.0);
-    let place: Vec<f64> = even[0].iter().map(|c| (c - start) / case.plant.counts_per_unit).collect();
+    let [counts, commands, tilt, load] = on_even_grid(source, first.stamp, rate, n);
+    let start = counts.first().copied().unwrap_or(0.0);
+    let place: Vec<f64> = counts.iter().map(|c| (c - start) / case.plant.counts_per_unit).collect();
     let place = low_pass(&place, rate, band);
     let speed = derivative(&place, rate);
     let acceleration = derivative(&speed, rate);
-    let smooth_command = low_pass(&even[1], rate, band);
+    let smooth_command = low_pass(&commands, rate, band);
     let command_rate = derivative(&smooth_command, rate);
     let command_bend = derivative(&command_rate, rate);
     // Far above the bandwidth the grid may be thinner: what selects works on tens of columns.
     let step = ((rate / (20.0 * band)) as usize).max(1);
-    let command = if step > 1 { low_pass(&even[1], rate, 5.0 * band) } else { even[1].clone() };
+    let command = if step > 1 { low_pass(&commands, rate, 5.0 * band) } else { commands };
     let slowest = 0.01 * rms(&speed);
     let edge = ((2.0 * rate / band) as usize).min(n / 10);
     let (mut rows, mut kept) = (Vec::with_capacity(n / step + 1), Vec::new());
@@ -95,11 +76,36 @@ pub(crate) fn table(case: &Case, k: usize) -> Table {
             speed: speed[i],
             acceleration: acceleration[i],
             progress: i as f64 / n as f64,
-            tilt: even[2][i].sin(),
-            load: even[3][i],
+            tilt: tilt[i].sin(),
+            load: load[i],
             since_reversal: (place[i] - reversal).abs(),
         });
     }
     let independent = 4.0 * band * case.machine.duration;
     Table { rows, kept, rate: rate / step as f64, band, independent }
+}
+
+/// Returns counts, commands, tilt and force of a recording at `n` points of an even grid from `start` (s) on, `rate` a second.
+fn on_even_grid(source: &[simulate::Row], start: f64, rate: f64, n: usize) -> [Vec<f64>; 4] {
+    let columns: [fn(&simulate::Row) -> f64; 4] = [|r| r.counts, |r| r.command, |r| r.tilt, |r| r.force];
+    let mut even: [Vec<f64>; 4] = Default::default();
+    let mut j = 0;
+    for i in 0..n {
+        let t = start + i as f64 / rate;
+        while j + 2 < source.len() && source[j + 1].stamp <= t {
+            j += 1;
+        }
+        let (a, b) = (&source[j], &source[j + 1]);
+        let share = (t - a.stamp) / (b.stamp - a.stamp);
+        for (c, column) in columns.iter().enumerate() {
+            let value = if c == 1 {
+                // Held commands: the mean around the grid point.
+                0.5 * (source[j.saturating_sub(1)].command + a.command)
+            } else {
+                column(a) + (column(b) - column(a)) * share
+            };
+            even[c].push(value);
+        }
+    }
+    even
 }

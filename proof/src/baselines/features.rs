@@ -83,8 +83,20 @@ pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
     let top = all().map(|r| r.speed.abs()).fold(1e-12, f64::max);
     let most = all().map(|r| r.command.abs()).fold(1e-12, f64::max);
     let travel = all().map(|r| r.place.abs()).fold(1e-12, f64::max);
-    let n = &case.nominal;
     let mut b = Builder { list: Vec::new(), group: 0 };
+    put_nominal(&mut b, case);
+    put_friction(&mut b, case, top, travel);
+    if case.machine.turn_told {
+        put_turn(&mut b, case.plant.turn);
+    }
+    put_command(&mut b, most);
+    put_mechanism(&mut b, case, travel);
+    b.list
+}
+
+/// The terms of the nominal model, and those of them that the rig file leaves out.
+fn put_nominal(b: &mut Builder, case: &Case) {
+    let n = &case.nominal;
     b.nominal(None, |r| r.command);
     if case.with_force {
         b.nominal(None, |r| r.load);
@@ -110,6 +122,10 @@ pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
     if n.coulomb.is_none() {
         b.one("coulomb_friction", |r| sign(r.speed));
     }
+}
+
+/// Friction laws and drifts; `top` is the largest speed, in u/s, and `travel` the largest travel, in u.
+fn put_friction(b: &mut Builder, case: &Case, top: f64, travel: f64) {
     b.one("asymmetric_friction", |r| r.speed.abs());
     for share in [0.02, 0.05, 0.1, 0.2] {
         let scale = share * top;
@@ -130,21 +146,27 @@ pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
         b.one("friction_drift", move |r| sign(r.speed) * (-r.progress / share).exp());
         b.one("gain_drift", move |r| r.command * (1.0 - (-r.progress / share).exp()));
     }
-    if case.machine.turn_told {
-        let wave = TAU / case.plant.turn;
-        let pair = |order: f64, factor: fn(&Row) -> f64| -> Vec<Column> {
-            vec![
-                Box::new(move |r| factor(r) * (order * wave * r.place).sin()),
-                Box::new(move |r| factor(r) * (order * wave * r.place).cos()),
-            ]
-        };
-        b.put("mass_imbalance", pair(1.0, |_| 1.0));
-        b.put("encoder_eccentricity", pair(1.0, |r| r.speed * r.speed));
-        for order in 2..=24 {
-            b.put("cogging", pair(f64::from(order), |_| 1.0));
-            b.put("torque_ripple", pair(f64::from(order), |r| r.command));
-        }
+}
+
+/// Effects that are periodic in the turn, of so many u.
+fn put_turn(b: &mut Builder, turn: f64) {
+    let wave = TAU / turn;
+    let pair = |order: f64, factor: fn(&Row) -> f64| -> Vec<Column> {
+        vec![
+            Box::new(move |r| factor(r) * (order * wave * r.place).sin()),
+            Box::new(move |r| factor(r) * (order * wave * r.place).cos()),
+        ]
+    };
+    b.put("mass_imbalance", pair(1.0, |_| 1.0));
+    b.put("encoder_eccentricity", pair(1.0, |r| r.speed * r.speed));
+    for order in 2..=24 {
+        b.put("cogging", pair(f64::from(order), |_| 1.0));
+        b.put("torque_ripple", pair(f64::from(order), |r| r.command));
     }
+}
+
+/// Effects on the command, whose largest is `most`.
+fn put_command(b: &mut Builder, most: f64) {
     for share in [0.05, 0.15, 0.4] {
         let width = share * most;
         b.one("command_deadband", move |r| r.command.clamp(-width, width));
@@ -154,6 +176,10 @@ pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
         b.one("command_saturation", move |r| r.command - r.command.clamp(-limit, limit));
     }
     b.one("command_delay", |r| r.command_rate);
+}
+
+/// Play, springs and weight; `travel` is the largest travel, in u.
+fn put_mechanism(b: &mut Builder, case: &Case, travel: f64) {
     for share in [0.003, 0.01, 0.03] {
         let length = share * travel;
         b.one("presliding_friction", move |r| sign(r.speed) * (-r.since_reversal / length).exp());
@@ -161,10 +187,9 @@ pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
     }
     b.one("drive_compliance", |r| r.command_bend);
     b.list.last_mut().expect("pushed on the line above").smooth = true;
-    if n.weight.is_none() && case.machine.tilt {
+    if case.nominal.weight.is_none() && case.machine.tilt {
         b.one("tilt_gravity", |r| r.tilt);
     }
     b.one("position_spring", |r| r.place);
     b.one("position_dependent_damping", |r| r.place * r.speed);
-    b.list
 }

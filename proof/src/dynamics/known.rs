@@ -38,9 +38,7 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
     let command = largest(bands, |m, i| m.command[i]);
     let travel = largest(bands, |m, i| m.place[i]);
     let seconds = bands.iter().map(|b| b.motion.time[b.motion.len() - 1]).fold(0.0, f64::max);
-    let mut shape = Numbers::new();
-    let mut axes: Vec<Axis> = Vec::new();
-    let mut coefficients: Vec<String> = Vec::new();
+    let (mut shape, mut axes, mut coefficients) = (Numbers::new(), Vec::<Axis>::new(), Vec::<String>::new());
     let mut linear = |names: &[&str]| coefficients.extend(names.iter().map(|n| (*n).to_string()));
     match name {
         "viscous_friction" => linear(&["viscous"]),
@@ -81,16 +79,7 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
         }
         "cogging" | "torque_ripple" | "mass_imbalance" | "encoder_eccentricity" => {
             shape.insert("turn".into(), rig.turn.ok_or("the turn is not told")?);
-            let told = key.parameters.iter().filter(|p| p.effect == name);
-            let mut orders: Vec<f64> =
-                told.filter_map(|p| p.name.strip_prefix("order_")?.parse().ok()).collect();
-            if orders.is_empty() {
-                if matches!(name, "cogging" | "torque_ripple") {
-                    return Err("the key does not tell the orders".into());
-                }
-                orders.push(1.0);
-            }
-            for (i, order) in orders.iter().enumerate() {
+            for (i, order) in orders(name, key)?.iter().enumerate() {
                 shape.insert(format!("order_{i}"), *order);
                 coefficients.extend([format!("cos_{i}"), format!("sin_{i}")]);
             }
@@ -102,6 +91,19 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
         axes,
         coefficients,
     })
+}
+
+/// The orders of an effect that is periodic in the turn: the key's, or the first where there can be no other.
+fn orders(name: &str, key: &Key) -> Result<Vec<f64>, String> {
+    let told = key.parameters.iter().filter(|p| p.effect == name);
+    let orders: Vec<f64> = told.filter_map(|p| p.name.strip_prefix("order_")?.parse().ok()).collect();
+    if !orders.is_empty() {
+        return Ok(orders);
+    }
+    if matches!(name, "cogging" | "torque_ripple") {
+        return Err("the key does not tell the orders".into());
+    }
+    Ok(vec![1.0])
 }
 
 /// The rig with the fitted values and effects, and what it leaves of the fit recordings in mean square.
@@ -166,24 +168,7 @@ fn fit_at(
     let mut normal = Normal::new(width);
     let mut seconds = 0.0;
     for (r, band) in fits.iter().enumerate() {
-        let command = effective_command(&shaped, &band.motion);
-        let drive = band.see(|i| rig.gain * command[i]);
-        let mut columns = band.nominal_columns();
-        for (i, form) in forms.iter().enumerate() {
-            for coefficient in &form.coefficients {
-                columns.push(column(&shaped, i, coefficient, band, &command)?);
-            }
-        }
-        for (j, drive) in drive.iter().enumerate() {
-            let mut row = vec![0.0; width];
-            let mut left = *drive;
-            for (k, column) in columns.iter().enumerate() {
-                row[k] = column[j];
-                left -= if k < NOMINAL { means[k] * row[k] } else { 0.0 };
-            }
-            row[NOMINAL + own + r] = -1.0;
-            normal.add(&row, left);
-        }
+        add_recording(&mut normal, &shaped, forms, &means, band, NOMINAL + own + r)?;
         seconds += band.seconds();
     }
     let weight = Band::dependence(fits, normal.rows, seconds);
@@ -210,6 +195,37 @@ fn fit_at(
         }
     }
     Ok(Fitted { rig: fitted, cost: normal.residual(&moved) / normal.rows.max(1) as f64 })
+}
+
+/// Adds a recording's rows to the normal equations: drive force less that of the nominal values, against the nominal terms, the
+/// effects' coefficients and the recording's offset in column `offset`.
+fn add_recording(
+    normal: &mut Normal,
+    rig: &Rig,
+    forms: &[Form],
+    means: &[f64],
+    band: &Band,
+    offset: usize,
+) -> Result<(), String> {
+    let command = effective_command(rig, &band.motion);
+    let drive = band.see(|i| rig.gain * command[i]);
+    let mut columns = band.nominal_columns();
+    for (i, form) in forms.iter().enumerate() {
+        for coefficient in &form.coefficients {
+            columns.push(column(rig, i, coefficient, band, &command)?);
+        }
+    }
+    for (j, drive) in drive.iter().enumerate() {
+        let mut row = vec![0.0; normal.width()];
+        let mut left = *drive;
+        for (k, column) in columns.iter().enumerate() {
+            row[k] = column[j];
+            left -= if k < NOMINAL { means[k] * row[k] } else { 0.0 };
+        }
+        row[offset] = -1.0;
+        normal.add(&row, left);
+    }
+    Ok(())
 }
 
 /// Returns what one unit of a coefficient adds to the left-hand side of the equation, in the band.

@@ -156,9 +156,10 @@ fn periodic(rig: &Rig, entry: &Entry, m: &Motion, command: &[f64]) -> Option<Vec
 /// A term for every row in turn.
 type Term<'a> = Box<dyn FnMut(&Motion, &[f64], usize) -> f64 + 'a>;
 
+/// The law of an effect, places moved by `along`.
 fn law<'a>(rig: &'a Rig, entry: &'a Entry, along: f64) -> Result<Term<'a>, String> {
     let c = |key: &str| entry.coefficient(key);
-    let (gain, bias) = (rig.gain, rig.offset.unwrap_or(0.0) / rig.inertia);
+    let gain = rig.gain;
     Ok(match entry.name.as_str() {
         "viscous_friction" => {
             let b = c("viscous");
@@ -191,64 +192,78 @@ fn law<'a>(rig: &'a Rig, entry: &'a Entry, along: f64) -> Result<Term<'a>, Strin
         }
         "position_dependent_friction" => profile(entry, along, way)?,
         "position_dependent_damping" => profile(entry, along, |m, i| m.speed[i])?,
-        "friction_drift" => {
-            let (f, b, tau) = (c("coulomb"), c("viscous"), entry.shape("time_constant", 1.0));
-            Box::new(move |m, _, i| {
-                let settled = 1.0 - (-m.time[i] / tau).exp();
-                -(f * way(m, i) + b * m.speed[i]) * settled
-            })
-        }
-        "gain_drift" => {
-            let (change, tau) = (c("change"), entry.shape("time_constant", 1.0));
-            let at_once = entry.shape("at_once_s", f64::INFINITY);
-            let mean_square = entry.shape("mean_square", f64::INFINITY);
-            let mut heat = 0.0;
-            Box::new(move |m, u, i| {
-                heat += (u[i] * u[i] / mean_square - heat) * m.step() / tau;
-                let settled = match at_once.is_finite() {
-                    true => f64::from(u8::from(m.time[i] >= at_once)),
-                    false if mean_square.is_finite() => heat,
-                    false => 1.0 - (-m.time[i] / tau).exp(),
-                };
-                change * gain * u[i] * settled
-            })
-        }
+        "friction_drift" => friction_drift(entry),
+        "gain_drift" => gain_drift(rig, entry),
         "tilt_gravity" => {
             let weight = c("weight");
             Box::new(move |m, _, i| weight * m.tilt[i].sin())
         }
-        "position_spring" => {
-            let (k, preload) = (c("stiffness"), c("preload"));
-            let (from, one_sided) = (entry.shape("from", 0.0), entry.is_set("one_sided"));
-            let fades = entry.shape("fades_s", f64::INFINITY);
-            let mut faded = 0.0;
-            Box::new(move |m, _, i| {
-                let x = m.place[i] + along - from;
-                faded += (x - faded) * (1.0 - (-m.step() / fades).exp());
-                let bent = if one_sided { (x - faded).max(0.0) } else { x - faded };
-                preload - k * bent
-            })
-        }
-        "backlash" | "roller_slip" => {
-            let (ratio, mut joint) = (c("inertia_ratio"), Joint::new(entry));
-            Box::new(move |m, u, i| {
-                let at = Instant {
-                    command: u[i],
-                    speed: m.speed[i],
-                    external: m.force[i],
-                    tilt: m.tilt[i].sin(),
-                    bias,
-                    step: m.step(),
-                };
-                ratio * joint.term(&at)
-            })
-        }
+        "position_spring" => spring(entry, along),
+        "backlash" | "roller_slip" => joint(rig, entry),
         "drive_compliance" => {
             let (ratio, mut resonance) = (c("inertia_ratio"), Resonance::new(entry));
             Box::new(move |m, u, i| ratio * resonance.term(gain * u[i], m.step()))
         }
         "table" => table(rig, entry, along)?,
         other => return Err(format!("the judge cannot run the effect `{other}`")),
+    })
+}
+
+/// Dry and viscous friction that settle at other values.
+fn friction_drift(entry: &Entry) -> Term<'_> {
+    let (f, b) = (entry.coefficient("coulomb"), entry.coefficient("viscous"));
+    let tau = entry.shape("time_constant", 1.0);
+    Box::new(move |m, _, i| {
+        let settled = 1.0 - (-m.time[i] / tau).exp();
+        -(f * way(m, i) + b * m.speed[i]) * settled
+    })
+}
+
+/// A gain that changes with time, at once, or with the heat of the winding.
+fn gain_drift<'a>(rig: &Rig, entry: &Entry) -> Term<'a> {
+    let (gain, change, tau) = (rig.gain, entry.coefficient("change"), entry.shape("time_constant", 1.0));
+    let at_once = entry.shape("at_once_s", f64::INFINITY);
+    let mean_square = entry.shape("mean_square", f64::INFINITY);
+    let mut heat = 0.0;
+    Box::new(move |m, u, i| {
+        heat += (u[i] * u[i] / mean_square - heat) * m.step() / tau;
+        let settled = match at_once.is_finite() {
+            true => f64::from(u8::from(m.time[i] >= at_once)),
+            false if mean_square.is_finite() => heat,
+            false => 1.0 - (-m.time[i] / tau).exp(),
+        };
+        change * gain * u[i] * settled
+    })
+}
+
+/// A spring along the travel, which may fade and may act on one side only.
+fn spring<'a>(entry: &Entry, along: f64) -> Term<'a> {
+    let (k, preload) = (entry.coefficient("stiffness"), entry.coefficient("preload"));
+    let (from, one_sided) = (entry.shape("from", 0.0), entry.is_set("one_sided"));
+    let fades = entry.shape("fades_s", f64::INFINITY);
+    let mut faded = 0.0;
+    Box::new(move |m, _, i| {
+        let x = m.place[i] + along - from;
+        faded += (x - faded) * (1.0 - (-m.step() / fades).exp());
+        let bent = if one_sided { (x - faded).max(0.0) } else { x - faded };
+        preload - k * bent
+    })
+}
+
+/// A joint between motor and load with play or slip.
+fn joint<'a>(rig: &Rig, entry: &'a Entry) -> Term<'a> {
+    let (ratio, mut joint) = (entry.coefficient("inertia_ratio"), Joint::new(entry));
+    let bias = rig.offset.unwrap_or(0.0) / rig.inertia;
+    Box::new(move |m, u, i| {
+        let at = Instant {
+            command: u[i],
+            speed: m.speed[i],
+            external: m.force[i],
+            tilt: m.tilt[i].sin(),
+            bias,
+            step: m.step(),
+        };
+        ratio * joint.term(&at)
     })
 }
 

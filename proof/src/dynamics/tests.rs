@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Bench;
 use crate::generator::case::{Case, build};
+use crate::generator::clock::Stamping;
 use crate::generator::files;
-use crate::generator::machine::Stamping;
 use crate::generator::spec::Spec;
 use crate::key::Category;
 use crate::report_residuals::Left;

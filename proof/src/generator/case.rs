@@ -3,12 +3,16 @@
 use super::case_builder::{CaseBuilder, Plan};
 use super::effects;
 use super::excite::{self, Kind};
-use super::machine::{Machine, Needs};
+use super::family::Needs;
+use super::machine::Machine;
 use super::outside;
 use super::plant::Plant;
-use super::simulate::{Believed, Row, STEP, Series};
+use super::series::Series;
+use super::simulate::{Believed, Row, STEP};
 use super::spec::Spec;
 use super::strength::{Declared, Measured, measure};
+use super::surroundings;
+use super::truth::truth;
 use crate::key::{Category, Parameter};
 use crate::rng::Rng;
 
@@ -116,110 +120,25 @@ fn merged_needs(spec: &Spec) -> Needs {
 }
 
 fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
-    let needs = merged_needs(spec);
-    let mut machine = Machine::draw(&mut rng.fork("machine"), needs, quick);
-    if let Some((rate, duration)) = spec.recorder {
-        (machine.rate, machine.duration) = (rate, duration);
-    }
+    let machine = draw_machine(spec, rng, quick);
     let mut pick = rng.fork("kinds");
-    if spec.category == Category::CannotTell {
-        machine.offset_key = true;
-        if spec.hidden == ["mass_imbalance"] && spec.poor.is_some_and(|p| p.contains(&Kind::OneTriangle)) {
-            machine.travel = 0.35 * machine.plant.turn;
-            machine.start_spread = Some(0.01 * machine.travel);
-        }
-    }
     let with_force = spec.hidden.contains(&"load_dependent_friction") || pick.chance(0.04);
-    let declared = Declared {
-        inertia: pick.range(0.05, 0.2),
-        viscous: pick.range(0.3, 0.5),
-        coulomb: pick.range(0.25, 0.5),
-        gain: pick.range(0.01, 0.1),
-        weight: pick.range(0.1, 0.3),
-        offset: 0.1 * machine.plant.dry.coulomb,
-        offset_allowed: machine.offset_key,
-    };
-    let coulomb = machine.plant.dry.coulomb;
-    let place = rng.fork("place").range(0.0, 2.0) * machine.plant.turn;
-    let load = coulomb * pick.range(0.8, 1.6);
-    let mut with_reference = [false; 3];
-    let plans = (0..3)
-        .map(|k| {
-            let mut own = rng.fork(&format!("recording/{k}"));
-            let kinds = draw_kinds(spec, quick, &mut own);
-            let segments = excite::programme(&kinds, &machine, &mut own);
-            with_reference[k] = segments.iter().any(|s| s.control.is_some()) && own.chance(0.85);
-            // A machine that has run before is warm already.
-            let warm = if own.chance(0.4) { 0.0 } else { machine.duration * own.range(0.0, 0.5) };
-            let start = match machine.start_spread {
-                Some(spread) => place + 0.5 * spread * own.range(-1.0, 1.0),
-                None => machine.plant.turn * own.range(0.0, 3.0),
-            };
-            let mut unit_noise = excite::disturbance(&machine, &mut own);
-            let mean = unit_noise.values.iter().sum::<f64>() / unit_noise.values.len() as f64;
-            unit_noise.values.iter_mut().for_each(|x| *x -= mean);
-            let mut rough = Series::default();
-            if spec.category == Category::Disturbance {
-                rough = excite::rough_disturbance(&machine, &mut own);
-                let size = coulomb * own.range(0.12, 0.4);
-                rough.values.iter_mut().for_each(|x| *x *= size);
-            }
-            Plan {
-                segments,
-                warm,
-                times: machine.stamps(&mut own),
-                tilt: if machine.tilt { excite::tilt_sweep(&machine, &mut own) } else { Series::default() },
-                force: if with_force { excite::pushes(&machine, load, &mut own) } else { Series::default() },
-                unit_noise,
-                rough,
-                offset: if machine.offset_key { 0.04 * coulomb * own.bounded_normal(2.0) } else { 0.0 },
-                start,
-                zero: (own.range(-1e5, 1e5)).round() + own.unit(),
-                random: own.fork("plant"),
-            }
-        })
-        .collect();
-    let clips = spec.hidden.contains(&"command_saturation");
-    let mut builder = CaseBuilder { spec, rng, machine, declared, base: place, plans };
-
-    if clips {
+    let declared = draw_declared(&machine, &mut pick);
+    let base = rng.fork("place").range(0.0, 2.0) * machine.plant.turn;
+    let load = with_force.then_some(machine.plant.dry.coulomb * pick.range(0.8, 1.6));
+    let around = Around { quick, base, load };
+    let (plans, referenced): (Vec<Plan>, Vec<bool>) =
+        (0..3).map(|k| draw_plan(spec, &machine, &around, &mut rng.fork(&format!("recording/{k}")))).unzip();
+    let mut builder = CaseBuilder { spec, rng, machine, declared, base, plans };
+    if spec.hidden.contains(&"command_saturation") {
         builder.machine.peak_command = builder.peak_command().ok()?;
     }
-    let mut scales: Vec<(usize, f64)> = Vec::new();
-    for i in 0..spec.hidden.len() {
-        let s = if spec.category == Category::CannotTell {
-            let (low, high, guess) = effects::bounds(spec.hidden[i], &builder.machine);
-            (2.0 * guess).clamp(low, high)
-        } else {
-            builder.calibrate(i, spec.strength, &scales).ok()?
-        };
-        scales.push((i, s));
-    }
-    // Beside the others each is measured again, alone, as it is.
-    let mut alone = Vec::new();
-    for scale in &scales {
-        let now = builder.measured(scale.0, scale.1, &scales, 40e-6).ok()?;
-        alone.push(now.effect / now.noise);
-    }
+    let scales = find_scales(&builder)?;
+    let mut alone = measured_alone(&builder, &scales)?;
     let plant = builder.plant(&scales);
     let believed = builder.believed(&plant, &scales);
-    let mut recordings: Vec<Vec<Row>> = builder
-        .plans
-        .iter()
-        .map(|p| builder.play(&plant, &believed, p, STEP))
-        .collect::<Result<_, _>>()
-        .ok()?;
+    let recordings = record(&builder, &plant, &believed)?;
     let m = &builder.machine;
-    for (k, recording) in recordings.iter_mut().enumerate() {
-        let times: Vec<f64> = recording.iter().map(|r| r.time).collect();
-        let stamps = m.stamping.of(&times, &mut rng.fork(&format!("stamps/{k}")));
-        let errs = m.stamping.by_chance();
-        for (row, stamp) in recording.iter_mut().zip(stamps) {
-            // Read as if at the stamp: at speed an error of time is one of place, and noise.
-            row.reading_error -= if errs { row.v * (stamp - row.time) } else { 0.0 };
-            row.stamp = stamp;
-        }
-    }
     let rows: Vec<&[Row]> = recordings.iter().map(Vec::as_slice).collect();
     let together = measure(&rows[..2], 2, &believed, &declared, m.rate, m.residual_bandwidth());
     let held = measure(&rows[2..], 1, &believed, &declared, m.rate, m.residual_bandwidth());
@@ -234,9 +153,9 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     let truths = if spec.category == Category::Outside {
         Vec::new()
     } else {
-        spec.hidden.iter().flat_map(|name| effects::truth(name, &plant, &rows[..2], cold)).collect()
+        spec.hidden.iter().flat_map(|name| truth(name, &plant, &rows[..2], cold)).collect()
     };
-    let nominal = draw_nominal(spec, &builder.machine, &plant, &declared, &mut rng.fork("nominal"));
+    let nominal = draw_nominal(spec, m, &plant, &declared, &mut rng.fork("nominal"));
     Some(Case {
         spec: spec.clone(),
         machine: builder.machine,
@@ -245,13 +164,131 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
         declared,
         nominal,
         recordings,
-        with_reference,
+        with_reference: [referenced[0], referenced[1], referenced[2]],
         with_force,
         category,
         level,
         together,
         truths,
     })
+}
+
+/// Draws the machine, with the recorder and the limits that the case asks for.
+fn draw_machine(spec: &Spec, rng: &Rng, quick: bool) -> Machine {
+    let mut machine = Machine::draw(&mut rng.fork("machine"), merged_needs(spec), quick);
+    if let Some((rate, duration)) = spec.recorder {
+        (machine.rate, machine.duration) = (rate, duration);
+    }
+    if spec.category == Category::CannotTell {
+        machine.offset_key = true;
+        if spec.hidden == ["mass_imbalance"] && spec.poor.is_some_and(|p| p.contains(&Kind::OneTriangle)) {
+            machine.travel = 0.35 * machine.plant.turn;
+            machine.start_spread = Some(0.01 * machine.travel);
+        }
+    }
+    machine
+}
+
+/// Draws the uncertainties that the rig file declares.
+fn draw_declared(machine: &Machine, pick: &mut Rng) -> Declared {
+    Declared {
+        inertia: pick.range(0.05, 0.2),
+        viscous: pick.range(0.3, 0.5),
+        coulomb: pick.range(0.25, 0.5),
+        gain: pick.range(0.01, 0.1),
+        weight: pick.range(0.1, 0.3),
+        offset: 0.1 * machine.plant.dry.coulomb,
+        offset_allowed: machine.offset_key,
+    }
+}
+
+/// The conditions that the recordings of a case share.
+struct Around {
+    quick: bool,
+    /// Mechanical place near which they start, if the machine has a start spread, in u.
+    base: f64,
+    /// Size of the pushes, as a force; `None`: nobody pushes.
+    load: Option<f64>,
+}
+
+/// Draws a recording, and whether the reference of its loop is recorded.
+fn draw_plan(spec: &Spec, machine: &Machine, around: &Around, own: &mut Rng) -> (Plan, bool) {
+    let coulomb = machine.plant.dry.coulomb;
+    let kinds = draw_kinds(spec, around.quick, own);
+    let segments = excite::programme(&kinds, machine, own);
+    let with_reference = segments.iter().any(|s| s.control.is_some()) && own.chance(0.85);
+    // A machine that has run before is warm already.
+    let warm = if own.chance(0.4) { 0.0 } else { machine.duration * own.range(0.0, 0.5) };
+    let start = match machine.start_spread {
+        Some(spread) => around.base + 0.5 * spread * own.range(-1.0, 1.0),
+        None => machine.plant.turn * own.range(0.0, 3.0),
+    };
+    let mut unit_noise = surroundings::disturbance(machine, own);
+    let mean = unit_noise.values.iter().sum::<f64>() / unit_noise.values.len() as f64;
+    unit_noise.values.iter_mut().for_each(|x| *x -= mean);
+    let mut rough = Series::default();
+    if spec.category == Category::Disturbance {
+        rough = surroundings::rough_disturbance(machine, own);
+        let size = coulomb * own.range(0.12, 0.4);
+        rough.values.iter_mut().for_each(|x| *x *= size);
+    }
+    let plan = Plan {
+        segments,
+        warm,
+        times: machine.stamps(own),
+        tilt: if machine.tilt { surroundings::tilt_sweep(machine, own) } else { Series::default() },
+        force: around.load.map(|size| surroundings::pushes(machine, size, own)).unwrap_or_default(),
+        unit_noise,
+        rough,
+        offset: if machine.offset_key { 0.04 * coulomb * own.bounded_normal(2.0) } else { 0.0 },
+        start,
+        zero: (own.range(-1e5, 1e5)).round() + own.unit(),
+        random: own.fork("plant"),
+    };
+    (plan, with_reference)
+}
+
+/// Finds the scale of every hidden effect at which it has the strength asked for. `None`: the motion diverges.
+fn find_scales(builder: &CaseBuilder) -> Option<Vec<(usize, f64)>> {
+    let spec = builder.spec;
+    let mut scales: Vec<(usize, f64)> = Vec::new();
+    for i in 0..spec.hidden.len() {
+        let s = if spec.category == Category::CannotTell {
+            let (low, high, guess) = effects::bounds(spec.hidden[i], &builder.machine);
+            (2.0 * guess).clamp(low, high)
+        } else {
+            builder.calibrate(i, spec.strength, &scales).ok()?
+        };
+        scales.push((i, s));
+    }
+    Some(scales)
+}
+
+/// Measures every effect again, alone, as it is beside the others: effect over noise. `None`: the motion diverges.
+fn measured_alone(builder: &CaseBuilder, scales: &[(usize, f64)]) -> Option<Vec<f64>> {
+    let strength = |&(i, s): &(usize, f64)| {
+        let now = builder.measured(i, s, scales, 40e-6).ok()?;
+        Some(now.effect / now.noise)
+    };
+    scales.iter().map(strength).collect()
+}
+
+/// Plays and stamps the recordings. `None`: the motion diverges.
+fn record(builder: &CaseBuilder, plant: &Plant, believed: &Believed) -> Option<Vec<Vec<Row>>> {
+    let play = |p| builder.play(plant, believed, p, STEP);
+    let mut recordings: Vec<Vec<Row>> = builder.plans.iter().map(play).collect::<Result<_, _>>().ok()?;
+    let stamping = builder.machine.stamping;
+    for (k, recording) in recordings.iter_mut().enumerate() {
+        let times: Vec<f64> = recording.iter().map(|r| r.time).collect();
+        let stamps = stamping.of(&times, &mut builder.rng.fork(&format!("stamps/{k}")));
+        let errs = stamping.by_chance();
+        for (row, stamp) in recording.iter_mut().zip(stamps) {
+            // Read as if at the stamp: at speed an error of time is one of place, and noise.
+            row.reading_error -= if errs { row.v * (stamp - row.time) } else { 0.0 };
+            row.stamp = stamp;
+        }
+    }
+    Some(recordings)
 }
 
 /// A drive that asks for its limit all the time, or a loop that has lost its reference: nobody would keep the recording.

@@ -2,7 +2,6 @@
 
 use super::drive::{Drive, Loop, Profile, Segment, Tones};
 use super::machine::Machine;
-use super::simulate::Series;
 use crate::rng::Rng;
 
 /// Kinds of excitation.
@@ -76,231 +75,231 @@ pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> (Drive, Option<Lo
         Kind::HoldRamp if !m.rotary => Kind::Ladder,
         other => other,
     };
-    let (ac, coulomb) = (m.friction_acceleration(), m.plant.dry.coulomb);
-    let per_force = 1.0 / m.plant.gain;
-    let (v, travel, t) = (m.top_speed, m.travel, m.duration);
-    let strongest = 0.45 * m.limit * m.plant.gain / m.plant.inertia;
-    let acceleration = (ac * rng.range(2.0, 5.0)).min(strongest);
-    let top_hz = m.residual_bandwidth();
-    let mut drive = Drive::default();
-    match kind {
-        Kind::Staircase => {
-            let steps = 6 + rng.below(2);
-            let dwell = t / (2 * steps) as f64;
-            let mut speeds: Vec<f64> =
-                (0..steps).map(|i| v * 10_f64.powf(-2.0 * i as f64 / (steps - 1) as f64)).collect();
-            if rng.chance(0.5) {
-                speeds.reverse();
-            }
-            let mut segments = Vec::new();
-            for speed in speeds {
-                let legs = (speed * dwell / travel).ceil().max(1.0);
-                for _ in 0..legs as usize {
-                    segments.push((speed, dwell / legs));
-                    segments.push((-speed, dwell / legs));
-                }
-            }
-            drive.profile = Some(Profile::from_speeds(&segments, acceleration, t));
+    let bench = Bench::new(m, rng);
+    let drive = match kind {
+        Kind::Staircase => bench.staircase(rng),
+        Kind::Triangle => {
+            let passes = 2 + rng.below(2) as i32;
+            bench.triangles(passes, rng)
         }
-        Kind::Triangle | Kind::OneTriangle => {
-            let passes: i32 = if kind == Kind::OneTriangle { 1 } else { 2 + rng.below(2) as i32 };
-            let first = rng.range(0.08, 0.2);
-            let mut segments = Vec::new();
-            for i in 0..passes {
-                let speed = v * first * 2.2_f64.powi(i);
-                let slice = t / f64::from(passes);
-                let legs = (speed * slice / (2.0 * travel)).ceil().max(1.0);
-                for _ in 0..legs as usize {
-                    segments.push((speed, 0.5 * slice / legs));
-                    segments.push((-speed, 0.5 * slice / legs));
-                }
-            }
-            drive.profile = Some(Profile::from_speeds(&segments, acceleration, t));
-        }
-        Kind::Ladder => {
-            let count = 24;
-            let each = t / f64::from(count);
-            let (small, large) = (0.004 * v * each, 0.5 * (v * each).min(travel));
-            let segments: Vec<(f64, f64)> = (0..count)
-                .map(|i| {
-                    let stage = f64::from(i / 2) / f64::from(count / 2 - 1);
-                    let amplitude = small.max(1e-12) * (large / small).powf(stage);
-                    (amplitude / each * if i % 2 == 0 { 1.0 } else { -1.0 }, each)
-                })
-                .collect();
-            drive.profile = Some(Profile::from_speeds(&segments, acceleration, t));
-        }
-        Kind::Trapezoids | Kind::Hard | Kind::Injected => {
-            let hard = kind == Kind::Hard;
-            let acceleration = if hard { 0.8 * strongest.min(ac * 9.0) } else { acceleration };
-            let mut segments = vec![(0.0, 0.1)];
-            let (mut place, mut elapsed) = (0.0, 0.1);
-            while elapsed < t {
-                let speed = if hard { v * rng.range(0.6, 1.2) } else { v * rng.log_range(0.08, 1.0) };
-                let mut target = travel * rng.range(0.0, 1.0);
-                // Moves of a length that the time allows.
-                let longest = speed * t / 6.0;
-                target = place + (target - place).clamp(-longest, longest);
-                let time = ((target - place) / speed).abs().max(0.02);
-                segments.push(((target - place) / time, time));
-                let pause = if hard { 0.02 } else { rng.range(0.02, 0.25) };
-                segments.push((0.0, pause));
-                elapsed += time + pause;
-                place = target;
-            }
-            drive.profile = Some(Profile::from_speeds(&segments, acceleration, t));
-            if kind == Kind::Injected {
-                let rms = coulomb * rng.range(0.8, 1.6) * per_force;
-                drive.tones = Tones::multisine(rng, rms, 1.0_f64.min(0.1 * top_hz), 1.1 * top_hz, 24);
-            }
-        }
-        Kind::Multisine => {
-            let slow = (coulomb + 0.6 * m.plant.viscous * v) * rng.range(0.9, 1.4) * per_force;
-            let rms = coulomb * rng.range(0.7, 1.5) * per_force;
-            drive.tones = Tones::multisine(rng, rms, 0.7_f64.min(0.1 * top_hz), 1.1 * top_hz, 28);
-            let hz = rng.range(2.0, 4.0) / t;
-            let phase = rng.range(0.0, 6.0);
-            drive.tones.tones.push((slow, hz, phase));
-            drive.tones.tones.push((0.5 * slow, hz * rng.range(2.2, 3.4), phase * 2.0));
-        }
-        Kind::Levels => {
-            let count = 12;
-            let each = t / f64::from(count);
-            drive.levels = (0..count)
-                .map(|i| {
-                    let level = coulomb * rng.range(1.05, 1.3)
-                        + m.plant.viscous * v * rng.range(0.05, 1.0)
-                        + coulomb * 0.2 * f64::from(i % 4);
-                    (level * per_force * if i % 2 == 0 { 1.0 } else { -1.0 }, each)
-                })
-                .collect();
-            drive.tones = Tones::multisine(rng, 0.3 * coulomb * per_force, 0.5, 0.5 * top_hz, 10);
-        }
-        Kind::HoldRamp => {
-            drive.ramps = true;
-            let ramp = (t / 14.0).max(0.4);
-            let mut side = rng.sign();
-            let mut elapsed = 0.0;
-            drive.levels.push((0.0, 0.05));
-            while elapsed < t {
-                let level = coulomb * rng.range(1.3, 2.2) * per_force * side;
-                for step in [(0.0, 0.15 * ramp), (level, ramp), (0.0, 0.05 * ramp)] {
-                    drive.levels.push(step);
-                    elapsed += step.1;
-                }
-                side = -side;
-            }
-        }
-        Kind::OneSine => {
-            let hz = rng.range(4.0, 7.0) / t;
-            let amplitude = (0.5 * v / (std::f64::consts::TAU * hz)).min(0.5 * travel);
-            let tones = Tones { tones: vec![(amplitude, hz, rng.range(0.0, 6.0))] };
-            drive.profile = Some(Profile::from_tones(&tones, t));
-        }
-        Kind::OneSpeed => {
-            let speed = (v * rng.range(0.2, 0.6)).min(travel / t);
-            drive.profile = Some(Profile::from_speeds(&[(speed, t)], acceleration, t));
-        }
-        Kind::SlowMultisine => {
-            let slow = (coulomb + 0.6 * m.plant.viscous * v) * per_force;
-            drive.tones = Tones::multisine(rng, 1.2 * slow, 2.0 / t, 1.5, 6);
-        }
-    }
-    let control = drive.profile.is_some().then(|| {
-        let velocity_loop = rng.chance(0.3);
-        let damping = if velocity_loop { rng.range(1.2, 2.0) } else { rng.range(0.7, 1.0) };
-        let integral = if rng.chance(0.6) { rng.range(0.05, 0.2) } else { 0.0 };
-        let mut control =
-            Loop::tuned(m.plant.inertia, m.plant.gain, m.bandwidth * rng.range(0.7, 1.0), damping, integral);
-        control.most = 0.3 * m.limit;
-        if rng.chance(0.4) {
-            let off = rng.range(0.8, 1.2);
-            control.forward = (
-                m.plant.inertia * per_force * off,
-                m.plant.viscous * per_force * off,
-                0.7 * coulomb * per_force,
-            );
-        }
-        control
-    });
+        Kind::OneTriangle => bench.triangles(1, rng),
+        Kind::Ladder => bench.ladder(),
+        Kind::Trapezoids => bench.moves(false, rng),
+        Kind::Hard => bench.moves(true, rng),
+        Kind::Injected => bench.injected_moves(rng),
+        Kind::Multisine => bench.multisine(rng),
+        Kind::Levels => bench.levels(rng),
+        Kind::HoldRamp => bench.hold_ramps(rng),
+        Kind::OneSine => bench.one_sine(rng),
+        Kind::OneSpeed => bench.one_speed(rng),
+        Kind::SlowMultisine => bench.slow_multisine(rng),
+    };
+    let control = drive.profile.is_some().then(|| bench.control(rng));
     (drive, control)
 }
 
-/// A tilt that goes slowly between random inclinations, rad.
-pub(crate) fn tilt_sweep(m: &Machine, rng: &mut Rng) -> Series {
-    let interval = 0.01;
-    let count = (m.duration / interval) as usize + 2;
-    let stops = 5;
-    let values: Vec<f64> = (0..=stops).map(|_| rng.range(-0.7, 0.7)).collect();
-    let values = (0..count)
-        .map(|i| {
-            let x = i as f64 / count as f64 * f64::from(stops);
-            let k = (x as usize).min(values.len() - 2);
-            let s = x - k as f64;
-            values[k] + (values[k + 1] - values[k]) * s * s * (3.0 - 2.0 * s)
-        })
-        .collect();
-    Series { interval, values }
+/// The machine with the numbers that its excitations share.
+struct Bench<'a> {
+    m: &'a Machine,
+    /// Level of the dry friction, as a force.
+    coulomb: f64,
+    /// Command for one unit of force.
+    per_force: f64,
+    /// The largest acceleration that the drive is asked for, u/s².
+    strongest: f64,
+    /// Acceleration at the changes of speed, u/s².
+    acceleration: f64,
+    /// The residual bandwidth, Hz.
+    top_hz: f64,
 }
 
-/// Pushes of a hand or a press: smooth bumps of either sign, of rms `size` all together.
-pub(crate) fn pushes(m: &Machine, size: f64, rng: &mut Rng) -> Series {
-    let interval = 0.002;
-    let count = (m.duration / interval) as usize + 2;
-    let bumps: Vec<(f64, f64, f64)> = (0..(m.duration / 0.7) as usize + 3)
-        .map(|_| {
-            let amplitude = rng.sign() * rng.range(0.5, 2.0);
-            (amplitude, rng.range(0.0, m.duration), rng.range(0.08, 0.35))
-        })
-        .collect();
-    let mut values: Vec<f64> = (0..count)
-        .map(|i| {
-            let t = i as f64 * interval;
-            bumps.iter().map(|&(a, c, w)| a * (-0.5 * ((t - c) / w).powi(2)).exp()).sum()
-        })
-        .collect();
-    let rms = (values.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt();
-    values.iter_mut().for_each(|x| *x *= size / rms);
-    Series { interval, values }
-}
-
-/// Noise and wander of the force with unit rms: band-limited noise, and a slow part at 30–60 % of it.
-pub(crate) fn disturbance(m: &Machine, rng: &mut Rng) -> Series {
-    let interval: f64 = 5e-4;
-    let count = (m.duration / interval) as usize + 2;
-    let corner = rng.log_range(5e-4, 6e-3);
-    let keep = (-interval / corner).exp();
-    let slow_corner: f64 = rng.range(1.5, 5.0);
-    let slow_keep = (-interval / slow_corner).exp();
-    let slow_share = rng.range(0.3, 0.6);
-    let (mut fast, mut slow, mut slower) = (0.0, 0.0, 0.0);
-    let (mut fasts, mut slows) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    for _ in 0..count {
-        fast = keep * fast + rng.normal();
-        slow = slow_keep * slow + rng.normal();
-        slower += (slow - slower) * (interval / (0.3 * slow_corner));
-        fasts.push(fast);
-        slows.push(slower);
+impl<'a> Bench<'a> {
+    fn new(m: &'a Machine, rng: &mut Rng) -> Self {
+        let strongest = 0.45 * m.limit * m.plant.gain / m.plant.inertia;
+        Self {
+            m,
+            coulomb: m.plant.dry.coulomb,
+            per_force: 1.0 / m.plant.gain,
+            strongest,
+            acceleration: (m.friction_acceleration() * rng.range(2.0, 5.0)).min(strongest),
+            top_hz: m.residual_bandwidth(),
+        }
     }
-    let rms = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt().max(1e-300);
-    let (a, b) = (1.0 / rms(&fasts), slow_share / rms(&slows));
-    let total = (1.0 + slow_share * slow_share).sqrt();
-    Series { interval, values: fasts.iter().zip(&slows).map(|(f, s)| (f * a + s * b) / total).collect() }
+
+    /// Returns a drive that follows (speed, duration) one after another.
+    fn speeds(&self, segments: &[(f64, f64)], acceleration: f64) -> Drive {
+        let profile = Profile::from_speeds(segments, acceleration, self.m.duration);
+        Drive { profile: Some(profile), ..Drive::default() }
+    }
+
+    fn staircase(&self, rng: &mut Rng) -> Drive {
+        let steps = 6 + rng.below(2);
+        let dwell = self.m.duration / (2 * steps) as f64;
+        let mut speeds: Vec<f64> = (0..steps)
+            .map(|i| self.m.top_speed * 10_f64.powf(-2.0 * i as f64 / (steps - 1) as f64))
+            .collect();
+        if rng.chance(0.5) {
+            speeds.reverse();
+        }
+        let mut segments = Vec::new();
+        for speed in speeds {
+            let legs = (speed * dwell / self.m.travel).ceil().max(1.0);
+            push_legs(&mut segments, speed, legs, dwell / legs);
+        }
+        self.speeds(&segments, self.acceleration)
+    }
+
+    /// Triangles at `passes` speeds, each 2.2 times the one before.
+    fn triangles(&self, passes: i32, rng: &mut Rng) -> Drive {
+        let first = rng.range(0.08, 0.2);
+        let mut segments = Vec::new();
+        for i in 0..passes {
+            let speed = self.m.top_speed * first * 2.2_f64.powi(i);
+            let slice = self.m.duration / f64::from(passes);
+            let legs = (speed * slice / (2.0 * self.m.travel)).ceil().max(1.0);
+            push_legs(&mut segments, speed, legs, 0.5 * slice / legs);
+        }
+        self.speeds(&segments, self.acceleration)
+    }
+
+    fn ladder(&self) -> Drive {
+        let (v, travel) = (self.m.top_speed, self.m.travel);
+        let count = 24;
+        let each = self.m.duration / f64::from(count);
+        let (small, large) = (0.004 * v * each, 0.5 * (v * each).min(travel));
+        let segments: Vec<(f64, f64)> = (0..count)
+            .map(|i| {
+                let stage = f64::from(i / 2) / f64::from(count / 2 - 1);
+                let amplitude = small.max(1e-12) * (large / small).powf(stage);
+                (amplitude / each * if i % 2 == 0 { 1.0 } else { -1.0 }, each)
+            })
+            .collect();
+        self.speeds(&segments, self.acceleration)
+    }
+
+    /// Point-to-point moves with pauses; `hard`: fast, with hardly a pause.
+    fn moves(&self, hard: bool, rng: &mut Rng) -> Drive {
+        let (v, travel, duration) = (self.m.top_speed, self.m.travel, self.m.duration);
+        let ac = self.m.friction_acceleration();
+        let acceleration = if hard { 0.8 * self.strongest.min(ac * 9.0) } else { self.acceleration };
+        let mut segments = vec![(0.0, 0.1)];
+        let (mut place, mut elapsed) = (0.0, 0.1);
+        while elapsed < duration {
+            let speed = if hard { v * rng.range(0.6, 1.2) } else { v * rng.log_range(0.08, 1.0) };
+            let mut target = travel * rng.range(0.0, 1.0);
+            // Moves of a length that the time allows.
+            let longest = speed * duration / 6.0;
+            target = place + (target - place).clamp(-longest, longest);
+            let time = ((target - place) / speed).abs().max(0.02);
+            segments.push(((target - place) / time, time));
+            let pause = if hard { 0.02 } else { rng.range(0.02, 0.25) };
+            segments.push((0.0, pause));
+            elapsed += time + pause;
+            place = target;
+        }
+        self.speeds(&segments, acceleration)
+    }
+
+    fn injected_moves(&self, rng: &mut Rng) -> Drive {
+        let mut drive = self.moves(false, rng);
+        let rms = self.coulomb * rng.range(0.8, 1.6) * self.per_force;
+        drive.tones = Tones::multisine(rng, rms, 1.0_f64.min(0.1 * self.top_hz), 1.1 * self.top_hz, 24);
+        drive
+    }
+
+    /// Returns the dry friction and a share of the viscous friction at top speed, as a force.
+    fn friction(&self) -> f64 {
+        self.coulomb + 0.6 * self.m.plant.viscous * self.m.top_speed
+    }
+
+    fn multisine(&self, rng: &mut Rng) -> Drive {
+        let slow = self.friction() * rng.range(0.9, 1.4) * self.per_force;
+        let rms = self.coulomb * rng.range(0.7, 1.5) * self.per_force;
+        let mut tones = Tones::multisine(rng, rms, 0.7_f64.min(0.1 * self.top_hz), 1.1 * self.top_hz, 28);
+        let hz = rng.range(2.0, 4.0) / self.m.duration;
+        let phase = rng.range(0.0, 6.0);
+        tones.tones.push((slow, hz, phase));
+        tones.tones.push((0.5 * slow, hz * rng.range(2.2, 3.4), phase * 2.0));
+        Drive { tones, ..Drive::default() }
+    }
+
+    fn levels(&self, rng: &mut Rng) -> Drive {
+        let (coulomb, per_force) = (self.coulomb, self.per_force);
+        let count = 12;
+        let each = self.m.duration / f64::from(count);
+        let levels = (0..count)
+            .map(|i| {
+                let level = coulomb * rng.range(1.05, 1.3)
+                    + self.m.plant.viscous * self.m.top_speed * rng.range(0.05, 1.0)
+                    + coulomb * 0.2 * f64::from(i % 4);
+                (level * per_force * if i % 2 == 0 { 1.0 } else { -1.0 }, each)
+            })
+            .collect();
+        let tones = Tones::multisine(rng, 0.3 * coulomb * per_force, 0.5, 0.5 * self.top_hz, 10);
+        Drive { levels, tones, ..Drive::default() }
+    }
+
+    fn hold_ramps(&self, rng: &mut Rng) -> Drive {
+        let ramp = (self.m.duration / 14.0).max(0.4);
+        let mut side = rng.sign();
+        let mut elapsed = 0.0;
+        let mut levels = vec![(0.0, 0.05)];
+        while elapsed < self.m.duration {
+            let level = self.coulomb * rng.range(1.3, 2.2) * self.per_force * side;
+            for step in [(0.0, 0.15 * ramp), (level, ramp), (0.0, 0.05 * ramp)] {
+                levels.push(step);
+                elapsed += step.1;
+            }
+            side = -side;
+        }
+        Drive { levels, ramps: true, ..Drive::default() }
+    }
+
+    fn one_sine(&self, rng: &mut Rng) -> Drive {
+        let hz = rng.range(4.0, 7.0) / self.m.duration;
+        let amplitude = (0.5 * self.m.top_speed / (std::f64::consts::TAU * hz)).min(0.5 * self.m.travel);
+        let tones = Tones { tones: vec![(amplitude, hz, rng.range(0.0, 6.0))] };
+        let profile = Profile::from_tones(&tones, self.m.duration);
+        Drive { profile: Some(profile), ..Drive::default() }
+    }
+
+    fn one_speed(&self, rng: &mut Rng) -> Drive {
+        let t = self.m.duration;
+        let speed = (self.m.top_speed * rng.range(0.2, 0.6)).min(self.m.travel / t);
+        self.speeds(&[(speed, t)], self.acceleration)
+    }
+
+    fn slow_multisine(&self, rng: &mut Rng) -> Drive {
+        let slow = self.friction() * self.per_force;
+        let tones = Tones::multisine(rng, 1.2 * slow, 2.0 / self.m.duration, 1.5, 6);
+        Drive { tones, ..Drive::default() }
+    }
+
+    /// Draws the loop that follows a motion.
+    fn control(&self, rng: &mut Rng) -> Loop {
+        let plant = &self.m.plant;
+        let velocity_loop = rng.chance(0.3);
+        let damping = if velocity_loop { rng.range(1.2, 2.0) } else { rng.range(0.7, 1.0) };
+        let integral = if rng.chance(0.6) { rng.range(0.05, 0.2) } else { 0.0 };
+        let bandwidth = self.m.bandwidth * rng.range(0.7, 1.0);
+        let mut control = Loop::tuned(plant.inertia, plant.gain, bandwidth, damping, integral);
+        control.most = 0.3 * self.m.limit;
+        if rng.chance(0.4) {
+            let off = rng.range(0.8, 1.2);
+            control.forward = (
+                plant.inertia * self.per_force * off,
+                plant.viscous * self.per_force * off,
+                0.7 * self.coulomb * self.per_force,
+            );
+        }
+        control
+    }
 }
 
-/// A strong disturbance that depends on nothing recorded: noise of unit rms below a few Hz.
-pub(crate) fn rough_disturbance(m: &Machine, rng: &mut Rng) -> Series {
-    let interval: f64 = 1e-3;
-    let count = (m.duration / interval) as usize + 2;
-    let keep = (-interval / rng.log_range(0.01, 0.08)).exp();
-    let mut state = 0.0;
-    let mut values: Vec<f64> = (0..count)
-        .map(|_| {
-            state = keep * state + rng.normal();
-            state
-        })
-        .collect();
-    let rms = (values.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt();
-    values.iter_mut().for_each(|x| *x /= rms);
-    Series { interval, values }
+/// Adds `legs` runs out and back at `speed`, each run of so many seconds.
+fn push_legs(segments: &mut Vec<(f64, f64)>, speed: f64, legs: f64, seconds: f64) {
+    for _ in 0..legs as usize {
+        segments.push((speed, seconds));
+        segments.push((-speed, seconds));
+    }
 }

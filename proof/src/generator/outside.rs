@@ -1,6 +1,7 @@
 //! Physics outside the contract's names: the right answer is to say that something is there and that no name fits.
 
-use super::machine::{Machine, Needs};
+use super::family::Needs;
+use super::machine::Machine;
 use super::plant::{Foreign, Plant};
 use crate::rng::Rng;
 
@@ -63,16 +64,7 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
             let top = (0.4 * m.residual_bandwidth()).min(18.0);
             Foreign::Hum { amplitude: s * coulomb, hertz: rng.range(0.5 * top, top) }
         }
-        "irregular_wells" => {
-            let width = travel * rng.range(0.012, 0.03);
-            let wells = (0..7)
-                .map(|_| {
-                    let depth = s * coulomb * width * rng.range(0.5, 1.5) * rng.sign();
-                    (depth, base + travel * rng.range(0.02, 0.9), width * rng.range(0.6, 1.6))
-                })
-                .collect();
-            Foreign::Wells { wells }
-        }
+        "irregular_wells" => draw_wells(s * coulomb, base, travel, rng),
         "payload_change" => Foreign::PayloadChange { share: s, at: rng.range(0.35, 0.65) },
         "linkage_inertia" => Foreign::Linkage {
             share: s,
@@ -80,15 +72,7 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
             width: travel * rng.range(0.1, 0.25),
         },
         "one_way_flywheel" => Foreign::Flywheel { share: s },
-        "latching_force" => {
-            let places = (0..3)
-                .map(|i| {
-                    let up = base + travel * (0.2 + 0.25 * f64::from(i) + rng.range(0.0, 0.1));
-                    (up, up - travel * rng.range(0.05, 0.15))
-                })
-                .collect();
-            Foreign::Latch { force: s * coulomb, places, side: rng.sign() }
-        }
+        "latching_force" => draw_latches(s * coulomb, base, travel, rng),
         "travel_times_speed" => Foreign::Shuttle {
             amplitude: s * coulomb * rng.sign(),
             centre: base + travel * rng.range(0.3, 0.6),
@@ -106,4 +90,27 @@ pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f6
         other => unreachable!("`{other}` is not among the foreign physics"),
     };
     plant.foreign.push(foreign);
+}
+
+/// Draws seven wells over the travel, which begins at `base`; both in u.
+fn draw_wells(force: f64, base: f64, travel: f64, rng: &mut Rng) -> Foreign {
+    let width = travel * rng.range(0.012, 0.03);
+    let wells = (0..7)
+        .map(|_| {
+            let depth = force * width * rng.range(0.5, 1.5) * rng.sign();
+            (depth, base + travel * rng.range(0.02, 0.9), width * rng.range(0.6, 1.6))
+        })
+        .collect();
+    Foreign::Wells { wells }
+}
+
+/// Draws three latches over the travel, which begins at `base`; both in u.
+fn draw_latches(force: f64, base: f64, travel: f64, rng: &mut Rng) -> Foreign {
+    let places = (0..3)
+        .map(|i| {
+            let up = base + travel * (0.2 + 0.25 * f64::from(i) + rng.range(0.0, 0.1));
+            (up, up - travel * rng.range(0.05, 0.15))
+        })
+        .collect();
+    Foreign::Latch { force, places, side: rng.sign() }
 }

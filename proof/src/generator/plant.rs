@@ -227,6 +227,36 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
+    /// A plant of one rigid mass with dry friction, on which nothing else acts.
+    pub(crate) fn rigid(inertia: f64, coulomb: f64, gain: f64, turn: f64, counts_per_unit: f64) -> Self {
+        Self {
+            inertia,
+            viscous: 0.0,
+            viscous_asymmetry: 0.0,
+            dry: Dry { coulomb, ..Dry::default() },
+            gain,
+            offset: 0.0,
+            weight: 0.0,
+            turn,
+            delay: 0.0,
+            lag: 0.0,
+            deadband: None,
+            clip: None,
+            gain_drift: None,
+            ripple: Vec::new(),
+            cogging: Vec::new(),
+            imbalance: None,
+            spring: None,
+            damping_profile: None,
+            drag: 0.0,
+            train: Train::Rigid,
+            eccentricity: None,
+            lost: None,
+            counts_per_unit,
+            foreign: Vec::new(),
+        }
+    }
+
     /// Angle within the turn, for what is periodic in it.
     pub(crate) fn angle(&self, q: f64) -> f64 {
         std::f64::consts::TAU / self.turn * q

@@ -108,59 +108,90 @@ pub(crate) fn measure(
     let stride = ((rate / (4.0 * band)) as usize).max(1);
     let judged = if fitted < sets.len() { fitted..sets.len() } else { 0..sets.len() };
     // Noise first: the refit's prior needs it.
-    let mut noise = Vec::new();
-    let (mut moving, mut all) = (0.0, 0.0);
-    for set in &sets[judged.clone()] {
-        let kept: Vec<f64> = picks(set, stride).map(|i| set.noise[i]).collect();
-        let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
-        noise.extend(kept.iter().map(|x| x - mean));
-        moving += set.moving.iter().filter(|&&m| m).count() as f64;
-        all += set.moving.len() as f64;
-    }
-    let noise = rms(&noise);
-    let width = 4 + sets.len();
-    let row = |set: &Columns, k: usize, i: usize| {
-        let mut x = vec![0.0; width];
-        x[0] = believed.inertia * set.acceleration[i];
-        x[1] = believed.viscous * set.speed[i];
-        x[2] = believed.coulomb * set.direction[i];
-        x[3] = believed.weight * set.tilt[i];
-        x[4 + k] = if declared.offset_allowed { 1.0 } else { 0.0 };
-        x
-    };
-    let mut normal = Normal::new(width);
-    let mut independent = 0.0;
-    for (k, set) in sets.iter().enumerate().take(fitted) {
-        for i in picks(set, stride) {
-            normal.add(&row(set, k, i), set.effect[i]);
-        }
-        independent += 2.0 * band * set.seconds;
-    }
-    // Rows that follow each other closely are not independent: the prior weighs accordingly.
-    let weight = (normal.rows as f64 / f64::max(independent, 1.0)).max(1.0);
-    let prior = |sigma: f64| weight * noise * noise / (sigma * sigma).max(1e-12);
-    let mut penalty = vec![
-        prior(declared.inertia),
-        prior(declared.viscous),
-        prior(declared.coulomb),
-        prior(declared.weight),
-    ];
-    penalty.resize(width, 0.0);
-    let active: Vec<usize> = (0..width).collect();
-    let shared = normal.solve(&active, &penalty);
+    let noise = noise_rms(&sets[judged.clone()], stride);
+    let refit = Refit { believed, declared, width: NOMINAL + sets.len(), stride };
+    let shared = refit.solve(&sets[..fitted.min(sets.len())], noise, band);
     let mut effect = Vec::new();
     for (k, set) in sets.iter().enumerate().skip(judged.start) {
         let left: Vec<f64> = picks(set, stride)
             .map(|i| {
-                let x = row(set, k, i);
-                set.effect[i] - x[..4].iter().zip(&shared[..4]).map(|(a, b)| a * b).sum::<f64>()
+                let x = refit.row(set, k, i);
+                let imitated = x[..NOMINAL].iter().zip(&shared[..NOMINAL]).map(|(a, b)| a * b).sum::<f64>();
+                set.effect[i] - imitated
             })
             .collect();
         let mean =
             if declared.offset_allowed { left.iter().sum::<f64>() / left.len().max(1) as f64 } else { 0.0 };
         effect.extend(left.iter().map(|x| x - mean));
     }
-    Measured { effect: rms(&effect), noise, moving: moving / f64::max(all, 1.0) }
+    Measured { effect: rms(&effect), noise, moving: moving_share(&sets[judged]) }
+}
+
+/// Rms of the noise on the rows that move, each recording's mean left out.
+fn noise_rms(sets: &[Columns], stride: usize) -> f64 {
+    let mut noise = Vec::new();
+    for set in sets {
+        let kept: Vec<f64> = picks(set, stride).map(|i| set.noise[i]).collect();
+        let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
+        noise.extend(kept.iter().map(|x| x - mean));
+    }
+    rms(&noise)
+}
+
+/// Share of the rows that move.
+fn moving_share(sets: &[Columns]) -> f64 {
+    let moving: usize = sets.iter().map(|set| set.moving.iter().filter(|&&m| m).count()).sum();
+    let all: usize = sets.iter().map(|set| set.moving.len()).sum();
+    moving as f64 / f64::max(all as f64, 1.0)
+}
+
+/// Nominal terms that are refitted: inertia, viscosity, dry friction, weight. An offset of each recording follows them.
+const NOMINAL: usize = 4;
+
+/// A refit of the nominal terms within their declared uncertainty, and of an offset of each recording.
+struct Refit<'a> {
+    believed: &'a Believed,
+    declared: &'a Declared,
+    width: usize,
+    stride: usize,
+}
+
+impl Refit<'_> {
+    /// The terms at row `i` of recording `k`.
+    fn row(&self, set: &Columns, k: usize, i: usize) -> Vec<f64> {
+        let mut x = vec![0.0; self.width];
+        x[0] = self.believed.inertia * set.acceleration[i];
+        x[1] = self.believed.viscous * set.speed[i];
+        x[2] = self.believed.coulomb * set.direction[i];
+        x[3] = self.believed.weight * set.tilt[i];
+        x[NOMINAL + k] = if self.declared.offset_allowed { 1.0 } else { 0.0 };
+        x
+    }
+
+    /// Returns the values of the terms that imitate the effect best. `noise`: rms of the noise, as a force; `band` in Hz.
+    fn solve(&self, sets: &[Columns], noise: f64, band: f64) -> Vec<f64> {
+        let mut normal = Normal::new(self.width);
+        let mut independent = 0.0;
+        for (k, set) in sets.iter().enumerate() {
+            for i in picks(set, self.stride) {
+                normal.add(&self.row(set, k, i), set.effect[i]);
+            }
+            independent += 2.0 * band * set.seconds;
+        }
+        // Rows that follow each other closely are not independent: the prior weighs accordingly.
+        let weight = (normal.rows as f64 / f64::max(independent, 1.0)).max(1.0);
+        let prior = |sigma: f64| weight * noise * noise / (sigma * sigma).max(1e-12);
+        let declared = self.declared;
+        let mut penalty = vec![
+            prior(declared.inertia),
+            prior(declared.viscous),
+            prior(declared.coulomb),
+            prior(declared.weight),
+        ];
+        penalty.resize(self.width, 0.0);
+        let active: Vec<usize> = (0..self.width).collect();
+        normal.solve(&active, &penalty)
+    }
 }
 
 fn picks(set: &Columns, stride: usize) -> impl Iterator<Item = usize> + '_ {

@@ -4,10 +4,12 @@ use std::f64::consts::TAU;
 
 use super::case::build;
 use super::drive::{Drive, Segment, Tones};
+use super::family::Needs;
 use super::files;
-use super::machine::{Machine, Needs};
+use super::machine::Machine;
 use super::plant::{Harmonic, Plant, Presliding, Train};
-use super::simulate::{Believed, Row, Run, STEP, Series, simulate};
+use super::series::Series;
+use super::simulate::{Believed, Row, Run, STEP, simulate};
 use super::spec::Spec;
 use crate::key::Category;
 use crate::rng::Rng;
@@ -289,7 +291,7 @@ fn loops_return_from_another_start_open_stretches_do_not() {
 
 #[test]
 fn stamps_err_and_still_increase() {
-    use super::machine::Stamping;
+    use super::clock::Stamping;
     let times: Vec<f64> = (0..5000).map(|i| f64::from(i) * 1.07e-4).collect();
     let off = |stamping: Stamping| {
         let stamps = stamping.of(&times, &mut Rng::new(2));

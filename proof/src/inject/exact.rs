@@ -11,7 +11,8 @@ use crate::generator::drive::{Drive, Segment, Tones};
 use crate::generator::plant::{
     Deadband, DeadbandKind, Drift, DriftLaw, Dry, Harmonic, Plant, Stribeck, StribeckLaw, Train,
 };
-use crate::generator::simulate::{Believed, Row, Run, STEP, Series, simulate};
+use crate::generator::series::Series;
+use crate::generator::simulate::{Believed, Row, Run, STEP, simulate};
 use crate::rng::Rng;
 use crate::signal::rms;
 

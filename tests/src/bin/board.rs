@@ -80,26 +80,16 @@ fn run(options: Options) -> Result<(), String> {
     };
     let mut board = board.map_err(|why| why.to_string())?;
     // The far end stays open here, so that programs may come and go.
-    let (mut terminal, far_end) =
-        TTYPort::pair().map_err(|error| format!("no pseudo-terminal: {error}; is /dev/ptmx there?"))?;
-    let path = far_end.name().unwrap_or_default();
-    let nothing = |error| format!("the pseudo-terminal {path}: {error}");
-    terminal.set_timeout(Duration::ZERO).map_err(nothing)?;
-    println!("the device's serial port: {path}");
+    let (mut terminal, _far_end) = Terminal::open()?;
+    println!("the device's serial port: {}", terminal.path);
 
     board.at_stop(|stopped| stopped.usb().host.plug());
-    let (mut port, mut enabled) = (Port::Absent, false);
-    let (mut started, mut paced_from) = (Instant::now(), board.now());
-    let mut waiting = Vec::new();
+    let mut shown = Shown { port: Port::Absent, enabled: false };
+    let mut clock = WallClock { started: Instant::now(), from: board.now() };
     loop {
         board.run_ms(1);
-        let mut bytes = [0; 4096];
-        let from_pc = match terminal.read(&mut bytes) {
-            Ok(length) => bytes[..length].to_vec(),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => Vec::new(),
-            Err(error) => return Err(format!("the pseudo-terminal {path}: {error}")),
-        };
-        let (now_port, drive, from_device, log) = board.at_stop(move |stopped| {
+        let from_pc = terminal.read()?;
+        let (port, drive, from_device, log) = board.at_stop(move |stopped| {
             let host = &mut stopped.usb().host;
             if host.port() == Port::Configured && !host.is_open() {
                 host.open();
@@ -110,32 +100,92 @@ fn run(options: Options) -> Result<(), String> {
             (port, drive, bytes, std::mem::take(stopped.log()))
         });
         drop(log);
-        waiting.extend(from_device);
-        match terminal.write(&waiting) {
-            Ok(length) => drop(waiting.drain(..length)),
-            // Nobody reads: a terminal keeps little.
-            Err(_) if waiting.len() > 65_536 => waiting.clear(),
-            Err(_) => {}
-        }
-        if now_port != port {
-            eprintln!("{:>8.3} s  USB: {now_port:?}", board.now() as f64 / 1e9);
-            port = now_port;
-        }
-        if drive.enabled != enabled {
-            enabled = drive.enabled;
-            let word = if enabled { "on" } else { "off" };
-            eprintln!("{:>8.3} s  amplifier {word}", board.now() as f64 / 1e9);
-        }
+        terminal.write(from_device);
+        shown.update(board.now(), port, drive.enabled);
         if options.seconds.is_some_and(|seconds| board.now() >= seconds * 1_000_000_000) {
             return Ok(());
         }
         if !options.fast {
-            let device = Duration::from_nanos(board.now() - paced_from);
-            match device.checked_sub(started.elapsed()) {
-                Some(ahead) => std::thread::sleep(ahead),
-                // Time that was lost is not made up for: the device would find its PC too slow.
-                None => (started, paced_from) = (Instant::now(), board.now()),
+            clock.wait(board.now());
+        }
+    }
+}
+
+/// The pseudo-terminal on which the device's serial port is.
+struct Terminal {
+    near: TTYPort,
+    path: String,
+    /// Bytes that nobody has read yet.
+    waiting: Vec<u8>,
+}
+
+impl Terminal {
+    /// Opens a terminal; the second is its far end, which a program opens by its path.
+    fn open() -> Result<(Self, TTYPort), String> {
+        let (mut near, far) =
+            TTYPort::pair().map_err(|error| format!("no pseudo-terminal: {error}; is /dev/ptmx there?"))?;
+        let path = far.name().unwrap_or_default();
+        near.set_timeout(Duration::ZERO).map_err(|error| format!("the pseudo-terminal {path}: {error}"))?;
+        Ok((Self { near, path, waiting: Vec::new() }, far))
+    }
+
+    /// Returns the bytes from the PC that are there.
+    fn read(&mut self) -> Result<Vec<u8>, String> {
+        let mut bytes = [0; 4096];
+        match self.near.read(&mut bytes) {
+            Ok(length) => Ok(bytes[..length].to_vec()),
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => {
+                Ok(Vec::new())
             }
+            Err(error) => Err(format!("the pseudo-terminal {}: {error}", self.path)),
+        }
+    }
+
+    fn write(&mut self, from_device: Vec<u8>) {
+        self.waiting.extend(from_device);
+        match self.near.write(&self.waiting) {
+            Ok(length) => drop(self.waiting.drain(..length)),
+            // Nobody reads: a terminal keeps little.
+            Err(_) if self.waiting.len() > 65_536 => self.waiting.clear(),
+            Err(_) => {}
+        }
+    }
+}
+
+/// The states of cable and amplifier, as they were last shown.
+struct Shown {
+    port: Port,
+    enabled: bool,
+}
+
+impl Shown {
+    fn update(&mut self, now: Nanos, port: Port, enabled: bool) {
+        let seconds = now as f64 / 1e9;
+        if port != self.port {
+            eprintln!("{seconds:>8.3} s  USB: {port:?}");
+            self.port = port;
+        }
+        if enabled != self.enabled {
+            let word = if enabled { "on" } else { "off" };
+            eprintln!("{seconds:>8.3} s  amplifier {word}");
+            self.enabled = enabled;
+        }
+    }
+}
+
+/// The clock on the wall, and the device's time at its start.
+struct WallClock {
+    started: Instant,
+    from: Nanos,
+}
+
+impl WallClock {
+    /// Waits until as much time has passed on the wall as for the device, whose time is `now`.
+    fn wait(&mut self, now: Nanos) {
+        match Duration::from_nanos(now - self.from).checked_sub(self.started.elapsed()) {
+            Some(ahead) => std::thread::sleep(ahead),
+            // Time that was lost is not made up for: the device would find its PC too slow.
+            None => *self = Self { started: Instant::now(), from: now },
         }
     }
 }

@@ -19,11 +19,13 @@ use rigless::soc::{Error, Gate, Window};
 use rigless::time::VirtualNanos;
 
 use super::Wiring;
+use super::bus::{DAC, EXTI, INSTRUCTIONS_PER_SECOND, OTG};
 use super::dac::Dac;
 use super::exti::{self, Exti};
 use super::flash::Flash;
 use super::pins::{PartPin, Pins};
-use super::processor::{DAC, EXTI, INSTRUCTIONS_PER_SECOND, OTG, Probe, Probed};
+use super::probe::Probe;
+use super::processor::Probed;
 use super::tilt::Accelerometer;
 use super::usb_port::{self, UsbPort};
 use super::warm_core::{ImageKey, WarmCore};

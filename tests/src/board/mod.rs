@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod amplifier;
+mod bus;
 pub mod cache;
 mod dac;
 pub mod elf;
@@ -16,6 +17,7 @@ mod machine;
 pub mod otg;
 pub mod pins;
 pub mod plant;
+mod probe;
 pub mod processor;
 mod record;
 mod rtt;
@@ -39,8 +41,9 @@ use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 pub use amplifier::Amplifier;
+pub use bus::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use processor::{Counted, Effect, HandlerRun, INSTRUCTIONS_PER_SECOND, Probe, ToCode, Upset};
+pub use probe::{Counted, Effect, HandlerRun, Probe, ToCode, Upset};
 pub use stopped::Stopped;
 pub use usb_port::UsbPort;
 pub use world::{EncoderRead, Log, Output};

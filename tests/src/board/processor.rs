@@ -1,143 +1,24 @@
-//! The emulator's core with three things added: addresses of peripherals it has no model for lead
-//! to windows where the board has one, the instructions of one interrupt handler can be counted, and
-//! a fault can be injected by moving the program counter.
+//! The emulator's core with three things added: its accesses go over the board's own bus ([`super::bus`]), the instructions of
+//! one interrupt handler can be counted, and a fault can be injected by moving the program counter.
 //!
-//! Nothing here changes what the firmware sees: the windows answer at the addresses of the manual.
+//! Nothing here changes what the firmware sees: the bus answers at the addresses of the manual.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::collections::BTreeSet;
 
-use rigless::emulator::{
-    Access, AccessKind, Checked, CoreBus, DataModel, Error, Exit, InterruptLine, Processor, Queued,
-};
+use rigless::emulator::{CoreBus, DataModel, Error, Exit, Processor, Queued};
 use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
 
+use super::bus::Rerouted;
 use super::cache::InstructionCache;
-use super::flash::{FLASH_OPTCR, Flash, WRITABLE};
-use super::pins::{PartPin, register};
+use super::flash::{Flash, WRITABLE};
+use super::probe::{Effect, HandlerRun, Probe, ToCode};
 use super::warm_core::WarmCore;
-
-/// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
-/// count a time.
-pub const INSTRUCTIONS_PER_SECOND: u64 = 168_000_000;
-/// The address of the USB core in the manual, its size, and the address of its window.
-pub(super) const OTG: (u64, u64, u64) = (0x5000_0000, 0x4_0000, 0x5010_0000);
-/// The same for the DAC.
-pub(super) const DAC: (u64, u64, u64) = (0x4000_7400, 0x400, 0x4010_0000);
-/// The same for the external interrupt controller.
-pub(super) const EXTI: (u64, u64, u64) = (0x4001_3C00, 0x400, 0x4011_0000);
-
-fn window(address: u64) -> u64 {
-    for (base, size, window) in [OTG, DAC, EXTI] {
-        if (base..base + size).contains(&address) {
-            return address - base + window;
-        }
-    }
-    address
-}
-
-/// The converter's holding register for twelve bits, right aligned (RM0090 14.5.3).
-const CONVERTER_CODE: u64 = 0x4000_7408;
-
-/// The part's reserved space between its RAM with the RAM's bits and its peripherals (RM0090 2.3): an access fails on the bus, and the
-/// core takes a fault (ARMv7-M B3.2.15, `PRECISERR`). The emulator answers zero by itself.
-const RESERVED: [std::ops::Range<u64>; 2] = [0x2010_0000..0x2200_0000, 0x2400_0000..0x4000_0000];
-
-/// The part's identity.
-const DBGMCU_IDCODE: u64 = 0xE004_2000;
 
 /// The number the architecture gives external interrupt 0.
 pub const FIRST_EXTERNAL: u32 = 16;
 const REGISTER_PC: usize = 15;
 const REGISTER_XPSR: usize = 16;
-
-/// One run of an interrupt handler, from the first instruction to the last, preemption excluded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct HandlerRun {
-    /// The instruction count of the run at its first instruction.
-    pub from: u64,
-    /// The number of its instructions.
-    pub instructions: u32,
-    /// The part of the run up to its first write of a code to the converter, if lines are counted.
-    pub to_code: Option<ToCode>,
-}
-
-/// A run up to the write of the converter's code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ToCode {
-    /// The number of instructions.
-    pub instructions: u32,
-    /// The number of lines of code that came from the flash, with an empty cache at the first instruction.
-    pub lines: u32,
-}
-
-/// Something that goes wrong inside the core, and when.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Upset {
-    /// The exception that has to be running; 0 is thread mode.
-    pub exception: u32,
-    /// The number of its instructions before the effect.
-    pub after: u32,
-    /// The effect.
-    pub effect: Effect,
-}
-
-/// The kinds of effects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Effect {
-    /// The program goes on at this address. Bit 0 is ignored.
-    Jump(u32),
-    /// The core does nothing for this many instructions' time, interrupts included.
-    Stall(u64),
-}
-
-/// An interrupt handler whose instructions are counted. Nothing may preempt it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Counted {
-    /// Its address.
-    pub entry: u32,
-    /// The instructions by which it may return.
-    pub exits: Vec<u32>,
-}
-
-/// The counts and actions of a probe.
-#[derive(Debug, Default)]
-pub struct Tally {
-    /// The handler that is counted, if any.
-    pub counted: Option<Counted>,
-    /// Every completed run of that handler.
-    pub runs: Vec<HandlerRun>,
-    /// True if the lines of its code are counted, too, which takes an instruction at a time.
-    pub count_lines: bool,
-    /// The addresses at which the image masks all interrupts (PRIMASK, `true`) and restores the previous state.
-    pub masks: BTreeMap<u32, bool>,
-    /// The instruction count at which interrupts were masked, and how many times one in the other.
-    masked_since: u64,
-    masked_depth: u32,
-    /// The most instructions between the two, and where they began.
-    pub longest_masked: (u64, u32),
-    masked_at: u32,
-    /// The output that is shorted to the supply, which the part reads back.
-    pub(super) shorted: Option<PartPin>,
-    /// The part's identity, if it is to be another one (`DBGMCU_IDCODE`, RM0090 38.6.1).
-    pub identity: Option<u32>,
-    /// An upset still to come.
-    pub upset: Option<Upset>,
-    /// Instructions done in the exception the upset waits for.
-    upset_progress: u32,
-}
-
-/// Shared between the test and the core.
-#[derive(Debug, Clone, Default)]
-pub struct Probe(Arc<Mutex<Tally>>);
-
-impl Probe {
-    /// Returns the counts, to read or to change.
-    pub fn tally(&self) -> MutexGuard<'_, Tally> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// The emulator's core, wrapped.
 #[derive(Debug)]
@@ -463,99 +344,5 @@ impl Processor for Probed {
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.core.load(bytes)
-    }
-}
-
-/// The runner's bus, with the windows in place.
-struct Rerouted<'a> {
-    bus: &'a mut dyn CoreBus,
-    flash: &'a Flash,
-    stalled: u64,
-    /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
-    standstill: u64,
-    shorted: Option<PartPin>,
-    identity: Option<u32>,
-    /// True if a code was written to the converter since somebody asked.
-    code_written: bool,
-    /// True if the core is inspected after every instruction.
-    stepping: bool,
-    /// What the run asked of the core in this stretch.
-    asked: Vec<Queued>,
-}
-
-impl CoreBus for Rerouted<'_> {
-    fn access(&mut self, mut access: Access, from_code: bool) -> Option<u64> {
-        let written = access.kind == AccessKind::Write;
-        if from_code && RESERVED.iter().any(|space| space.contains(&access.address)) {
-            return None;
-        }
-        if WRITABLE.contains(&access.address) {
-            let (address, value) = (access.address, access.value as u32);
-            let mut array = self.flash.array();
-            if written {
-                array.store(address, access.width.bytes(), value);
-                return Some(access.value);
-            }
-            let word = u64::from(array.word(address)) | u64::from(array.word(address + 4)) << 32;
-            return Some(word >> (8 * (address & 3)) & access.width.mask());
-        }
-        if !written && access.address == FLASH_OPTCR {
-            return Some(self.flash.array().option_register().into());
-        }
-        if written {
-            let at = self.bus.time(access.instruction_count + self.stalled).0;
-            let stall = self.flash.array().register_written(access.address, access.value as u32, at);
-            self.standstill += stall * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000;
-        }
-        let address = access.address;
-        self.code_written |= written && address == CONVERTER_CODE;
-        access.address = window(access.address);
-        if self.stalled > 0 {
-            access.instruction_count += self.stalled;
-            access.virtual_time = self.bus.time(access.instruction_count);
-        }
-        let value = self.bus.access(access, from_code)?;
-        if let Some(identity) = self.identity.filter(|_| !written && address == DBGMCU_IDCODE) {
-            return Some(identity.into());
-        }
-        let high = self.shorted.filter(|place| !written && access.address == place.register(register::INPUT));
-        Some(high.map_or(value, |place| value | 1 << place.index))
-    }
-
-    fn time(&self, instructions: u64) -> VirtualNanos {
-        self.bus.time(instructions + self.stalled)
-    }
-
-    fn queued(&mut self) -> Vec<Queued> {
-        let queued = self.bus.queued();
-        self.asked.extend_from_slice(&queued);
-        queued
-    }
-
-    fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        if self.stepping || self.standstill > 0 {
-            return None;
-        }
-        self.bus.carry_on(instructions + self.stalled, event)
-    }
-
-    fn acknowledge(&mut self, line: InterruptLine, instructions: u64) -> Option<u64> {
-        self.bus.acknowledge(line, instructions + self.stalled)
-    }
-
-    fn read_checked(&mut self, access: Access, report: bool) -> Option<Checked> {
-        self.bus.read_checked(access, report)
-    }
-
-    fn write_checked(&mut self, access: Access) -> Option<bool> {
-        self.bus.write_checked(access)
-    }
-
-    fn stops_before(&mut self, access: &Access) -> bool {
-        self.bus.stops_before(access)
-    }
-
-    fn send_trace(&mut self, bytes: &[u8]) {
-        self.bus.send_trace(bytes);
     }
 }

@@ -8,10 +8,10 @@ use rigless::soc::stm32f427::peripherals::adc;
 use rigless::time::VirtualNanos;
 
 use super::amplifier::Amplifier;
+use super::bus::DAC;
 use super::machine::{CLOCK_HZ, Machine, RAIL_MILLIVOLTS, pin};
 use super::pins::{Clock, register};
 use super::plant::{Drive, Nanos, PlantSide};
-use super::processor::DAC;
 use super::tracks::{PULL_SETTLES, Tracks};
 use super::{SetValue, Timer, Wiring, rtt};
 

@@ -1,7 +1,7 @@
 //! Ten thousand ticks a second, each in time, none lost, whatever the PC does meanwhile.
 
 use link::Command;
-use tests::board::{Nanos, Wiring};
+use tests::board::{Board, Nanos, Output, Wiring};
 use tests::pc::Pc;
 use tests::scenario::{board_wired, venepuncture};
 
@@ -21,6 +21,35 @@ fn garbage(seed: &mut u64) -> Vec<u8> {
         .collect()
 }
 
+/// Sends valid commands and garbage in turn until `end`, faster than the cable carries them; returns the number of commands.
+fn flood(pc: &mut Pc, board: &mut Board, end: Nanos) -> u64 {
+    let mut seed = 1;
+    let mut commands = 0_u64;
+    while board.now() < end {
+        while board.at_stop(|stopped| stopped.usb().host.unsent()) < FLOOD_BYTES {
+            let command = match commands % 4 {
+                0 => Command::Zero,
+                1 => Command::Start,
+                _ => Command::Heartbeat,
+            };
+            pc.send(board, command);
+            let noise = garbage(&mut seed);
+            pc.send_bytes(board, &noise);
+            // What follows the noise up to its next zero is part of it.
+            pc.send_bytes(board, &[0]);
+            commands += 1;
+        }
+        pc.run_ms(board, 1);
+    }
+    commands
+}
+
+/// The shortest and the longest time from a tick to its output, in ns.
+fn spread(outputs: &[Output]) -> (Nanos, Nanos) {
+    let times = outputs.iter().filter_map(|output| output.since_tick);
+    times.fold((u64::MAX, 0), |(low, high), time| (low.min(time), high.max(time)))
+}
+
 #[test]
 fn a_minute_of_flood_costs_no_tick_no_sample_and_no_time() {
     let wiring = Wiring { plant_period: TICK, ..Wiring::default() };
@@ -31,25 +60,7 @@ fn a_minute_of_flood_costs_no_tick_no_sample_and_no_time() {
     pc.run_ms(&mut board, 10);
     board.at_stop(|stopped| *stopped.log() = Default::default());
     let (start, counts_before) = (board.now(), pc.counts());
-    let mut seed = 1;
-    let mut commands = 0_u64;
-    while board.now() < start + MINUTE_TICKS * TICK {
-        // Valid commands and garbage in turn, faster than the cable carries them.
-        while board.at_stop(|stopped| stopped.usb().host.unsent()) < FLOOD_BYTES {
-            let command = match commands % 4 {
-                0 => Command::Zero,
-                1 => Command::Start,
-                _ => Command::Heartbeat,
-            };
-            pc.send(&mut board, command);
-            let noise = garbage(&mut seed);
-            pc.send_bytes(&mut board, &noise);
-            // What follows the noise up to its next zero is part of it.
-            pc.send_bytes(&mut board, &[0]);
-            commands += 1;
-        }
-        pc.run_ms(&mut board, 1);
-    }
+    let commands = flood(&mut pc, &mut board, start + MINUTE_TICKS * TICK);
     // What is on its way arrives.
     let log = board.at_stop(|stopped| std::mem::take(stopped.log()));
     pc.run_ms(&mut board, 50);
@@ -73,12 +84,7 @@ fn a_minute_of_flood_costs_no_tick_no_sample_and_no_time() {
     assert_eq!((timing.missed_ticks, timing.dropped_samples), (0, 0));
     assert!(timing.garbage_frames > 1_000, "the flood arrived: {timing:?}");
 
-    let spread = |outputs: &[tests::board::Output]| {
-        let times = outputs.iter().filter_map(|output| output.since_tick);
-        times.fold((u64::MAX, 0), |(low, high), time| (low.min(time), high.max(time)))
-    };
-    let written = spread(&log.written);
-    let put_out = spread(&log.put_out);
+    let (written, put_out) = (spread(&log.written), spread(&log.put_out));
     println!(
         "tick to the DAC's register {}..{} ns (spread {}), to its pin {}..{} ns (spread {}); {} commands, {} of them heard; {counts:?}",
         written.0,

@@ -194,20 +194,7 @@ pub async fn commission(
 
     ask(Step::Pulses).await?;
     bench.settle().await?;
-    let mut leads_reversed = false;
-    let mechanism = loop {
-        let found = pulses(&mut bench, &device).await?;
-        match found {
-            Some(mechanism) => break mechanism,
-            None if !leads_reversed => {
-                leads_reversed = true;
-                device.motor_reversed = !device.motor_reversed;
-                bench.configure(&device).await?;
-            }
-            // Against its torque whichever way it is driven.
-            None => return Err(Trouble::NoFit.into()),
-        }
-    };
+    let (mechanism, leads_reversed) = find_mechanism(&mut bench, &mut device).await?;
     device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
     device.mechanism = findings::along_the_needle(&mechanism, radius_mm, device.mechanism.delay_us);
     // Never above what the pulses were driven with: the device takes nothing higher than it has proved.
@@ -216,6 +203,18 @@ pub async fn commission(
     bench.configure(&device).await?;
     let record = bench.commission(&device).await?;
     Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism, stiffness_lowered })
+}
+
+/// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device drives it the other way from now on.
+async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(Mechanism, bool), Failure> {
+    if let Some(mechanism) = pulses(bench, device).await? {
+        return Ok((mechanism, false));
+    }
+    device.motor_reversed = !device.motor_reversed;
+    bench.configure(device).await?;
+    // Otherwise it turns against its torque whichever way it is driven.
+    let mechanism = pulses(bench, device).await?.ok_or(Trouble::NoFit)?;
+    Ok((mechanism, true))
 }
 
 /// Plays the pulses and returns the mechanism; `None` if the motor turns against its torque.

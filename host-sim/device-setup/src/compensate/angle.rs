@@ -36,41 +36,8 @@ pub fn find(
     (counts_per_turn, torque_per_code, middle, inertia): (f64, f64, f64, f64),
 ) -> Result<Angle, Failure> {
     let rad = TAU / counts_per_turn;
-    let speed = |at: usize| {
-        let moved = f64::from(samples[at + SPAN / 2].count) - f64::from(samples[at - SPAN / 2].count);
-        moved * rad * f64::from(TICK_HZ) / SPAN as f64
-    };
-    // Angle, torque that is not the inertia's, direction.
-    let rows: Vec<(f64, f64, bool)> = (SPAN..samples.len().saturating_sub(SPAN))
-        .step_by(STRIDE)
-        .filter_map(|at| {
-            let v = speed(at);
-            let a = (speed(at + SPAN / 2) - speed(at - SPAN / 2)) * f64::from(TICK_HZ) / SPAN as f64;
-            let torque = (f64::from(samples[at].dac) - middle) * torque_per_code - inertia * a;
-            (v.abs() > MOVING).then_some(((f64::from(samples[at].count) + 0.5) * rad, torque, v > 0.0))
-        })
-        .collect();
-    let mean = |direction: bool| {
-        let (sum, count) = rows
-            .iter()
-            .filter(|row| row.2 == direction)
-            .fold((0.0, 0.0_f64), |(sum, count), row| (sum + row.1, count + 1.0));
-        sum / count.max(1.0)
-    };
-    let means = [mean(false), mean(true)];
-    // What the motor has to give is the opposite of what the mechanism adds.
-    let seen: Vec<(f64, f64)> = waves
-        .iter()
-        .map(|&(order, ..)| {
-            let sum = rows.iter().fold((0.0, 0.0), |(sin, cos), &(angle, torque, inwards)| {
-                let (s, c) = (f64::from(order) * angle).sin_cos();
-                let left = means[usize::from(inwards)] - torque;
-                (sin + left * s, cos + left * c)
-            });
-            let norm = 2.0 / rows.len().max(1) as f64;
-            (sum.0 * norm, sum.1 * norm)
-        })
-        .collect();
+    let rows = rows(samples, rad, |code| (code - middle) * torque_per_code, inertia);
+    let seen = seen_waves(&rows, waves);
     let size = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
     let expected = size(&mut waves.iter().map(|wave| wave.1));
     let norm = expected * size(&mut seen.iter().map(|s| s.0.hypot(s.1)));
@@ -96,6 +63,58 @@ pub fn find(
             "the rotor's angle was not found: a slow turn does not show the cogging that was diagnosed; characterise and diagnose again",
         )
     })
+}
+
+/// One row of the slow turn in motion.
+struct Row {
+    /// Angle of the roller in rad.
+    angle: f64,
+    /// Torque beyond the inertia's, in N·m.
+    torque: f64,
+    inwards: bool,
+}
+
+/// The rows in which the roller moves. `rad` is the angle of a count, `torque` turns a code into N·m, `inertia` is in kg·m².
+fn rows(samples: &[Sample], rad: f64, torque: impl Fn(f64) -> f64, inertia: f64) -> Vec<Row> {
+    let speed = |at: usize| {
+        let moved = f64::from(samples[at + SPAN / 2].count) - f64::from(samples[at - SPAN / 2].count);
+        moved * rad * f64::from(TICK_HZ) / SPAN as f64
+    };
+    (SPAN..samples.len().saturating_sub(SPAN))
+        .step_by(STRIDE)
+        .filter_map(|at| {
+            let v = speed(at);
+            let a = (speed(at + SPAN / 2) - speed(at - SPAN / 2)) * f64::from(TICK_HZ) / SPAN as f64;
+            let torque = torque(f64::from(samples[at].dac)) - inertia * a;
+            let angle = (f64::from(samples[at].count) + 0.5) * rad;
+            (v.abs() > MOVING).then_some(Row { angle, torque, inwards: v > 0.0 })
+        })
+        .collect()
+}
+
+/// The projections of the torque onto sine and cosine of each wave, in N·m; the mean of each direction is left out.
+fn seen_waves(rows: &[Row], waves: &[(u16, f64, f64)]) -> Vec<(f64, f64)> {
+    let mean = |inwards: bool| {
+        let (sum, count) = rows
+            .iter()
+            .filter(|row| row.inwards == inwards)
+            .fold((0.0, 0.0_f64), |(sum, count), row| (sum + row.torque, count + 1.0));
+        sum / count.max(1.0)
+    };
+    let means = [mean(false), mean(true)];
+    waves
+        .iter()
+        .map(|&(order, ..)| {
+            let sum = rows.iter().fold((0.0, 0.0), |(sin, cos), row| {
+                let (s, c) = (f64::from(order) * row.angle).sin_cos();
+                // What the motor has to give is the opposite of what the mechanism adds.
+                let left = means[usize::from(row.inwards)] - row.torque;
+                (sin + left * s, cos + left * c)
+            });
+            let norm = 2.0 / rows.len().max(1) as f64;
+            (sum.0 * norm, sum.1 * norm)
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Before and after, as a page that needs nothing beside it.
 
 use super::Outcome;
-use super::felt::PARTS;
+use super::felt::{Felt, PARTS};
 use control_core::compensation::Gain;
 use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet, decimal};
@@ -18,44 +18,8 @@ pub fn html(outcome: &Outcome) -> String {
         decimal(after.all() * 1e3, 1)
     );
     let mut sheet = Sheet::new("What the hand feels beyond the law", &lead);
-    let row = |what: &str, before: f64, after: f64| {
-        vec![
-            Cell::text(what),
-            Cell::number(Some(before * 1e3), 1),
-            Cell::number(Some(after * 1e3), 1),
-            Cell::number(Some(after / before.max(1e-9)), 2),
-        ]
-    };
-    sheet.table(
-        &["", "before, mN rms", "after, mN rms", "after/before"],
-        &[
-            row("insertion", before.insertion, after.insertion),
-            row("hold", before.hold, after.hold),
-            row("withdrawal", before.withdrawal, after.withdrawal),
-            row("all", before.all(), after.all()),
-        ],
-    );
-    let steps = |values: &[f64; PARTS]| -> Vec<(f64, f64)> {
-        let step = |(tenth, force): (usize, &f64)| {
-            let (from, to) = (10.0 * tenth as f64, 10.0 * (tenth + 1) as f64);
-            [(from, force * 1e3), (to, force * 1e3)]
-        };
-        values.iter().enumerate().flat_map(step).collect()
-    };
-    let curve = |name: &str, colour, values| Curve {
-        name: name.into(),
-        colour,
-        points: steps(values),
-        dashed: false,
-    };
-    let chart = Chart {
-        title: "By tenth of the travel".into(),
-        x_label: "travel, %".into(),
-        y_label: "force, mN rms".into(),
-        curves: vec![curve("before", 5, &before.by_tenth), curve("after", 0, &after.by_tenth)],
-        ..Chart::default()
-    };
-    sheet.figures(&[(chart.svg(), "Way in and way out together.".into())]);
+    sheet.table(&["", "before, mN rms", "after, mN rms", "after/before"], &ways(before, after));
+    sheet.figures(&[(by_tenth(before, after).svg(), "Way in and way out together.".into())]);
     sheet.heading("What is fed forward");
     sheet.table(&["part", "found", "gain"], &parts(outcome));
     if let Some(weight) = outcome.weight_mnm {
@@ -76,6 +40,48 @@ pub fn html(outcome: &Outcome) -> String {
         ));
     }
     sheet.finish()
+}
+
+/// The forces by direction of motion, in mN rms.
+fn ways(before: &Felt, after: &Felt) -> [Vec<Cell>; 4] {
+    let row = |what: &str, before: f64, after: f64| {
+        vec![
+            Cell::text(what),
+            Cell::number(Some(before * 1e3), 1),
+            Cell::number(Some(after * 1e3), 1),
+            Cell::number(Some(after / before.max(1e-9)), 2),
+        ]
+    };
+    [
+        row("insertion", before.insertion, after.insertion),
+        row("hold", before.hold, after.hold),
+        row("withdrawal", before.withdrawal, after.withdrawal),
+        row("all", before.all(), after.all()),
+    ]
+}
+
+/// The forces along the travel.
+fn by_tenth(before: &Felt, after: &Felt) -> Chart {
+    let steps = |values: &[f64; PARTS]| -> Vec<(f64, f64)> {
+        let step = |(tenth, force): (usize, &f64)| {
+            let (from, to) = (10.0 * tenth as f64, 10.0 * (tenth + 1) as f64);
+            [(from, force * 1e3), (to, force * 1e3)]
+        };
+        values.iter().enumerate().flat_map(step).collect()
+    };
+    let curve = |name: &str, colour, values| Curve {
+        name: name.into(),
+        colour,
+        points: steps(values),
+        dashed: false,
+    };
+    Chart {
+        title: "By tenth of the travel".into(),
+        x_label: "travel, %".into(),
+        y_label: "force, mN rms".into(),
+        curves: vec![curve("before", 5, &before.by_tenth), curve("after", 0, &after.by_tenth)],
+        ..Chart::default()
+    }
 }
 
 fn parts(outcome: &Outcome) -> Vec<Vec<Cell>> {

@@ -141,15 +141,8 @@ pub(super) fn gather(
     let said = |role: Role| choices.iter().any(|c| c.role == role);
     // Everything that only a person can know is asked at once.
     let mut questions = missing(logs, &found, known);
-    if found.contains_key(&Role::Position)
-        && !said(Role::Velocity)
-        && let Some(left) = found.remove(&Role::Velocity)
-    {
-        let name = &column(logs, &left).name;
-        notes.push(format!(
-            "{name} left out: give {} only where a sensor of its own measured it",
-            roles::option(Role::Velocity, name, None)
-        ));
+    if !said(Role::Velocity) {
+        leave_out_velocity(logs, &mut found, notes);
     }
     let units = units(logs, &mut found, &said, &mut questions, notes);
     if !questions.is_empty() {
@@ -195,6 +188,19 @@ pub(super) fn gather(
         notes.push("the command is zero throughout, as --undriven says".into());
     }
     Ok(rows)
+}
+
+/// Leaves out a speed beside a position: most are its difference, and no measurement.
+fn leave_out_velocity(logs: &[Log], found: &mut BTreeMap<Role, Chosen>, notes: &mut Vec<String>) {
+    if found.contains_key(&Role::Position)
+        && let Some(left) = found.remove(&Role::Velocity)
+    {
+        let name = &column(logs, &left).name;
+        notes.push(format!(
+            "{name} left out: give {} only where a sensor of its own measured it",
+            roles::option(Role::Velocity, name, None)
+        ));
+    }
 }
 
 /// The clock of each table, by the places of file and table, and its zero.

@@ -1,0 +1,86 @@
+//! What goes into and comes out of a tick, and the orders between ticks.
+
+use crate::compensation::Gains;
+use crate::event::{Fault, Limits, Transitions, VesselState};
+use crate::excitation::Excitation;
+use crate::plan::Plan;
+use crate::units::{Counts, DacCode, Millimetres, MillimetresPerSecond, Milliradians, Newtons};
+use serde::{Deserialize, Serialize};
+
+/// What the tick reads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TickInput {
+    /// The encoder's absolute count; it may wrap.
+    pub count: Counts,
+    /// The latest inclination.
+    pub tilt: Milliradians,
+}
+
+/// What the tick gives.
+#[derive(Clone, Copy, Debug)]
+pub struct TickOutput {
+    /// What to write to the converter.
+    pub dac: DacCode,
+    /// Whether the amplifier may be on.
+    pub enable: bool,
+    /// What is streamed.
+    pub sample: Sample,
+    /// What changed in the tissue.
+    pub transitions: Transitions,
+    /// What holds torque back.
+    pub limits: Limits,
+    /// The fault that latched in this tick.
+    pub tripped: Option<Fault>,
+    /// Depth past the zero.
+    pub depth: Millimetres,
+    /// Estimated speed.
+    pub speed: MillimetresPerSecond,
+    /// The force that the law asked for, before limits.
+    pub force: Newtons,
+    /// The angle to the skin that the layers were met at.
+    pub angle: Milliradians,
+    /// Where the tip is as seen from the vessel.
+    pub vessel: VesselState,
+    /// The force across the needle that would hold its direction; this device cannot give it.
+    pub lateral: Newtons,
+}
+
+/// One tick as it is streamed and recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Counts past the zero.
+    pub count: i32,
+    /// The torque as the code of a converter of the same width whose zero is mid-scale, on a motor whose sign is right:
+    /// without the commissioned zero and sign, so that a recording needs no device to be read.
+    pub dac: u16,
+    /// [`crate::event::State`] as a number.
+    pub state: u8,
+    /// Inclination in mrad.
+    pub tilt_mrad: i16,
+}
+
+/// What a person or the supervisor asks of the control law, between ticks.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
+pub enum Order {
+    /// Power up and fade in; clears a latched fault. Only on a device that has been commissioned.
+    Start,
+    /// Zero torque, amplifier off.
+    Stop,
+    /// The needle is at depth 0 now; only while torque is off.
+    Zero,
+    /// The PC is alive.
+    Heartbeat,
+    /// Another plan; only while torque is off.
+    Configure(Plan),
+    /// Something outside the tick went wrong: torque off, latched.
+    Trip(Fault),
+    /// Play an excitation from where the motor is; only while torque is off, and on a device that has not been
+    /// commissioned only where [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
+    Excite(Excitation),
+    /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
+    /// [`crate::compensation::check::check`].
+    Compensate(Gains),
+    /// The rotor's angle, from which waves are counted, is zero at this many counts past the zero; `None`: it is not known.
+    Index(Option<Counts>),
+}
