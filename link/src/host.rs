@@ -1,6 +1,6 @@
 //! The PC's end: bytes in, frames out, and the count of what is missing.
 
-use crate::codec::{self, Decoder, MAX_FRAME, TooLong};
+use crate::codec::{self, Decoder, Garbage, MAX_FRAME, TooLong};
 use crate::frames::{Command, DeviceFrame, HostFrame, Numbered};
 
 /// The counts of frames that arrived and that did not.
@@ -30,12 +30,28 @@ pub struct Reception {
 impl Reception {
     /// Takes a byte; a frame where one is whole.
     pub fn push(&mut self, byte: u8) -> Option<DeviceFrame> {
-        match self.decoder.push::<Numbered>(byte)? {
+        let read = self.decoder.push(byte)?;
+        self.counted(read)
+    }
+
+    /// Takes bytes from the front of `bytes` until a frame is whole, and returns it; `None` where they end before that.
+    pub fn take(&mut self, bytes: &mut &[u8]) -> Option<DeviceFrame> {
+        while let Some(read) = self.decoder.take(bytes) {
+            let frame = self.counted(read);
+            if frame.is_some() {
+                return frame;
+            }
+        }
+        None
+    }
+
+    fn counted(&mut self, read: Result<Numbered, Garbage>) -> Option<DeviceFrame> {
+        match read {
             Ok(numbered) => {
                 self.count(&numbered);
                 Some(numbered.frame)
             }
-            Err(_) => {
+            Err(Garbage) => {
                 self.counts.garbage += 1;
                 None
             }

@@ -63,6 +63,27 @@ proptest! {
     }
 
     #[test]
+    fn bytes_in_pieces_are_read_as_one_by_one(garbage: Vec<u8>, samples in samples(), long in 0..3 * MAX_FRAME, piece in 1..200_usize) {
+        let mut bytes = garbage;
+        for (sequence, filler) in [0, long, 1].into_iter().enumerate() {
+            bytes.extend(vec![1; filler]);
+            bytes.push(0);
+            bytes.extend(encoded(&Numbered { sequence: sequence as u32, frame: block(9, &samples) }));
+        }
+        let (mut decoder, mut frames, mut garbage) = (Decoder::default(), Vec::new(), 0);
+        for mut piece in bytes.chunks(piece) {
+            while let Some(read) = decoder.take::<Numbered>(&mut piece) {
+                match read {
+                    Ok(frame) => frames.push(frame),
+                    Err(Garbage) => garbage += 1,
+                }
+            }
+            prop_assert!(piece.is_empty());
+        }
+        prop_assert_eq!((frames, garbage), decode_all(&bytes));
+    }
+
+    #[test]
     fn a_frame_cut_short_costs_itself_alone(samples in samples(), cut in 0.0..1.0_f64) {
         let first = encoded(&Numbered { sequence: 0, frame: block(0, &samples) });
         let second = Numbered { sequence: 1, frame: block(32, &samples) };

@@ -1,11 +1,16 @@
 //! Time of a step of the tissue picture on one core, for `cargo xtask bench`: at least 5,000 particles, a needle that goes in
-//! and out. Prints `xpbd_step_ms=…`, the median over all steps.
+//! and out. Prints `xpbd_step_ms=…`, the median over all steps, and the time of a step on meshes of about one, ten and a hundred
+//! times as many particles.
 
 use std::time::Instant;
 use tissue::{Configuration, Needle, Tissue};
 
 const STEPS: usize = 600;
 const STEP_S: f32 = 1.0 / 60.0;
+
+/// Particles of meshes of about one, ten and a hundred times as many, at least, and the steps of each; 20,000 are the most that
+/// are possible.
+const WORK: [(usize, usize); 3] = [(180, 400), (1_800, 100), (18_000, 20)];
 
 fn main() {
     let mut configuration = Configuration::default();
@@ -16,15 +21,7 @@ fn main() {
         }
     }
     let mut tissue = Tissue::new(&configuration).expect("the default limb can be built");
-    let mut times: Vec<f64> = (0..STEPS)
-        .map(|step| {
-            let depth = 7.0 - 9.0 * (step as f32 * STEP_S).cos();
-            let begin = Instant::now();
-            tissue.step(&Needle::entering(depth, 30_f32.to_radians(), 0.0), STEP_S);
-            begin.elapsed().as_secs_f64() * 1e3
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
+    let times = sorted_ms(&mut tissue, STEPS);
     let [distances, volumes, bendings, ties] = tissue.solver().counts();
     println!(
         "particles={} distances={distances} volumes={volumes} bendings={bendings} ties={ties} substeps={} longest_ms={:.3}",
@@ -33,6 +30,35 @@ fn main() {
         times[STEPS - 1]
     );
     println!("xpbd_step_ms={:.4}", times[STEPS / 2]);
+    for (least, steps) in WORK {
+        // Without the vessel, whose mesh is the same in all.
+        let mut configuration = Configuration { vessel: None, ..Configuration::default() };
+        // One row of cells in each layer, so that the coarsest mesh is small enough.
+        configuration
+            .layers
+            .iter_mut()
+            .for_each(|layer| (layer.rows, layer.spacing_mm) = (1, 8.0 * layer.spacing_mm));
+        while particles(&configuration) < least {
+            configuration.layers.iter_mut().for_each(|layer| layer.spacing_mm *= 0.97);
+        }
+        let mut tissue = Tissue::new(&configuration).expect("a finer or coarser limb can be built");
+        let ms = sorted_ms(&mut tissue, steps)[steps / 2];
+        println!("work.xpbd.particles.{}={:.7}", tissue.points().len(), 1e-3 * ms);
+    }
+}
+
+/// Times of steps with a needle that goes in and out, from the shortest, in ms.
+fn sorted_ms(tissue: &mut Tissue, steps: usize) -> Vec<f64> {
+    let mut times: Vec<f64> = (0..steps)
+        .map(|step| {
+            let depth = 7.0 - 9.0 * (step as f32 * STEP_S).cos();
+            let begin = Instant::now();
+            tissue.step(&Needle::entering(depth, 30_f32.to_radians(), 0.0), STEP_S);
+            begin.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times
 }
 
 fn particles(configuration: &Configuration) -> usize {

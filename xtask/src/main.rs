@@ -7,6 +7,7 @@ mod arrows;
 mod bench;
 mod board_test;
 mod boards;
+mod counts;
 mod dfu;
 mod dist;
 mod elf;
@@ -36,7 +37,8 @@ The project's chores.
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
                                 fmt words clippy firmware unit doc board wasm site browser clients fuzz prove
   cargo xtask test --quick      the inner loop: format, warnings, the tests inside the crates; three minutes
-  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class soak mutants proof
+  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class counts soak
+                                mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, and board-test, take --board: discovery (default), nucleo-f429zi
@@ -46,6 +48,8 @@ The project's chores.
   cargo xtask wiring            draws both boards' wiring from the tables in docs/hardware.md
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
+  cargo xtask counts            the instructions of hot paths against those written down; --renew writes them down,
+                                --shares prints the source files in which they are spent
   cargo xtask mutants [CRATE…]  changes the code a thousand times and sees that the tests notice: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
@@ -74,6 +78,7 @@ fn main() -> ExitCode {
         "wiring" => no_more(rest).and_then(|()| wiring::run()),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
+        "counts" => counts::run(rest),
         other => {
             Err(Failure::usage(format!("`{other}` is not a command of xtask; `cargo xtask help` lists them")))
         }

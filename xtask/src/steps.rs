@@ -4,7 +4,7 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Failure, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, built};
-use crate::{arrows, board_test, firmware, mutants, python, site, wasm, words};
+use crate::{arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -49,7 +49,7 @@ pub(crate) const QUICK: [Step; 5] = [
 ];
 
 /// The checks that take longer than the tests may.
-pub(crate) const NIGHTLY: [Step; 7] = [
+pub(crate) const NIGHTLY: [Step; 8] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
     step(
         "parquet",
@@ -59,6 +59,7 @@ pub(crate) const NIGHTLY: [Step; 7] = [
     ),
     step("foxglove", "Foxglove's live stream read by Foxglove's own client", 400.0, foxglove),
     step("class", "devices and their instructor over Zenoh, and thirty devices measured", 900.0, class),
+    step("counts", "hot paths take no more instructions than were written down", 120.0, counts::check),
     step("soak", "the frame parser, ten minutes of damaged frames", 620.0, soak),
     step("mutants", "the tests notice a thousand small changes of the code", 2400.0, mutated),
     step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),

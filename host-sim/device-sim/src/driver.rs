@@ -165,9 +165,8 @@ impl Driver {
     }
 
     /// Takes bytes; gives every whole frame to `see`.
-    pub fn receive(&mut self, now: Duration, bytes: &[u8], mut see: impl FnMut(&DeviceFrame)) {
-        for &byte in bytes {
-            let Some(frame) = self.reception.push(byte) else { continue };
+    pub fn receive(&mut self, now: Duration, mut bytes: &[u8], mut see: impl FnMut(&DeviceFrame)) {
+        while let Some(frame) = self.reception.take(&mut bytes) {
             match &frame {
                 DeviceFrame::Ack(ack) => self.answered(now, ack),
                 DeviceFrame::Samples(_) => self.last_samples = now,

@@ -202,32 +202,44 @@ fn cpu_s(pid: u32) -> f64 {
     (ticks(11) + ticks(12)) / 100.0
 }
 
-/// Thirty programs and their instructor's, each with a virtual device at 10 kHz and 1,000 poses a second: all of it within one
-/// core. Prints the row of `cargo xtask nightly class`.
+/// Programs and their instructor's, each with a virtual device at 10 kHz and 1,000 poses a second: the CPU time in s that all of
+/// them take in some seconds, those seconds, and the poses that each sends in one of them.
 #[cfg(target_os = "linux")]
-#[test]
-#[ignore = "measures: needs a machine that does nothing else, `cargo xtask nightly class` runs it"]
-fn thirty_devices_cost_less_than_a_core() {
+fn measured(members: usize) -> (f64, f64, f64) {
     const SECONDS: f64 = 10.0;
-    let meeting = meeting("thirty", None);
+    let meeting = meeting(&format!("of-{members}"), None);
     let (board, _listener) = listen(&meeting);
-    let names: Vec<String> = (0..MEMBERS).map(|number| format!("d{number:02}")).collect();
+    let names: Vec<String> = (0..members).map(|number| format!("d{number:02}")).collect();
     let mut children: Vec<Child> = names.iter().map(|name| device(&meeting, name, &[])).collect();
-    wait("all thirty", &board, |b| names.iter().all(|name| is_here(b, name)));
+    wait("all of them", &board, |b| names.iter().all(|name| is_here(b, name)));
     let used =
         || -> f64 { cpu_s(std::process::id()) + children.iter().map(|child| cpu_s(child.id())).sum::<f64>() };
     let poses = || -> u64 { view(&board).iter().map(|m| m.poses).sum() };
     let (begin, cpu, heard) = (Instant::now(), used(), poses());
     std::thread::sleep(Duration::from_secs_f64(SECONDS));
     let seconds = begin.elapsed().as_secs_f64();
-    let (cores, rate) = ((used() - cpu) / seconds, (poses() - heard) as f64 / seconds / MEMBERS as f64);
+    let (cpu, rate) = (used() - cpu, (poses() - heard) as f64 / seconds / members as f64);
     let here = names.iter().filter(|name| is_here(&board, name)).count();
     children.iter_mut().for_each(|child| {
         let _ = child.kill();
         let _ = child.wait();
     });
-    println!("class_cores={cores:.2} class_poses_per_s={rate:.0}");
-    assert_eq!(here, MEMBERS);
-    assert!((950.0..=1_050.0).contains(&rate), "{rate} poses a second of each");
-    assert!(cores <= 1.0, "{cores} cores");
+    assert_eq!(here, members);
+    (cpu, seconds, rate)
+}
+
+/// One, ten and thirty devices with their instructor, all of it within one core. Prints the row of `cargo xtask nightly class`, and
+/// for `cargo xtask bench` the CPU time of each class.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "measures: needs a machine that does nothing else, `cargo xtask nightly class` runs it"]
+fn thirty_devices_cost_less_than_a_core() {
+    for members in [1, 10, MEMBERS] {
+        let (cpu, seconds, rate) = measured(members);
+        let cores = cpu / seconds;
+        println!("work.class.devices.{members}={cpu:.3}");
+        println!("class_cores={cores:.2} class_poses_per_s={rate:.0}");
+        assert!((950.0..=1_050.0).contains(&rate), "{rate} poses a second of each of {members}");
+        assert!(cores <= 1.0, "{cores} cores");
+    }
 }

@@ -1,0 +1,108 @@
+//! The measuring programs: examples, tests that print rows, and other people's solvers in Python.
+
+use super::values::{BOARD_LINE, Values, board_lines_in, values_in};
+use crate::rows::ROWS;
+use crate::shell::{self, Failure, cargo};
+use crate::workspace_build::{BUILD, built};
+use crate::{boards, firmware, setup};
+use std::fs;
+use std::process::{Command, Stdio};
+
+/// The test programs of the crate `tests`: a folder each.
+const TEST_PROGRAMS: [&str; 2] = ["board", "page"];
+
+/// A file of tests.
+pub(crate) struct TestModule {
+    program: &'static str,
+    pub(crate) name: String,
+    text: String,
+}
+
+/// Finds the files of tests.
+pub(crate) fn test_modules() -> Result<Vec<TestModule>, Failure> {
+    let mut modules = vec![];
+    for program in TEST_PROGRAMS {
+        let folder = shell::top().join("tests/tests").join(program);
+        let unreadable = |error| Failure::new(format!("{} cannot be read: {error}", folder.display()));
+        for path in fs::read_dir(&folder).map_err(unreadable)?.flatten().map(|entry| entry.path()) {
+            let Some(name) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
+            let is_source = path.extension().is_some_and(|extension| extension == "rs");
+            if let (true, Ok(text)) = (is_source, fs::read_to_string(&path)) {
+                modules.push(TestModule { program, name: name.into(), text });
+            }
+        }
+    }
+    modules.sort_by(|a, b| (a.program, &a.name).cmp(&(b.program, &b.name)));
+    Ok(modules)
+}
+
+impl TestModule {
+    /// True if the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
+    pub(crate) fn measures(&self, wants: impl Fn(&str) -> bool) -> bool {
+        let text = &self.text;
+        (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
+            || ROWS.iter().filter(|row| wants(row.name)).any(|row| {
+                text.contains(&format!("{}=", row.name)) || text.contains(&format!("\"{}\"", row.name))
+            })
+    }
+
+    /// Runs the tests of the file.
+    pub(crate) fn run(&self, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
+        let mut run = cargo();
+        run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
+        run.arg("test").args(BUILD).args(["--quiet", "--test", self.program, "--"]);
+        run.args(["--nocapture", &format!("{}::", self.name)]);
+        // A test that fails its bound has printed what it measured.
+        let output = run
+            .stderr(Stdio::inherit())
+            .output()
+            .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        board_lines.extend(board_lines_in(&text));
+        Ok(values_in(&text))
+    }
+}
+
+/// Examples that measure, and what the rows that they give begin with.
+pub(crate) const EXAMPLES: [(&str, &str); 6] = [
+    ("tick_host", "tick_host"),
+    ("plant_speed", "plant_"),
+    ("frame_speed", "frame_"),
+    ("xpbd_speed", "xpbd_"),
+    ("ultrasound_speed", "ultrasound_"),
+    ("diagnosis_growth", "diagnose_growth"),
+];
+
+/// Builds an example with the one build of everything, and runs it.
+pub(crate) fn example(name: &str) -> Result<Values, Failure> {
+    let program = built(&["--example", name], &format!("examples/{name}"))?;
+    shell::output(&mut Command::new(program)).map(|text| values_in(&text))
+}
+
+/// Other people's solvers on the same tasks, in Python, and the rows that they stand beside.
+pub(crate) const PEERS: [(&str, &str); 3] =
+    [("plant.py", "plant_core_ticks"), ("soft_body.py", "xpbd_step"), ("bmode.py", "ultrasound_")];
+/// The Python packages that the peers need.
+pub(crate) const PEERS_PACKAGES: [&str; 3] = ["numpy==2.4.6", "mujoco==4.0.0", "scipy==1.17.1"];
+
+/// Runs one of them: it prints the row that it stands beside.
+pub(crate) fn peer(script: &str) -> Result<Values, Failure> {
+    shell::output(&mut python(script)?).map(|text| values_in(&text))
+}
+
+/// A peer's program, ready to be run where MuJoCo may leave its log; on one core, as ours.
+pub(crate) fn python(script: &str) -> Result<Command, Failure> {
+    let mut command = Command::new(setup::python(&PEERS_PACKAGES)?);
+    command.current_dir(shell::target());
+    command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+    command.arg(shell::top().join("xtask/peers").join(script));
+    Ok(command)
+}
+
+/// One, ten and thirty devices with their instructor: a build of its own, with Zenoh.
+pub(crate) fn class() -> Result<Values, Failure> {
+    let mut test = cargo();
+    test.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/class", "--test", "class", "--"]);
+    test.args(["--ignored", "--nocapture", "thirty_devices_cost_less_than_a_core"]);
+    shell::output(&mut test).map(|text| values_in(&text))
+}
