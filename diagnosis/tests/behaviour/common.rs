@@ -1,5 +1,5 @@
 //! A small simulator for calibrating thresholds: written from the physics, apart from the crate's own effect models.
-#![allow(dead_code, unreachable_pub, missing_docs)]
+#![allow(dead_code, unused_imports, unreachable_pub, missing_docs)]
 
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
