@@ -1,4 +1,4 @@
-//! The emulator's core with three things added: its accesses go over the board's own bus ([`super::bus`]), the instructions of
+//! The emulator's core with three things added: its accesses go over the board's own bus (`bus`), the instructions of
 //! one interrupt handler can be counted, and a fault can be injected by moving the program counter.
 //!
 //! Nothing here changes what the firmware sees: the bus answers at the addresses of the manual.
