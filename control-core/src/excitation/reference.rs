@@ -49,7 +49,7 @@ struct Leg {
 }
 
 impl Reference {
-    /// From the beginning. The signal has passed [`Excitation::check`].
+    /// From the beginning. The signal has passed `Excitation::check`.
     pub fn new(signal: &Signal) -> Self {
         let mut reference = Self {
             signal: signal.clone(),
