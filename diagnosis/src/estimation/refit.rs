@@ -89,7 +89,8 @@ const LOOSE: f64 = 0.5;
 
 /// Anchors the inertia if the rig hardly knows it: slow motion under a speed loop is explained as well by an axis too heavy to
 /// be moved as by forces in balance. Regressing the command on the motion, rather than the motion on the command, has
-/// no such way out; what it finds anchors the fits that follow.
+/// no such way out; what it finds anchors the fits that follow. A result out of reach is ignored: if the largest forces are missing
+/// from the model, the motion says nothing about the inertia.
 fn anchor(nominal: &mut Nominal, fit: &Fit) {
     let size = fit.keys.len();
     // Unknowns: the data's own column takes the place of the gain's.
@@ -121,12 +122,16 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
     }
     let solution = bounded(&m, &b, &vec![Prior::FREE; size]);
     let place = fit.places[0][0];
-    let inverse = solution.x[place];
-    if inverse * nominal.gain() > 0.0 {
-        let reach = 40.0;
-        let gain = (1.0 / inverse).abs().clamp(nominal.gain().abs() / reach, nominal.gain().abs() * reach);
-        nominal.anchor = Some((gain * nominal.gain().signum(), 0.3));
-    }
+    nominal.anchor = anchored(1.0 / solution.x[place], nominal.gain()).map(|gain| (gain, 0.3));
+}
+
+/// Factor by which a gain over inertia that is hardly known may differ from the rig's.
+const ANCHOR_REACH: f64 = 40.0;
+
+/// Returns the gain over inertia that was found, if it has the sign of the rig's and is within reach of it.
+fn anchored(found: f64, nominal: f64) -> Option<f64> {
+    let reach = ANCHOR_REACH.recip()..ANCHOR_REACH;
+    reach.contains(&(found / nominal)).then_some(found)
 }
 
 /// The sign with which the measured load acts, where it is seen to act as a load does.
@@ -230,6 +235,15 @@ mod tests {
             ..Recording::default()
         };
         BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0))
+    }
+
+    #[test]
+    fn a_gain_out_of_reach_anchors_nothing() {
+        assert_eq!(anchored(-30.0, -2.0), Some(-30.0));
+        assert_eq!(anchored(100.0, 2.0), None, "too light");
+        assert_eq!(anchored(0.01, 2.0), None, "too heavy");
+        assert_eq!(anchored(-3.0, 2.0), None, "of the wrong sign");
+        assert_eq!(anchored(f64::INFINITY, 2.0), None);
     }
 
     #[test]
