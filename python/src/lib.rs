@@ -1,6 +1,7 @@
 //! The diagnosis for Python. Rigs come as TOML and recordings as CSV, in the forms of `docs/recordings.md`, so that Python and the command
 //! line refuse the same things with the same sentences; the Python side turns frames and files into them. Nothing here computes.
 
+use convert::import;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::replay::Beside;
@@ -8,7 +9,6 @@ use diagnosis::{Outcome, diagnose_recordings};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
-use recording::import;
 use std::path::PathBuf;
 
 create_exception!(

@@ -1,14 +1,15 @@
 //! `host-sim characterise`: recordings that tell one physical effect from another.
 
 use super::confirm::needle_is_out;
-use super::progress::Progress;
-use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
-use host_sim::serial::SerialPort;
 use lab::characterise::mechanism::BareDevice;
 use lab::characterise::{self, News, programme, written};
+use live::progress::Progress;
+use live::serial::SerialPort;
+use live::serving::stop_on_signals;
+use live::{examples, say};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

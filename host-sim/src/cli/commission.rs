@@ -1,16 +1,17 @@
 //! `host-sim commission`: how a device is wired and built, found out before anybody holds its needle.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::device::Port;
 use device_sim::failure::Failure;
-use host_sim::serial::SerialPort;
 use lab::characterise::mechanism::Wiring;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
 use lab::commission::{self, Outcome, Step, Wish};
+use live::serial::SerialPort;
+use live::serving::stop_on_signals;
+use live::{examples, say};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

@@ -1,16 +1,17 @@
 //! `host-sim compensate`: what a diagnosis found, fed forward by the device.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::serving::stop_on_signals;
 use clap::Args;
 use device_sim::device::Port;
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
-use host_sim::serial::SerialPort;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
 use lab::compensate::{self, Step, files};
+use live::serial::SerialPort;
+use live::serving::stop_on_signals;
+use live::{examples, say};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

@@ -4,6 +4,7 @@ use super::Cli;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 use device_sim::failure::Failure;
+use live::{examples, say};
 
 /// Print a script with which a shell completes commands and options.
 #[derive(Args)]

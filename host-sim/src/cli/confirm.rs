@@ -1,8 +1,8 @@
 //! The consent of a person before a motor moves: on the terminal, or in the page of a guide.
 
-use super::output;
 use clap::Args;
 use device_sim::failure::Failure;
+use live::output;
 use server::guide::Guide;
 use server::visualizer::{self, Server};
 use std::fmt::Display;

@@ -1,9 +1,10 @@
 //! `host-sim diagnose`: which physics the simulation leaves out.
 
-use super::progress::Progress;
 use clap::Args;
 use device_sim::failure::Failure;
 use diagnosis::{Made, Request};
+use live::progress::Progress;
+use live::{examples, say};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::path::PathBuf;

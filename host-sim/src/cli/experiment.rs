@@ -3,6 +3,7 @@
 use clap::Args;
 use device_sim::failure::Failure;
 use experiment::{Case, design};
+use live::{examples, say};
 use std::path::PathBuf;
 
 /// The longest input, s.

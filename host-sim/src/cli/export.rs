@@ -3,6 +3,7 @@
 use device_sim::failure::Failure;
 use diagnosis::report::exports::{Format, export};
 use diagnosis::rig::Rig;
+use live::say;
 use std::path::Path;
 
 /// The formats of `--export`.

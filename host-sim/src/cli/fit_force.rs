@@ -3,6 +3,7 @@
 use clap::Args;
 use device_sim::failure::Failure;
 use lab::force_fit::{self, Fit, insertions, page, table::Origin, written};
+use live::{examples, say};
 use std::path::{Path, PathBuf};
 
 /// Fit the force table of seed 000, F(depth, speed, angle), to insertions at several speeds and angles.

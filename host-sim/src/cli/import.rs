@@ -1,9 +1,10 @@
 //! `host-sim import`: recordings as people have them, made into what `diagnose` reads.
 
 use clap::Args;
+use convert::import::{self, Keep, Known, Request, RigValues};
+use convert::shell::quoted;
 use device_sim::failure::Failure;
-use recording::import::{self, Keep, Known, Request, RigValues};
-use recording::shell::quoted;
+use live::{examples, note, say};
 use std::path::PathBuf;
 
 /// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.

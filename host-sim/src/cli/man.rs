@@ -3,6 +3,7 @@
 use super::Cli;
 use clap::{Args, CommandFactory};
 use device_sim::failure::Failure;
+use live::{examples, say};
 use std::path::PathBuf;
 
 /// Write a manual page for the program and for each of its commands.

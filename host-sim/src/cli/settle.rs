@@ -1,14 +1,15 @@
 //! `host-sim settle`: the device asks itself what the recordings cannot tell.
 
 use super::confirm::{Consent, ConsentFlags};
-use super::serving::stop_on_signals;
 use clap::{Args, ValueEnum};
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
-use host_sim::serial::SerialPort;
 use lab::settle::{
     self, Feel, Inputs, MOST_MOTION_S, MOST_ROUNDS, Plant, Progress, Settings, Settled, Subject,
 };
+use live::serial::SerialPort;
+use live::serving::stop_on_signals;
+use live::{examples, note, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

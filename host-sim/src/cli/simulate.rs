@@ -1,6 +1,7 @@
 //! `host-sim simulate`: the motion that a user sees, beside the recording.
 
 use clap::Args;
+use convert::simulated;
 use device_sim::failure::Failure;
 use diagnosis::recording::Recording;
 use diagnosis::report::{motion_picture, simulation_page};
@@ -8,7 +9,7 @@ use diagnosis::rig::Rig;
 use diagnosis::simulation::comparison::Comparison;
 use diagnosis::simulation::replay::WINDOWS_S;
 use diagnosis::simulation::value_fit;
-use recording::simulated;
+use live::{examples, say};
 use std::path::{Path, PathBuf};
 
 /// Run the nominal, refitted and patched simulation and compare them with a recording: free run, windows of 0.05 to 5 s, and

@@ -2,8 +2,8 @@
 
 use crate::common::{figure, folder, refused, run, run_well, text};
 use control_core::controller::Sample;
-use recording::export::stretches;
 use recording::read::Recording;
+use recording::stretches::stretches;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -2,13 +2,14 @@
 
 use crate::common::{folder, run_well, text};
 use control_core::controller::Sample;
+use convert::export::export;
 use device_sim::failure::Failure;
 use device_sim::profile::Profile;
 use link::device::{Endpoint, Identity};
 use link::frames::{Event, EventKind, Hello};
-use recording::export::{export, stretches};
 use recording::messages::{Link, Setup};
 use recording::read::Recording;
+use recording::stretches::stretches;
 use recording::write::Recorder;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 use training::score::score;

@@ -8,8 +8,8 @@ use device_sim::procedure::task::Task;
 use device_sim::profile::Profile;
 use device_sim::session::Batch;
 use link::frames::EventKind;
-use recording::export::Stretch;
 use recording::messages::Hello;
+use recording::stretches::Stretch;
 
 /// Samples kept while the needle is outside: an event may be told a moment before or after its samples. 0.5 s.
 const OUTSIDE: usize = TICK_HZ as usize / 2;

@@ -45,7 +45,7 @@ pub(super) const STILL_TO_CLEAN: &[&str] = &[
     "diagnosis/src/report/",
     "firmware/",
     "host-sim/lab/src/force_fit/",
-    "host-sim/recording/src/import/",
+    "host-sim/convert/src/import/",
     "host-sim/training/src/practice.rs",
     "host-sim/device-sim/src/procedure.rs",
     "host-sim/reproduce/src/",

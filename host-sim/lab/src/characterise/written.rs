@@ -2,9 +2,9 @@
 
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
+use convert::export::{self, write};
 use device_sim::failure::Failure;
 use diagnosis::rig::Rig;
-use recording::export::{self, write};
 use recording::messages::Hello;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,8 +3,8 @@
 
 use control_core::TICK_HZ;
 use device_sim::failure::Failure;
-use recording::export::stretches;
 use recording::read::Recording;
+use recording::stretches::stretches;
 use std::path::Path;
 
 /// A way in that is shorter than this says nothing of a force over depth, mm.

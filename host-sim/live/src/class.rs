@@ -1,7 +1,7 @@
 //! `host-sim class`: the instructor's page; and the flags by which `run` joins a class.
 
-use super::output;
-use super::serving::stop_on_signals;
+use crate::output;
+use crate::serving::stop_on_signals;
 use clap::Args;
 use control_core::Device;
 use device_sim::failure::Failure;
@@ -26,7 +26,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 #[command(after_help = examples!("Examples:
   host-sim class ward-3
   host-sim class ward-3 --listen 192.168.1.20:7447 --class-token a-long-secret"))]
-pub(crate) struct Class {
+pub struct Class {
     /// Name of the class: letters, digits, ._-
     name: Name,
     /// Address that devices connect to; one that other computers reach needs --class-token

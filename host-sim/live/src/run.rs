@@ -1,11 +1,12 @@
 //! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
 
-use super::class::ClassFlags;
-use super::output;
-use super::progress::Progress;
-use super::serving::stop_on_signals;
-use super::streams::StreamFlags;
-use super::training::without_insertion;
+use crate::class::ClassFlags;
+use crate::output;
+use crate::progress::Progress;
+use crate::serial::SerialPort;
+use crate::serving::stop_on_signals;
+use crate::streams::StreamFlags;
+use crate::training::without_insertion;
 use clap::{Args, ValueEnum};
 use control_core::{Device, TICK_HZ};
 use device_sim::device::part::DevicePart;
@@ -15,7 +16,6 @@ use device_sim::failure::Failure;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{Model, Profile};
 use device_sim::session::{self, Session, Source, Subscription};
-use host_sim::serial::SerialPort;
 use recording::messages::Setup;
 use recording::read::Recording;
 use recording::tally::Tally;
@@ -43,7 +43,7 @@ use training::debrief;
   host-sim run --model sparte
   host-sim run --device /dev/ttyACM0 --record session.mcap
   host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
-pub(crate) struct Run {
+pub struct Run {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,

@@ -19,7 +19,7 @@ pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Failure> {
 }
 
 fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {
-    let options = WriteOptions::new().profile("").library(crate::version::program());
+    let options = WriteOptions::new().profile("").library(recording::version::program());
     let mut writer = Writer::with_options(Cursor::new(Vec::new()), options.compression(None))?;
     let schema = writer.add_schema("Motion", "jsonschema", schema(compared).to_string().as_bytes())?;
     let none = BTreeMap::new();

@@ -10,7 +10,7 @@ const INTERVAL: Duration = Duration::from_millis(100);
 const AGAIN: Duration = Duration::from_secs(5);
 
 /// A line that is drawn over.
-pub(crate) struct Progress {
+pub struct Progress {
     what: &'static str,
     on: bool,
     verbose: bool,
@@ -22,11 +22,11 @@ pub(crate) struct Progress {
 
 impl Progress {
     /// Quiet unless standard error is a terminal, and with `--quiet`.
-    pub(crate) fn new(what: &'static str) -> Self {
+    pub fn new(what: &'static str) -> Self {
         Self {
             what,
-            on: std::io::stderr().is_terminal() && !super::output::is_quiet(),
-            verbose: super::output::is_verbose(),
+            on: std::io::stderr().is_terminal() && !crate::output::is_quiet(),
+            verbose: crate::output::is_verbose(),
             stage: String::new(),
             drawn: None,
             begun: Instant::now(),
@@ -34,7 +34,7 @@ impl Progress {
     }
 
     /// Shows `done` of `all`, where that is known.
-    pub(crate) fn show(&mut self, done: f64, all: Option<f64>, unit: &str) {
+    pub fn show(&mut self, done: f64, all: Option<f64>, unit: &str) {
         let is_due = |interval| self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
         let is_wanted =
             if self.verbose { self.stage != unit || is_due(AGAIN) } else { self.on && is_due(INTERVAL) };

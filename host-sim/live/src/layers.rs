@@ -8,7 +8,7 @@ use serde_json::json;
 /// List what a needle meets on a straight line into a body: structures with mm along the needle, and the layers that the device gets
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim layers --profile forearm --along 10 --around 5 --angle 45"))]
-pub(crate) struct Layers {
+pub struct Layers {
     /// A patient with a [body]: shoulder-joint, forearm, knee, hip, or a TOML file
     #[arg(long, default_value = "forearm")]
     profile: String,

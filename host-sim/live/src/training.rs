@@ -1,11 +1,10 @@
-//! `host-sim score`, `debrief`, `profiles` and `reproduce`: what a teacher asks for.
+//! `host-sim score`, `debrief` and `profiles`: what a teacher asks for.
 
-use super::recordings::read;
+use crate::replay::read;
 use clap::Args;
 use device_sim::failure::Failure;
 use device_sim::patients;
 use device_sim::profile::{BUILT_IN, Profile};
-use reproduce::{PAPERS, Paper, reproduce};
 use std::path::{Path, PathBuf};
 use training::debrief;
 use training::score::tasks::{TaskResult, Tasks};
@@ -17,7 +16,7 @@ use training::xapi::statements;
 /// docs/training.md explains each figure.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim score session.mcap --profile adult"))]
-pub(crate) struct Score {
+pub struct Score {
     /// The recording
     #[arg(value_name = "FILE.mcap")]
     file: PathBuf,
@@ -38,7 +37,7 @@ pub(crate) struct Score {
 /// Write a page to print: the gesture over the anatomy, force against depth, the figures, the first and the last attempt compared.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim debrief monday.mcap friday.mcap --out debrief"))]
-pub(crate) struct Debrief {
+pub struct Debrief {
     /// Recordings, in the order of the attempts
     #[arg(value_name = "FILE.mcap", required = true)]
     files: Vec<PathBuf>,
@@ -56,22 +55,10 @@ pub(crate) struct Debrief {
 /// List the patients, each with a picture of its layers to scale.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim profiles my-patient.toml"))]
-pub(crate) struct Profiles {
+pub struct Profiles {
     /// Patients to show, by name or as files; without any, all built-in ones
     #[arg(value_name = "NAME|FILE")]
     wanted: Vec<String>,
-}
-
-/// Run the papers' procedures on the virtual device and write a page for each, with the paper's numbers and ours.
-#[derive(Args)]
-#[command(after_help = examples!("Example: host-sim reproduce --paper 001 --out papers"))]
-pub(crate) struct Reproduce {
-    /// One paper by its number: 000, 001 or 002; without it, all three
-    #[arg(long, value_name = "N")]
-    paper: Option<String>,
-    /// Folder to write the pages and their recordings to; created if missing
-    #[arg(long, value_name = "DIR", default_value = "papers")]
-    out: PathBuf,
 }
 
 impl Score {
@@ -107,7 +94,7 @@ fn check(insertions: &[Insertion], file: &Path) -> Result<(), Failure> {
     if insertions.is_empty() { Err(without_insertion(file)) } else { Ok(()) }
 }
 
-pub(super) fn without_insertion(file: &Path) -> Failure {
+pub(crate) fn without_insertion(file: &Path) -> Failure {
     Failure::input(format_args!(
         "{}: it has no insertion: the needle never touched the skin; record one first",
         file.display()
@@ -213,29 +200,5 @@ impl Profiles {
             say!("{}", patients::picture(profile));
         }
         Ok(())
-    }
-}
-
-impl Reproduce {
-    pub(crate) fn run(self) -> Result<(), Failure> {
-        let wanted: Vec<Paper> = match &self.paper {
-            None => PAPERS.to_vec(),
-            Some(number) => PAPERS.into_iter().filter(|p| p.number() == number).collect(),
-        };
-        if wanted.is_empty() {
-            return Err(Failure::input(format_args!(
-                "--paper is {}; it must be 000, 001 or 002",
-                self.paper.unwrap_or_default()
-            )));
-        }
-        // One that cannot be run must not cost the others.
-        let mut outcome = Ok(());
-        for paper in wanted {
-            match reproduce(paper, &self.out) {
-                Ok(page) => say!("{}", page.display()),
-                Err(why) => outcome = outcome.and(Err(why)),
-            }
-        }
-        outcome
     }
 }

@@ -12,19 +12,19 @@ static VERBOSE: AtomicBool = AtomicBool::new(false);
 static NO_BROWSER: AtomicBool = AtomicBool::new(false);
 
 /// Notes what the command line asks for; what was asked for once stays so.
-pub(crate) fn set(quiet: bool, verbose: bool, no_browser: bool) {
+pub fn set(quiet: bool, verbose: bool, no_browser: bool) {
     QUIET.fetch_or(quiet, Ordering::Relaxed);
     VERBOSE.fetch_or(verbose, Ordering::Relaxed);
     NO_BROWSER.fetch_or(no_browser, Ordering::Relaxed);
 }
 
 /// Returns true if only results and errors are printed.
-pub(crate) fn is_quiet() -> bool {
+pub fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
 /// Returns true if each stage is printed with its time.
-pub(crate) fn is_verbose() -> bool {
+pub fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }
 
@@ -34,7 +34,7 @@ fn takes_colours() -> bool {
 }
 
 /// Says where a page is, and opens it where this program does so.
-pub(crate) fn page(what: &str, url: &str) {
+pub fn page(what: &str, url: &str) {
     note!("{what} at {url}");
     if OPENS_BROWSER && !NO_BROWSER.load(Ordering::Relaxed) {
         open(url);
@@ -42,7 +42,7 @@ pub(crate) fn page(what: &str, url: &str) {
 }
 
 /// Prints the address of a page for other computers, and the same as a QR code for a camera.
-pub(crate) fn page_for_others(url: &str) {
+pub fn page_for_others(url: &str) {
     note!("for tablets and phones: {url}");
     // An address always fits.
     if let Ok(code) = qrcode::QrCode::new(url) {

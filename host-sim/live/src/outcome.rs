@@ -1,0 +1,58 @@
+//! The end of a program: help goes to standard output, a failure is one line and an exit status, 1 if the request failed, 2 for unusable
+//! input.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use device_sim::failure::Failure;
+use std::process::ExitCode;
+
+/// Carries out a command line that was parsed, and returns the program's exit status.
+pub fn finish<T>(parsed: Result<T, clap::Error>, run: impl FnOnce(T) -> Result<(), Failure>) -> ExitCode {
+    let result = match parsed {
+        Ok(command) => run(command),
+        Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            // Help may go into a closed pipe.
+            let _ = error.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => Err(usage(&error)),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("host-sim: {failure}");
+            ExitCode::from(failure.status())
+        }
+    }
+}
+
+/// Returns the parser's message, in one sentence.
+fn usage(error: &clap::Error) -> Failure {
+    let drawn = error.to_string();
+    // The last line of help that the parser names: of the command that was asked for.
+    let help = drawn.lines().find_map(|line| line.trim().strip_prefix("Usage: ")).map_or(
+        "host-sim --help".into(),
+        |usage| {
+            let command: Vec<&str> =
+                usage.split_whitespace().take_while(|word| !word.starts_with(['-', '<', '['])).collect();
+            format!("{} --help", command.join(" "))
+        },
+    );
+    if let Some(ContextValue::Strings(missing)) =
+        error.get(ContextKind::InvalidArg).filter(|_| error.kind() == ErrorKind::MissingRequiredArgument)
+    {
+        let (what, them) = if missing.len() == 1 { ("is", "it") } else { ("are", "them") };
+        return Failure::input(format_args!(
+            "{} {what} missing; add {them}, see {help}",
+            missing.join(" and ")
+        ));
+    }
+    let said: Vec<&str> = drawn
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
+        .filter(|line| !line.is_empty())
+        .map(|line| line.trim_start_matches("tip: "))
+        .collect();
+    let said = said.join("; ");
+    Failure::input(format_args!("{}; see {help}", said.trim_start_matches("error: ")))
+}
