@@ -34,7 +34,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn the_whole_program_gets_every_argument_and_its_status_is_returned() {
+fn arguments_go_to_the_whole_program_and_its_status_returns() {
     let dir = folder("beside");
     script(&dir.join("host-sim"), "for word in \"$@\"; do echo \"<$word>\"; done; exit 7");
     let output = needle(&dir, &["--quiet", "diagnose", "--out", "a b", "--help"], None);
