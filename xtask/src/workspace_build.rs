@@ -14,3 +14,27 @@ pub(crate) fn built(which: &[&str], below: &str) -> Result<PathBuf, Failure> {
     shell::run(cargo().args(["build", "--quiet"]).args(BUILD).args(which))?;
     Ok(shell::target().join("release").join(below))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    /// Every crate of a selection of packages, with its features.
+    fn crates(selection: &[&str]) -> BTreeSet<String> {
+        let mut tree = cargo();
+        tree.args(["tree", "--quiet", "-e", "normal,build", "--prefix", "none", "--format", "{p} {f}"]);
+        let text = shell::output(tree.args(selection)).expect("cargo shows the crates");
+        text.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
+    }
+
+    #[test]
+    fn every_selection_is_built_of_the_same_crates() {
+        let everything = crates(&["--workspace"]);
+        for selection in [&[][..], &["-p", "needle-diagnosis"]] {
+            let own = crates(selection);
+            let others: Vec<_> = own.difference(&everything).collect();
+            assert!(others.is_empty(), "{selection:?}: host-sim/same-features does not cover {others:#?}");
+        }
+    }
+}
