@@ -15,3 +15,6 @@ pub mod pc;
 pub mod rig;
 pub mod scenario;
 pub mod usb_host;
+
+/// The variable of the environment by which `cargo xtask bench` asks a test to measure for longer than it needs to pass or fail.
+pub const BENCH: &str = "NEEDLE_BENCH";

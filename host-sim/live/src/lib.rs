@@ -70,7 +70,7 @@ impl Options {
 #[derive(Subcommand)]
 pub enum Command {
     #[allow(missing_docs, reason = "their texts are the commands' help")]
-    Run(run::Run),
+    Run(Box<run::Run>),
     #[allow(missing_docs, reason = "as above")]
     Class(class::Class),
     #[allow(missing_docs, reason = "as above")]

@@ -49,7 +49,8 @@ impl TestModule {
     /// Runs the tests of the file.
     pub(crate) fn run(&self, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
         let mut run = cargo();
-        run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
+        // As `BENCH` of the crate `tests`.
+        run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT)).env("NEEDLE_BENCH", "1");
         run.arg("test").args(BUILD).args(["--quiet", "--test", self.program, "--"]);
         run.args(["--nocapture", &format!("{}::", self.name)]);
         // A test that fails its bound has printed what it measured.
