@@ -7,7 +7,7 @@ use crate::estimation::effective_command::effective_command;
 use crate::estimation::filter::Noise;
 use crate::estimation::input::{Input, Total};
 use crate::estimation::nominal::{Key, Nominal};
-use crate::estimation::regressors::effect_inputs;
+use crate::estimation::regressors::kept_inputs;
 use crate::numerics::linear::Prior;
 
 /// One column over one recording.
@@ -81,7 +81,7 @@ impl Model {
             push(Key::External, Input::Held(force.clone()), false);
         }
         for (index, effect) in self.effects.iter().enumerate() {
-            for (term, input) in effect_inputs(track, effect, command, self.bias_on(track), || drive.clone())
+            for (term, input) in kept_inputs(track, effect, command, self.bias_on(track), || drive.clone())
                 .into_iter()
                 .enumerate()
             {
