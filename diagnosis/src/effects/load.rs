@@ -27,6 +27,8 @@ pub(crate) struct Load {
     /// Acceleration of the whole machine per unit of the measured load, and by its weight.
     per_force: f64,
     weight: f64,
+    /// The last tilt, rad, and its sine.
+    tilt: (f64, f64),
     /// Deceleration of the load by its own dry friction, and its friction over that of the whole machine, per inertia.
     coast: f64,
     share: f64,
@@ -78,6 +80,7 @@ impl Load {
             viscous: get("viscous", 0.0),
             per_force: get("per_force", 0.0),
             weight: get("weight", 0.0),
+            tilt: (0.0, 0.0),
             coast,
             share: if dry > 0.0 { coast / dry } else { 1.0 },
             limit: get("limit", f64::INFINITY),
@@ -132,14 +135,25 @@ impl Load {
         (sum / steps - missed) / self.per_command
     }
 
-    fn held(&self, s: &State) -> Held {
+    fn held(&mut self, s: &State) -> Held {
         let way = if s.velocity == 0.0 { 0.0 } else { s.velocity.signum() };
         let friction = self.dry * way + self.viscous * s.velocity;
-        let pulled = (self.per_force * s.external + self.weight * s.tilt.sin() + s.bias) / self.ratio;
+        let pulled = (self.per_force * s.external + self.weigh(s.tilt) + s.bias) / self.ratio;
         Held {
             apart: (1.0 + self.ratio) * pulled + (1.0 + self.ratio * (1.0 - self.share)) * friction,
             missed: (1.0 - self.share) * friction + pulled,
         }
+    }
+
+    /// Acceleration by the weight; the sine is taken once for every tilt.
+    fn weigh(&mut self, tilt: f64) -> f64 {
+        if self.weight == 0.0 {
+            return 0.0;
+        }
+        if self.tilt.0 != tilt {
+            self.tilt = (tilt, tilt.sin());
+        }
+        self.weight * self.tilt.1
     }
 
     /// Deceleration of the load by its own friction; near rest it holds rather than brakes.

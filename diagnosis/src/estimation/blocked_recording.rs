@@ -4,23 +4,11 @@
 use crate::estimation::blocks::{Blocks, Rows};
 use crate::estimation::filter::Observed;
 use crate::estimation::input::{Input, Total};
+use crate::estimation::kept::{BlockMotion, Kept};
+use crate::estimation::slices::Slice;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use std::sync::Arc;
-
-/// The motion of a recording, block by block.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct BlockMotion {
-    /// Position and velocity at the middle of each block: from the smoother where the recording is fitted, from the filter where it judges.
-    pub(crate) x: Vec<f64>,
-    pub(crate) v: Vec<f64>,
-    /// Blocks where the axis rests or the sign of its speed is not known.
-    pub(crate) rest: Vec<bool>,
-    /// Blocks in the middle of a rest: friction is a reaction there and cancels every input.
-    pub(crate) stuck: Vec<bool>,
-    /// Speed below which its sign is not known.
-    pub(crate) speed_floor: f64,
-}
 
 /// Jumps of the reading that were found, block by block.
 #[derive(Debug, Clone, Default)]
@@ -44,6 +32,8 @@ pub(crate) struct BlockedRecording {
     pub(crate) place: Option<usize>,
     /// Acceleration by the force that is there all the time, of a model fitted before.
     pub(crate) bias: f64,
+    /// Its nominal columns as they were under some noises.
+    pub(super) kept: Kept,
 }
 
 impl BlockedRecording {
@@ -60,8 +50,10 @@ impl BlockedRecording {
     }
 
     fn cut(recording: &Recording, rig: &Rig, lead_s: f64) -> Self {
-        let rows = Rows::new(recording, rig);
+        let mut rows = Rows::new(recording, rig);
         let blocks = Blocks::new(recording, rig, &rows, lead_s);
+        rows.of_contact.place_in(&blocks.span);
+        rows.of_grip.place_in(&blocks.span);
         let n = blocks.span.len();
         let motion = BlockMotion {
             x: blocks.z.clone(),
@@ -78,6 +70,7 @@ impl BlockedRecording {
             unknown: vec![false; n],
             place: None,
             bias: 0.0,
+            kept: Kept::default(),
         }
     }
 
@@ -119,12 +112,13 @@ impl BlockedRecording {
         if b > a { (self.motion.v[b] - self.motion.v[a]) / (middle(b) - middle(a)) } else { 0.0 }
     }
 
-    /// Velocity at a time since the start of a block, s, between those in the middles of the blocks.
-    pub(crate) fn velocity_within(&self, block: usize, time: f64) -> f64 {
-        let part = time / self.blocks.span[block] - 0.5;
-        let other =
-            if part < 0.0 { block.saturating_sub(1) } else { (block + 1).min(self.block_count() - 1) };
-        self.motion.v[block] + part.abs() * (self.motion.v[other] - self.motion.v[block])
+    /// Velocity in the middle of a slice of a block, between those in the middles of the blocks.
+    pub(crate) fn velocity_within(&self, block: usize, slice: &Slice) -> f64 {
+        let other = match slice.is_late {
+            true => (block + 1).min(self.block_count() - 1),
+            false => block.saturating_sub(1),
+        };
+        self.motion.v[block] + slice.aside * (self.motion.v[other] - self.motion.v[block])
     }
 
     /// Returns the input of an effective command; that of the command as sent where there is none.

@@ -65,6 +65,9 @@ pub(crate) struct Rows {
     /// Rows taken together for a resonance or a contact, and for a grip.
     pub(crate) of_contact: Slices,
     pub(crate) of_grip: Slices,
+    /// Mean command of each of these slices.
+    pub(crate) contact_command: Vec<f64>,
+    pub(crate) grip_command: Vec<f64>,
 }
 
 /// Blocks per second that are wanted: enough for friction, few enough for a minute at 10 kHz.
@@ -108,6 +111,8 @@ impl Rows {
             spread_input: none(),
             of_contact,
             of_grip,
+            contact_command: Vec::new(),
+            grip_command: Vec::new(),
         }
         .with_command(command)
     }
@@ -117,7 +122,9 @@ impl Rows {
         let command_input = self.input(&command);
         let lateness_input = self.input(&skew_columns::per_row_late(&command));
         let spread_input = self.input(&skew_columns::per_part_spread(&command));
-        Self { command, command_input, lateness_input, spread_input, ..self }
+        let contact_command = self.of_contact.means(&command, &self.hold);
+        let grip_command = self.of_grip.means(&command, &self.hold);
+        Self { command, command_input, lateness_input, spread_input, contact_command, grip_command, ..self }
     }
 
     /// Number of whole blocks.

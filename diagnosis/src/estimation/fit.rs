@@ -5,7 +5,7 @@ use crate::estimation::filter::{Gains, Noise, robust_loss};
 use crate::estimation::input::{Input, Total};
 use crate::estimation::model::{Column, Model, total};
 use crate::estimation::nominal::{Key, Nominal};
-use crate::numerics::linear::dot;
+use crate::estimation::whitened::{grams, nominal_columns};
 use crate::numerics::linear::{Prior, Solution, Square, bounded};
 use crate::numerics::parallel;
 use std::ops::Range;
@@ -32,14 +32,13 @@ pub(crate) struct Prepared {
 impl Prepared {
     pub(crate) fn new(model: &Model, nominal: &Nominal, track: &BlockedRecording, noise: &Noise) -> Self {
         let columns = model.columns(nominal, track, noise);
-        let observed = track.observed();
-        let gains = Gains::new(&observed, noise);
         let reference: Vec<f64> = columns.iter().map(|c| c.prior.mean).collect();
-        let at_reference = total(track, &columns, &reference);
-        let residual = gains.innovations(&observed, &at_reference);
-        let inputs: Vec<&Input> = columns.iter().map(|c| &c.input).collect();
-        let responses = gains.all_responses(&observed, &inputs);
-        let segments = grams(track, &responses, &residual);
+        let known = nominal_columns(track, noise, &columns);
+        let further: Vec<&Input> = columns[known.responses.len()..].iter().map(|c| &c.input).collect();
+        let mut responses = known.responses.clone();
+        responses.extend(known.gains.all_responses(&track.observed(), &further));
+        let segments = grams(track, &responses, &known.residual, Some(&known));
+        let (gains, residual) = (known.gains.clone(), known.residual.clone());
         let bounds = track.blocks.segments.clone();
         let weight = vec![1.0; segments.len()];
         let surcharges = surcharges(track, model);
@@ -127,24 +126,6 @@ fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
         _ => 0.0,
     };
     track.blocks.segments.windows(2).map(paid).collect()
-}
-
-/// Gram matrices of the columns and the residual, per segment.
-fn grams(track: &BlockedRecording, responses: &[Vec<f64>], residual: &[f64]) -> Vec<Square> {
-    let p = responses.len();
-    parallel::map(track.segment_count(), |s| {
-        let (a, b) = (track.blocks.segments[s], track.blocks.segments[s + 1]);
-        let mut m = Square::zero(p + 1);
-        let column = |i: usize| if i == p { &residual[a..b] } else { &responses[i][a..b] };
-        for i in 0..=p {
-            for j in 0..=i {
-                let x = dot(column(i), column(j));
-                m.a[i * (p + 1) + j] = x;
-                m.a[j * (p + 1) + i] = x;
-            }
-        }
-        m
-    })
 }
 
 /// A fitted model.

@@ -1,7 +1,7 @@
 //! Inputs of a model, block by block: each one, and the sum of all.
 
 /// The effect of an input over each block, from the state at the block's start.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Input {
     /// Acceleration held over each block, rad/s² or m/s² per unit.
     Held(Vec<f64>),

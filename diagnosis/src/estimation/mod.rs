@@ -2,11 +2,13 @@
 
 pub(crate) mod blocked_recording;
 pub(crate) mod blocks;
+pub(crate) mod covariance;
 pub(crate) mod effective_command;
 pub(crate) mod filter;
 pub(crate) mod fit;
 pub(crate) mod force_residual;
 pub(crate) mod input;
+pub(crate) mod kept;
 pub(crate) mod lost_counts;
 pub(crate) mod model;
 pub(crate) mod noise;
@@ -20,3 +22,4 @@ pub(crate) mod skew;
 pub(crate) mod skew_columns;
 pub(crate) mod slices;
 pub(crate) mod smoother;
+pub(crate) mod whitened;

@@ -1,10 +1,12 @@
 //! The size of sensor noise and disturbance: maximum likelihood of the innovations, by a deterministic pattern search.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::{Gains, Noise, Observed, robust_loss};
+use crate::estimation::covariance::rhos;
+use crate::estimation::filter::{Noise, Observed, innovations, robust_loss};
 use crate::estimation::input::Total;
 use crate::numerics::parallel;
 use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
 const LOOKED_AT: usize = 8000;
@@ -20,6 +22,8 @@ struct Excerpt<'a> {
     start: Vec<f64>,
     z: Vec<f64>,
     total: Total,
+    /// A correlation time, s, and the parts of the disturbance that are left after each block then: most trials of a search keep it.
+    left: Mutex<(f64, Arc<Vec<f64>>)>,
 }
 
 fn excerpts<'a>(track: &'a BlockedRecording, total: &Total) -> Vec<Excerpt<'a>> {
@@ -40,7 +44,15 @@ impl<'a> Excerpt<'a> {
         let (start, z) = (since_first(&track.blocks.start), since_first(&track.blocks.z));
         let cut = |column: &[f64]| column[over.clone()].to_vec();
         let total = Total { dv: cut(&total.dv), dq: cut(&total.dq), dz: cut(&total.dz) };
-        Self { track, over, start, z, total }
+        Self { track, over, start, z, total, left: Mutex::new((f64::NAN, Arc::default())) }
+    }
+
+    fn rhos(&self, tau: f64) -> Arc<Vec<f64>> {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        if left.0 != tau {
+            *left = (tau, Arc::new(rhos(&self.observed(), tau)));
+        }
+        Arc::clone(&left.1)
     }
 
     fn observed(&self) -> Observed<'_> {
@@ -63,8 +75,7 @@ impl<'a> Excerpt<'a> {
 fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
     let each = parallel::map_all(parts, |part| {
         let observed = part.observed();
-        let gains = Gains::new(&observed, noise);
-        let e = gains.innovations(&observed, &part.total);
+        let (e, log_det) = innovations(&observed, noise, &part.rhos(noise.tau), &part.total);
         let cost: f64 = e
             .chunks(STRETCH)
             .map(|e| {
@@ -72,7 +83,7 @@ fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
                 e.len() as f64 * robust_loss(square / e.len() as f64).0
             })
             .sum();
-        gains.log_det - 0.5 * cost
+        log_det - 0.5 * cost
     });
     each.iter().sum()
 }

@@ -5,6 +5,24 @@ use crate::effects::{Effect, Law, State, Variable};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::input::Input;
 
+/// The same inputs, kept from one model to the next where they are costly and rest on the command as recorded.
+pub(crate) fn kept_inputs(
+    track: &BlockedRecording,
+    effect: &Effect,
+    command: &[f64],
+    bias: f64,
+    drive: impl FnOnce() -> Input,
+) -> Vec<Input> {
+    let definition = effect.name.definition();
+    let is_costly =
+        definition.coupling().is_some() || (definition.is_periodic() && !definition.scales_drive());
+    let new = || effect_inputs(track, effect, command, bias, drive);
+    if !is_costly || !std::ptr::eq(command, track.rows.command.as_slice()) {
+        return new();
+    }
+    track.kept.inputs((&track.motion, &track.rows), (effect, bias), new)
+}
+
 /// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
 /// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.
 pub(crate) fn effect_inputs(
@@ -76,21 +94,30 @@ fn of_second_mass(
     command: &[f64],
     bias: f64,
 ) -> Input {
-    let slices = match coupling {
-        Coupling::Grip => &track.rows.of_grip,
-        Coupling::Stiff => &track.rows.of_contact,
+    let rows = &track.rows;
+    let (slices, of_recorded) = match coupling {
+        Coupling::Grip => (&rows.of_grip, &rows.grip_command),
+        Coupling::Stiff => (&rows.of_contact, &rows.contact_command),
     };
+    let is_recorded = std::ptr::eq(command, rows.command.as_slice());
+    let of_other = (!is_recorded).then(|| slices.means(command, &rows.hold));
+    let means = of_other.as_ref().unwrap_or(of_recorded);
     let mut out = [0.0];
-    let mut signal = Vec::new();
-    for (j, slices) in slices.blocks().enumerate() {
+    let mut signal = Vec::with_capacity(means.len());
+    for (j, (slices, means)) in slices.blocks().zip(means.chunks_exact(slices.per_block())).enumerate() {
         let (tilt, external) = (track.tilt_at(j), track.force_at(j));
-        for slice in slices {
-            let (command, hold) = (&command[slice.rows.clone()], &track.rows.hold[slice.rows.clone()]);
-            let mean = command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / slice.span;
-            let velocity = track.velocity_within(j, slice.start + 0.5 * slice.span);
-            let dt = slice.span;
-            let state =
-                State { drive: mean, command: mean, velocity, tilt, external, bias, dt, ..State::default() };
+        for (slice, mean) in slices.iter().zip(means) {
+            let (velocity, dt) = (track.velocity_within(j, slice), slice.span);
+            let state = State {
+                drive: *mean,
+                command: *mean,
+                velocity,
+                tilt,
+                external,
+                bias,
+                dt,
+                ..State::default()
+            };
             law.terms(&state, &mut out);
             signal.push(out[0]);
         }

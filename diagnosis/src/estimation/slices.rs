@@ -14,6 +14,9 @@ pub(crate) struct Slice {
     /// Sums over the rows of the time since the slice's start, s, and of half its square, s².
     tau1: f64,
     tau2: f64,
+    /// Part of the way from the middle of its block to that of the one before or after at which its own middle is.
+    pub(crate) aside: f64,
+    pub(crate) is_late: bool,
 }
 
 /// A recording's slices, as many in every block.
@@ -37,7 +40,8 @@ impl Slices {
                     tau2 += 0.5 * span * span;
                     span += h;
                 }
-                slices.push(Slice { rows: first..first + hold.len(), start, span, tau1, tau2 });
+                let rows = first..first + hold.len();
+                slices.push(Slice { rows, start, span, tau1, tau2, aside: 0.0, is_late: false });
                 first += hold.len();
                 start += span;
             }
@@ -45,9 +49,33 @@ impl Slices {
         Self { per_block: rows_per_block.div_ceil(rows), rows_per_block, slices }
     }
 
+    /// Says of each slice where in its block its middle is; `spans` are the lengths of the blocks, s.
+    pub(crate) fn place_in(&mut self, spans: &[f64]) {
+        for (slices, block) in self.slices.chunks_exact_mut(self.per_block).zip(spans) {
+            for slice in slices {
+                let part = (slice.start + 0.5 * slice.span) / block - 0.5;
+                (slice.aside, slice.is_late) = (part.abs(), part >= 0.0);
+            }
+        }
+    }
+
+    /// Mean of a command over each slice; `row_hold` is how long each row lasts.
+    pub(crate) fn means(&self, command: &[f64], row_hold: &[f64]) -> Vec<f64> {
+        let mean = |slice: &Slice| {
+            let (command, hold) = (&command[slice.rows.clone()], &row_hold[slice.rows.clone()]);
+            command.iter().zip(hold).map(|(u, h)| u * h).sum::<f64>() / slice.span
+        };
+        self.slices.iter().map(mean).collect()
+    }
+
     /// The slices of each block.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = &[Slice]> {
         self.slices.chunks_exact(self.per_block)
+    }
+
+    /// Number of slices in a block.
+    pub(crate) fn per_block(&self) -> usize {
+        self.per_block
     }
 
     /// Returns the input of a signal held slice by slice.

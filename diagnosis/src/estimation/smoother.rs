@@ -1,6 +1,6 @@
 //! The motion of a recording under a model's input, by the filter alone or by a fixed-interval smoother.
 
-use crate::estimation::filter::{
+use crate::estimation::covariance::{
     Covariance, Noise, Observed, Step, initial, predict, product, times, update,
 };
 use crate::estimation::input::Total;

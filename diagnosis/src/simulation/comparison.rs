@@ -91,7 +91,11 @@ impl Comparison {
         let motion = Motion::new(recording, first);
         let feedback = PositionLoop::fit(recording, &motion, first.actuator.gain);
         let simulated = |(name, rig): &(String, Rig)| {
-            let beside = Beside::new(recording, rig);
+            let has_same_counts = rig.encoder.counts_per_unit == first.encoder.counts_per_unit;
+            let beside = match has_same_counts {
+                true => Beside::in_motion(recording, motion.clone(), rig),
+                false => Beside::new(recording, rig),
+            };
             let free = beside.free_run(rig);
             let under = feedback.map(|feedback| beside.under_reference(rig, feedback));
             let whole = beside.motion.seconds();

@@ -69,15 +69,19 @@ pub struct Beside<'a> {
 impl<'a> Beside<'a> {
     /// A recording under a rig; the start is where absolute counts say, else where the rig's periodic effects fit the recording best.
     pub fn new(recording: &'a Recording, rig: &Rig) -> Self {
-        let motion = Motion::new(recording, rig);
+        Self::in_motion(recording, Motion::new(recording, rig), rig)
+    }
+
+    /// The same where the motion is known.
+    pub(super) fn in_motion(recording: &'a Recording, motion: Motion, rig: &Rig) -> Self {
         let mut beside = Self { recording, motion, start: 0.0 };
         if rig.model.gravity.is_some_and(|gravity| gravity != 0.0) {
             // Its counts have one zero, from which the gravity's angle counts.
             beside.start = recording.position_counts[0] / rig.encoder.counts_per_unit;
         } else if let Some(turn) = period(rig) {
-            let off = |start: f64| {
-                let at = Self { recording, motion: beside.motion.clone(), start };
-                at.spread(rig, 0.2, SEARCH_S).position
+            let mut off = |start: f64| {
+                beside.start = start;
+                beside.spread(rig, 0.2, SEARCH_S).position
             };
             let starts = (0..STARTS).map(|k| turn * k as f64 / STARTS as f64);
             let best = starts.map(|start| (off(start), start)).min_by(|a, b| a.0.total_cmp(&b.0));

@@ -6,6 +6,7 @@ use crate::effects::{CommandLaw, Effect};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
+use std::sync::OnceLock;
 
 /// Part of a dead band over which its inverse rises from one side to the other.
 const RAMP: f64 = 0.3;
@@ -25,13 +26,39 @@ pub(crate) struct Columns {
     pub(crate) sd: f64,
 }
 
-/// Returns the columns of an effect; none where a regression has no law of it. `asked` is the drive's force that the motion asks
-/// for, per recording and block.
+/// The drive's force that the motion asks for, on every recording.
+pub(crate) struct Asked {
+    /// N·m or N, per recording and block.
+    pub(crate) force: Vec<Vec<f64>>,
+    /// The recordings with the command that makes it; made when first needed.
+    tracks: OnceLock<Vec<BlockedRecording>>,
+}
+
+impl Asked {
+    pub(crate) fn new(force: Vec<Vec<f64>>) -> Self {
+        Self { force, tracks: OnceLock::new() }
+    }
+
+    fn tracks(&self, sights: &[Sight], scale: Scale) -> &[BlockedRecording] {
+        let with = |(sight, force): (&Sight, &Vec<f64>)| {
+            let mut track = BlockedRecording::clone(sight.track);
+            let last = track.rows.per_block;
+            let rows = track.rows.hold.len();
+            let command =
+                (0..rows).map(|row| force[(row / last).min(force.len() - 1)] / scale.gain).collect();
+            track.set_command(command);
+            track
+        };
+        self.tracks.get_or_init(|| sights.iter().zip(&self.force).map(with).collect())
+    }
+}
+
+/// Returns the columns of an effect; none where a regression has no law of it.
 pub(crate) fn columns(
     effect: &Effect,
     sights: &[Sight],
     nominal: &Nominal,
-    asked: &[Vec<f64>],
+    asked: &Asked,
 ) -> Option<Columns> {
     let definition = effect.name.definition();
     if definition.coupling().is_some() {
@@ -41,7 +68,7 @@ pub(crate) fn columns(
     if let Some(law) = CommandLaw::new(effect) {
         let column =
             |(sight, asked): (&Sight, &Vec<f64>)| Some(vec![sight.see(&more(&law, sight, asked, scale)?)]);
-        let of: Option<Vec<_>> = sights.iter().zip(asked).map(column).collect();
+        let of: Option<Vec<_>> = sights.iter().zip(&asked.force).map(column).collect();
         return Some(Columns {
             effect: effect.clone(),
             of: of?,
@@ -50,8 +77,10 @@ pub(crate) fn columns(
             sd: f64::INFINITY,
         });
     }
+    let with_asked = is_by_command(effect).then(|| asked.tracks(sights, scale));
+    let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
     let of: Vec<Vec<Vec<f64>>> =
-        sights.iter().zip(asked).map(|(sight, asked)| seen(effect, sight, asked, scale)).collect();
+        sights.iter().enumerate().map(|(r, sight)| seen(effect, sight, track(r))).collect();
     let terms = of.first()?.len();
     if terms == 0 {
         return None;
@@ -76,16 +105,7 @@ pub(crate) fn is_by_command(effect: &Effect) -> bool {
 }
 
 /// The columns of a law on force or reading, with the signs of the drive's side, per unit of force.
-fn seen(effect: &Effect, sight: &Sight, asked: &[f64], scale: Scale) -> Vec<Vec<f64>> {
-    let with_asked = is_by_command(effect).then(|| {
-        let mut track = BlockedRecording::clone(sight.track);
-        let last = track.rows.per_block;
-        let rows = track.rows.hold.len();
-        let command = (0..rows).map(|row| asked[(row / last).min(asked.len() - 1)] / scale.gain).collect();
-        track.set_command(command);
-        track
-    });
-    let track = with_asked.as_ref().unwrap_or(sight.track);
+fn seen(effect: &Effect, sight: &Sight, track: &BlockedRecording) -> Vec<Vec<f64>> {
     let sensor = effect.name.definition().in_sensor() || effect.name.definition().is_of_jumps();
     let sign = if sensor { 1.0 } else { -1.0 };
     let inputs = effect_inputs(track, effect, &track.rows.command, track.bias, || track.drive(None));

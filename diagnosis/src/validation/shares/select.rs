@@ -2,7 +2,7 @@
 
 use super::design::{Design, held_out};
 use super::forms::forms;
-use super::laws::{Columns, columns};
+use super::laws::{Asked, Columns, columns};
 use super::sight::{FEWEST_ROWS, Scale, Sight, priors};
 use crate::effects::definition::Unnamed;
 use crate::effects::{Effect, EffectName as N};
@@ -202,7 +202,7 @@ struct State<'a> {
     /// Mean squares that are left on folds of the fitted recordings and on held-out ones.
     left: (f64, f64),
     square: f64,
-    asked: Vec<Vec<f64>>,
+    asked: Asked,
 }
 
 impl<'a> State<'a> {
@@ -213,7 +213,7 @@ impl<'a> State<'a> {
         let x = fitted.solve(guess, |_| true);
         let square = fitted.left_by(&x);
         let left = (fitted.left_out(square), held_out(&fitted, &x, &there, square, &laws));
-        let asked = on.sights.iter().map(|sight| asked(on, sight, &x)).collect();
+        let asked = Asked::new(on.sights.iter().map(|sight| asked(on, sight, &x)).collect());
         Self { on, laws, left, square, asked }
     }
 
