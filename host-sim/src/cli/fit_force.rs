@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Reads recordings of this program (MCAP), or CSV with the columns time_s, depth_mm (along the needle), force_n and angle_deg. It is
 /// judged by the insertions of --holdout; without any, by each insertion in its turn, left out. Writes the table, which a profile's
-/// [force_table] takes, and beside it a page that shows measured against fitted.
+/// `[force_table]` takes, and beside it a page that shows measured against fitted.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim fit-force phantom/*.csv --out table.toml"))]
 pub(crate) struct FitForce {
