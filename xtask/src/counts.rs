@@ -4,8 +4,8 @@
 mod shares;
 
 use crate::setup;
-use crate::shell::{self, Failure};
-use crate::workspace_build::built;
+use crate::shell::{self, Failure, cargo};
+use crate::workspace_build::{ANY_RUST, built};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -74,16 +74,31 @@ fn file() -> PathBuf {
     shell::top().join("xtask/instruction-counts.txt")
 }
 
-/// Builds the example, and makes sure of valgrind.
-fn prepared() -> Result<PathBuf, Failure> {
-    if !shell::is_on_path("valgrind") {
-        setup::install(&["valgrind"], "counting instructions")?;
+/// The example that runs the hot paths.
+const EXAMPLE: [&str; 2] = ["--example", "hot_paths"];
+
+fn valgrind() -> Result<(), Failure> {
+    if shell::is_on_path("valgrind") {
+        Ok(())
+    } else {
+        setup::install(&["valgrind"], "counting instructions")
     }
-    built(&["--example", "hot_paths"], "examples/hot_paths")
+}
+
+/// Builds the example with line numbers, which the one build does not have, in a folder of its own.
+fn with_lines() -> Result<PathBuf, Failure> {
+    let folder = shell::target().join("with-lines");
+    let mut build = cargo();
+    build.env("CARGO_PROFILE_RELEASE_DEBUG", "line-tables-only").env("CARGO_TARGET_DIR", &folder);
+    shell::run(
+        build.args(["build", "--quiet", "-p", "host-sim"]).args(["--release", ANY_RUST]).args(EXAMPLE),
+    )?;
+    Ok(folder.join("release/examples/hot_paths"))
 }
 
 fn counted() -> Result<Counts, Failure> {
-    let program = prepared()?;
+    valgrind()?;
+    let program = built(&EXAMPLE, "examples/hot_paths")?;
     let mut counts = Counts::new();
     for path in &PATHS {
         let count = count(&program, path)?;
@@ -95,7 +110,8 @@ fn counted() -> Result<Counts, Failure> {
 
 /// The files of whose code each path spends its instructions; of the diagnosis all of it, and not the filter alone.
 fn print_shares() -> Result<(), Failure> {
-    let program = prepared()?;
+    valgrind()?;
+    let program = with_lines()?;
     for path in &PATHS {
         let is_own = path.function.starts_with("hot_paths::");
         let arguments: &[&str] = if is_own { &[path.name] } else { &[path.name, "whole"] };

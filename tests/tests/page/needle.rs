@@ -155,6 +155,9 @@ impl Grab {
     }
 }
 
+/// A depth outside at which the scripted hand begins, too, within a millimetre.
+pub(crate) const OUTSIDE_MM: f64 = -5.0;
+
 /// Drags the needle in single millimetres to each of `depths`, which lie behind the far wall, beyond its hub, and out again.
 fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> Result<(), Failure> {
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -4")?;
@@ -177,9 +180,10 @@ fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> R
     }
     let frozen = page.number("__stats.drawn.scale")?;
     check("the scale of the grab to its end", frozen == grab.scale, (size, grab.scale, frozen))?;
-    grab.move_to(page, grab.begin_mm)?;
+    // Not to where it was taken: the script may have gone on a little before.
+    grab.move_to(page, OUTSIDE_MM)?;
     page.wait("the needle outside", SOON, "__stats.depthMm < -4")?;
-    grab.let_go(page, grab.begin_mm)
+    grab.let_go(page, OUTSIDE_MM)
 }
 
 /// Waits until hand and needle are at `depth`: the needle lags by what its force bends the grip.

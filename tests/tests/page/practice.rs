@@ -1,7 +1,7 @@
 //! Practice in the page: a goal, a verdict after each withdrawal, the attempts compared with the best one, the learning curve, and
 //! recordings that never replace one another.
 
-use crate::needle::{A_FEW_INSERTIONS, Grab, SIZES, SOON, complaints, open};
+use crate::needle::{A_FEW_INSERTIONS, Grab, OUTSIDE_MM, SIZES, SOON, complaints, open};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -135,8 +135,9 @@ fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Fa
     for mm in way.iter().rev() {
         grab.move_to(page, *mm)?;
     }
+    grab.move_to(page, OUTSIDE_MM)?;
     page.wait("the needle outside", SOON, "__stats.depthMm < -3")?;
-    grab.let_go(page, grab.begin_mm)
+    grab.let_go(page, OUTSIDE_MM)
 }
 
 /// The link appears when a recording has ended, and leads to the debrief of its insertions.
