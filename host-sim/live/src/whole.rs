@@ -25,13 +25,27 @@ pub(crate) fn run() -> ExitCode {
         }
     }
     let mut command = Command::new(&program);
-    match command.args(std::env::args_os().skip(1)).status() {
-        Ok(status) => ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)),
+    match become_it(command.args(std::env::args_os().skip(1))) {
+        Ok(status) => status,
         Err(cause) => refused(&format!(
             "{}, which has this command, cannot be started ({cause}); build it with cargo build --release",
             program.display()
         )),
     }
+}
+
+/// Puts a program in the place of this one, so that a signal that ends this process ends it, and with it a device's torque.
+#[cfg(unix)]
+fn become_it(command: &mut Command) -> std::io::Result<ExitCode> {
+    use std::os::unix::process::CommandExt;
+    Err(command.exec())
+}
+
+/// Runs a program and returns its exit status.
+#[cfg(not(unix))]
+fn become_it(command: &mut Command) -> std::io::Result<ExitCode> {
+    let code = command.status()?.code().and_then(|code| u8::try_from(code).ok());
+    Ok(ExitCode::from(code.unwrap_or(1)))
 }
 
 fn beside(own: &Path) -> PathBuf {

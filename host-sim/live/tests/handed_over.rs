@@ -67,6 +67,25 @@ fn cargo_builds_the_whole_program_before_it_is_run() {
 }
 
 #[test]
+fn a_signal_that_ends_it_ends_the_whole_program() {
+    let dir = folder("ended");
+    script(&dir.join("host-sim"), "echo $$; exec sleep 60");
+    let mut child = Command::new(dir.join("needle"))
+        .arg("settle")
+        .env_remove("CARGO")
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let own = child.id().to_string();
+    let mut line = String::new();
+    let output = child.stdout.take().expect("it is piped");
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line).expect("it prints");
+    assert_eq!(line.trim(), own, "one process, which the signal meets");
+    child.kill().expect("it runs");
+    child.wait().expect("it ended");
+}
+
+#[test]
 fn what_it_has_is_not_handed_over() {
     let dir = folder("own");
     for (arguments, wanted) in
