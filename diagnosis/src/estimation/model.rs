@@ -26,9 +26,6 @@ pub(crate) struct Model {
     /// Acceleration by the force that is there all the time, for a second mass to take up, per fitted recording; where there is
     /// none the track's own.
     pub(crate) bias: Vec<f64>,
-    /// True if the part of the command that laws of the command take is a column of its own: its coefficient is zero if they are right, and
-    /// the gain's if they are wrong.
-    pub(crate) is_loose: bool,
 }
 
 /// Sign of the velocity where it is known, per block.
@@ -99,11 +96,6 @@ impl Model {
         let mut push = |key: Key, input: Input, own: bool| {
             columns.push(Column { key, input, own, prior: nominal.priors(key, noise) });
         };
-        if let (true, Some(effective)) = (self.is_loose, &effective) {
-            let taken: Vec<f64> =
-                track.rows.command.iter().zip(effective).map(|(u, after)| u - after).collect();
-            push(Key::Taken, track.rows.input(&taken), false);
-        }
         push(Key::Gain, drive, false);
         columns.rotate_right(1);
         columns

@@ -25,8 +25,6 @@ pub(crate) enum Key {
     Gravity,
     /// The measured external load.
     External,
-    /// The part of the command that laws of the command take, times gain over inertia.
-    Taken,
     /// Term of an effect of the model.
     Term {
         effect: usize,
@@ -194,7 +192,7 @@ impl Nominal {
             Key::Skew => skew_columns::prior(self.known_gain(), self.skew_rows.unwrap_or(0.0)),
             Key::Spread => skew_columns::prior_of_spread(self.known_gain()),
             Key::External => Prior { mean: self.external / j, sd: 0.5 / j, ..Prior::FREE },
-            Key::Taken | Key::Term { .. } => Prior::FREE,
+            Key::Term { .. } => Prior::FREE,
         }
     }
 

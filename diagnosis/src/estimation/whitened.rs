@@ -12,8 +12,7 @@ use std::sync::Arc;
 
 /// The nominal columns, which are the first of `columns`, under a noise.
 pub(crate) fn nominal_columns(track: &BlockedRecording, noise: &Noise, columns: &[Column]) -> Arc<Whitened> {
-    let count =
-        columns.iter().take_while(|column| !matches!(column.key, Key::Taken | Key::Term { .. })).count();
+    let count = columns.iter().take_while(|column| !matches!(column.key, Key::Term { .. })).count();
     let nominal = &columns[..count];
     track.kept.columns(|one| is_of(one, track, noise, nominal), || whitened(track, noise, nominal))
 }

@@ -42,9 +42,6 @@ pub(crate) fn rejection(why: &Rejection) -> String {
                 .into()
         }
         Rejection::AtLimit => "a fitted parameter reached its limit".into(),
-        Rejection::OtherAmplitude { on_fit, on_holdout } => format!(
-            "the motion shows {on_fit:.2} times the change of the command that its law makes on fitted recordings and {on_holdout:.2} times on held-out ones, where both should be near 1"
-        ),
         Rejection::NoSize => "its size cannot be distinguished from zero".into(),
         Rejection::Swing { hertz } => {
             format!("what it explains swings at {hertz:.1} Hz, whatever the axis does")

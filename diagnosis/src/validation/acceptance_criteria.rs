@@ -1,15 +1,13 @@
 //! The evidence for an effect on fitted and on held-out recordings, and the criteria that it must meet to be named. Nothing here
 //! fits or chooses between effects.
 
-use crate::effects::Effect;
+use crate::effects::{Effect, EffectName};
 use crate::numerics::bootstrap::Gain;
 use crate::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
-use crate::validation::amplitude::Amplitude;
 use crate::validation::rejection::Rejection;
-use crate::validation::rival::Rival;
 use crate::validation::shares::material::Material;
 use std::ops::Range;
 
@@ -39,8 +37,6 @@ pub(crate) struct EffectEvidence {
     /// Size that it would have on each recording that plays it, over the size that it has on all, fitted ones first; none
     /// where no fitted or no held-out one does.
     pub(crate) sizes: Vec<f64>,
-    /// The part of the command that it takes, over the part that its law takes, where it is a law of the command; exact if not.
-    pub(crate) amplitude: Amplitude,
     /// Its part in the force error, where that names it.
     pub(crate) material: Option<Material>,
 }
@@ -180,14 +176,27 @@ impl EffectEvidence {
         self.too_small()
             .or_else(|| (!self.is_comb).then_some(Rejection::NotPeriodic))
             .or_else(|| self.at_bound.then_some(Rejection::AtLimit))
-            .or_else(|| self.amplitude.rejection())
     }
+}
+
+/// A rival and how far it is behind.
+#[derive(Clone, Debug)]
+pub(crate) struct Rival {
+    pub(crate) name: EffectName,
+    /// The effect with the shape that fits best.
+    pub(crate) effect: Effect,
+    /// Mean lead of the winner over its standard error, over all segments.
+    pub(crate) z: f64,
+    /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
+    pub(crate) lead: f64,
+    pub(crate) held_out_lead: f64,
+    /// The reason why it may not be named although it explains as much.
+    pub(crate) absence: Option<Rejection>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::EffectName;
 
     fn gain(sum: f64, low: f64, z: f64) -> Gain {
         Gain { sum, low, high: 2.0 * sum, z, clipped_z: z }
@@ -207,7 +216,6 @@ mod tests {
             at_bound: false,
             is_comb: true,
             sizes: vec![1.0, 1.02, 0.95],
-            amplitude: Amplitude::EXACT,
             material: None,
         }
     }

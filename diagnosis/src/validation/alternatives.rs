@@ -16,12 +16,11 @@ use crate::selection::predictive::left_out_costs;
 use crate::thresholds::{
     BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
 };
-use crate::validation::acceptance_criteria::EffectEvidence;
+use crate::validation::acceptance_criteria::{EffectEvidence, Rival};
 use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
-use crate::validation::rival::Rival;
 
 /// The number of rivals of each effect that are fitted in full.
 const RIVALS: usize = 4;

@@ -16,7 +16,6 @@ use crate::selection::periodic;
 use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::thresholds::DRIFT;
 use crate::validation::acceptance_criteria::EffectEvidence;
-use crate::validation::amplitude::Amplitude;
 use crate::validation::holdout_likelihood::{self, HoldoutFit, evaluate_all};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
@@ -121,7 +120,6 @@ impl<'a> JudgedModel<'a> {
             at_bound: self.is_at_bound(&effect, i),
             is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
-            amplitude: Amplitude::of(context, last, shown, i),
             material: None,
             effect,
         };

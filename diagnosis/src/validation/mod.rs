@@ -2,7 +2,6 @@
 
 pub(crate) mod acceptance_criteria;
 pub(crate) mod alternatives;
-pub(crate) mod amplitude;
 pub(crate) mod comparison;
 pub(crate) mod confidence;
 pub(crate) mod confidence_pass;
@@ -20,7 +19,6 @@ pub(crate) mod rejection;
 pub(crate) mod repeats;
 pub(crate) mod residual_maps;
 pub(crate) mod residuals;
-pub(crate) mod rival;
 pub(crate) mod shares;
 pub(crate) mod sizes;
 pub(crate) mod tonal;

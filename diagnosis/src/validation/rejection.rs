@@ -29,8 +29,6 @@ pub(crate) enum Rejection {
     NotPeriodic,
     /// A fitted value reached its limit.
     AtLimit,
-    /// The part of the command that it takes is another multiple of what its law takes, on fitted or on held-out recordings.
-    OtherAmplitude { on_fit: f64, on_holdout: f64 },
     /// The interval of its size holds zero.
     NoSize,
     /// A force that swings at a frequency of its own explains what the effect explains.
