@@ -13,6 +13,8 @@ pub struct Options {
     pub quick: bool,
     /// Conceal plants in the virtual device and let `host-sim settle` name them.
     pub settle: bool,
+    /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion first.
+    pub inputs: Vec<&'static str>,
     /// Cases that run at the same time.
     pub jobs: usize,
     /// No case begins after this many minutes; the report says how many were left.
@@ -46,6 +48,7 @@ impl Default for Options {
             cases: None,
             quick: false,
             settle: false,
+            inputs: crate::settle::INPUTS.to_vec(),
             jobs: 2,
             minutes: None,
             write: None,
@@ -66,9 +69,10 @@ impl Default for Options {
 pub(crate) const SPEED: &str = "speed";
 
 /// The flags that take a value.
-const FLAGS: [&str; 14] = [
+const FLAGS: [&str; 15] = [
     "--seed",
     "--cases",
+    "--inputs",
     "--jobs",
     "--minutes",
     "--only",
@@ -92,6 +96,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines
                 and the set of characterise in the same time of motion; settle.json and settle.md in the folder of --out.
                 --keep DIR leaves the recordings
+  --inputs A,B  with --settle: only these of designed, multisines and characterise; the first sets the time of motion
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
   --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
@@ -152,6 +157,7 @@ impl Options {
                 "--cases" => {
                     options.cases = Some(whole("a whole number from 1")?.clamp(1, 10_000) as usize);
                 }
+                "--inputs" => options.inputs = inputs(&value)?,
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
                 "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
                 "--only" => options.only = Some(value),
@@ -195,6 +201,16 @@ impl Options {
     }
 }
 
+/// The sources of inputs in a list with commas.
+fn inputs(list: &str) -> Result<Vec<&'static str>, String> {
+    let known = crate::settle::INPUTS;
+    let one = |name: &str| {
+        let found = known.into_iter().find(|known| *known == name);
+        found.ok_or_else(|| format!("--inputs takes some of {}, not `{name}`", known.join(", ")))
+    };
+    list.split(',').map(one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,6 +223,10 @@ mod tests {
     fn flags_are_read_and_wrong_ones_named() {
         let o = parse("--seed 7 --cases 3 --quick --jobs 1").unwrap().unwrap();
         assert_eq!((o.seed, o.cases, o.quick, o.jobs), (7, Some(3), true, 1));
+        assert_eq!(o.inputs, ["designed", "multisines", "characterise"], "all where nobody says which");
+        let o = parse("--settle --inputs multisines,designed").unwrap().unwrap();
+        assert_eq!(o.inputs, ["multisines", "designed"]);
+        assert!(parse("--settle --inputs sines").unwrap_err().contains("`sines`"));
         assert_eq!(parse("--help"), Ok(None));
         assert!(parse("--sed 7").unwrap_err().contains("--sed"));
         assert!(parse("--seed x").unwrap_err().contains("`x`"));

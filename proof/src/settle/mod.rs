@@ -20,7 +20,7 @@ const SURE: f64 = 0.9;
 const LEAST_MOTION_S: f64 = 20.0;
 
 /// The sources of inputs, the judged one first.
-const ARMS: [&str; 3] = ["designed", "multisines", "characterise"];
+pub(crate) const INPUTS: [&str; 3] = ["designed", "multisines", "characterise"];
 
 /// The answer of one run of `host-sim settle`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,7 +33,7 @@ struct Answer {
     error: Option<String>,
 }
 
-/// A plant with the answer of each arm.
+/// A plant with the answer by each source of inputs.
 struct Judged {
     kind: Kind,
     names: Vec<&'static str>,
@@ -69,7 +69,7 @@ impl Answer {
     }
 }
 
-/// Figures of one arm.
+/// Figures of one source of inputs.
 #[derive(Clone, Debug, Default)]
 struct Figures {
     twins: Rate,
@@ -117,9 +117,10 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     let count = options.cases.unwrap_or(PLANTS);
     let plants: Vec<(usize, Plant)> =
         (0..count).map(|index| (index, plants::draw(&base, options.seed, index))).collect();
+    let inputs = &options.inputs;
     let judged = pool::map(options.jobs, options.budget(), "settled", &plants, |(index, plant)| {
         let folder = out.join(format!("plant-{index}"));
-        let answers = settle(&program, plant, options.seed + *index as u64, &folder);
+        let answers = settle(&program, plant, inputs, options.seed + *index as u64, &folder);
         if options.keep.is_none() {
             // Recordings of a plant take 100 MB.
             let _ = std::fs::remove_dir_all(&folder);
@@ -127,9 +128,9 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         Judged { kind: plant.kind, names: plant.names.clone(), answers }
     });
     let judged: Vec<Judged> = judged.into_iter().flatten().collect();
-    let text = table::markdown(&judged, options.seed, count);
+    let text = table::markdown(&judged, inputs, options.seed, count);
     print!("{text}");
-    let all: Vec<Value> = judged.iter().map(json_of).collect();
+    let all: Vec<Value> = judged.iter().map(|plant| json_of(plant, inputs)).collect();
     let json = json!({ "seed": options.seed, "drawn": count, "plants": all });
     for (name, text) in [("settle.md", text), ("settle.json", format!("{json:#}\n"))] {
         let path = options.out.join(name);
@@ -138,19 +139,19 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-fn json_of(plant: &Judged) -> Value {
-    let answer = |(arm, answer): (&&str, &Answer)| {
+fn json_of(plant: &Judged, inputs: &[&str]) -> Value {
+    let answer = |(inputs, answer): (&&str, &Answer)| {
         let names: Vec<Value> =
             answer.names.iter().map(|(class, sure)| json!({ "class": class, "confidence": sure })).collect();
         json!({
-            "arm": arm,
+            "inputs": inputs,
             "names": names,
             "rounds": answer.rounds,
             "motion_s": answer.motion_s,
             "error": answer.error,
         })
     };
-    let answers: Vec<Value> = ARMS.iter().zip(&plant.answers).map(answer).collect();
+    let answers: Vec<Value> = inputs.iter().zip(&plant.answers).map(answer).collect();
     json!({ "kind": plant.kind.words(), "truth": plant.names, "answers": answers })
 }
 
@@ -177,12 +178,12 @@ fn base(program: &Path, out: &Path) -> Result<Base, String> {
     Base::parse(&text)
 }
 
-/// The answer of each arm on one plant; the others move as long as the judged one did.
-fn settle(program: &Path, plant: &Plant, seed: u64, folder: &Path) -> Vec<Answer> {
+/// The answer by each source of inputs on one plant; the others move as long as the first did.
+fn settle(program: &Path, plant: &Plant, inputs: &[&str], seed: u64, folder: &Path) -> Vec<Answer> {
     let mut motion_s = f64::INFINITY;
     let mut answers = Vec::new();
-    for arm in ARMS {
-        let answer = answer(program, plant, seed, &folder.join(arm), arm, motion_s)
+    for source in inputs {
+        let answer = answer(program, plant, seed, &folder.join(source), source, motion_s)
             .unwrap_or_else(|error| Answer { error: Some(error), ..Answer::default() });
         if answers.is_empty() && answer.error.is_none() {
             motion_s = answer.motion_s;
@@ -197,7 +198,7 @@ fn answer(
     plant: &Plant,
     seed: u64,
     folder: &Path,
-    arm: &str,
+    source: &str,
     motion_s: f64,
 ) -> Result<Answer, String> {
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))?;
@@ -205,7 +206,9 @@ fn answer(
     std::fs::write(&concealed, &plant.toml)
         .map_err(|e| format!("cannot write {}: {e}", concealed.display()))?;
     let mut command = Command::new(program);
-    command.args(["--quiet", "settle", "--no-compensate", "--inputs", arm, "--seed"]).arg(seed.to_string());
+    command
+        .args(["--quiet", "settle", "--no-compensate", "--inputs", source, "--seed"])
+        .arg(seed.to_string());
     command.arg("--plant").arg(&concealed).arg("--out").arg(folder);
     if motion_s.is_finite() {
         command.arg("--motion").arg(motion_s.max(LEAST_MOTION_S).to_string());

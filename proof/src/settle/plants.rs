@@ -42,11 +42,13 @@ pub(crate) struct Plant {
 }
 
 /// Effects with a near twin, in pairs.
-const TWINS: [&str; 14] = [
+const TWINS: [&str; 16] = [
     "command_delay",
     "electrical_lag",
     "presliding_friction",
+    "backlash",
     "drive_compliance",
+    "backlash",
     "gain_drift",
     "friction_drift",
     "position_spring",
@@ -175,6 +177,7 @@ fn effect(name: &str, base: &Base, rng: &mut Rng) -> String {
             let deflection = rng.log_range(3.0, 12.0) / base.counts_per_unit;
             text(name, &[("deflection", deflection)], &[("coulomb", base.dry), ("damping", 0.0)])
         }
+        "backlash" => gap(base, rng),
         "drive_compliance" => text(
             name,
             &[("resonance_hz", rng.log_range(20.0, 60.0)), ("damping", 0.05)],
@@ -212,6 +215,24 @@ fn effect(name: &str, base: &Base, rng: &mut Rng) -> String {
         "command_deadband" => text(name, &[("half_width", force / base.gain)], &[]),
         _ => text(name, &[], &[("coulomb_difference", force), ("viscous_difference", 0.0)]),
     }
+}
+
+/// A gap between the motor and a load that has a part of the machine's friction.
+fn gap(base: &Base, rng: &mut Rng) -> String {
+    let (ratio, dry) = (rng.range(0.3, 1.0), base.dry / base.inertia);
+    text(
+        "backlash",
+        &[
+            ("gap", rng.log_range(6.0, 30.0) / base.counts_per_unit),
+            ("coast", rng.range(0.4, 0.9) * dry),
+            ("contact_hz", rng.log_range(100.0, 250.0)),
+            ("ratio", ratio),
+            ("dry", dry),
+            ("viscous", base.viscous / base.inertia),
+            ("per_command", base.gain / base.inertia),
+        ],
+        &[("inertia_ratio", ratio * base.gain)],
+    )
 }
 
 /// A force that no effect of the library is.

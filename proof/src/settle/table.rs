@@ -1,23 +1,24 @@
 //! The figures of `--settle` as a table.
 
-use super::{ARMS, Figures, Judged};
+use super::{Figures, Judged};
 use crate::stats::{Rate, quantile};
 use std::fmt::Write as _;
 
 /// The table in Markdown, with every plant below it.
-pub(super) fn markdown(judged: &[Judged], seed: u64, drawn: usize) -> String {
-    let figures: Vec<Figures> = (0..ARMS.len())
-        .map(|arm| {
+pub(super) fn markdown(judged: &[Judged], inputs: &[&str], seed: u64, drawn: usize) -> String {
+    let rule = format!("| --- |{}\n", " --- |".repeat(inputs.len()));
+    let figures: Vec<Figures> = (0..inputs.len())
+        .map(|source| {
             let mut figures = Figures::default();
-            judged.iter().for_each(|plant| figures.add(plant, &plant.answers[arm]));
+            judged.iter().for_each(|plant| figures.add(plant, &plant.answers[source]));
             figures
         })
         .collect();
     let mut out = format!(
-        "Seed {seed}: {} of {drawn} concealed plants. Wilson's 95 % interval; the others moved as long as the designed inputs.\n\n\
-         | | {} |\n| --- | --- | --- | --- |\n",
+        "Seed {seed}: {} of {drawn} concealed plants. Wilson's 95 % interval; the others moved as long as the first.\n\n\
+         | | {} |\n{rule}",
         judged.len(),
-        ARMS.join(" | ")
+        inputs.join(" | ")
     );
     let mut row = |what: &str, value: &dyn Fn(&Figures) -> String| {
         let cells: Vec<String> = figures.iter().map(value).collect();
@@ -38,8 +39,8 @@ pub(super) fn markdown(judged: &[Judged], seed: u64, drawn: usize) -> String {
     row("motion, median, s", &|f| median(&f.motion_s));
     row("no answer", &|f| f.errors.to_string());
     out.push_str("\n| truth | ");
-    out.push_str(&ARMS.join(" | "));
-    out.push_str(" |\n| --- | --- | --- | --- |\n");
+    out.push_str(&inputs.join(" | "));
+    let _ = write!(out, " |\n{rule}");
     for plant in judged {
         let named = plant.names.join(" + ");
         let truth = if named.is_empty() { plant.kind.words() } else { &named };
