@@ -4,11 +4,12 @@
 mod exchange;
 mod torque;
 mod watches;
+mod whole;
 
 use crate::anatomy::{self, Insertion};
 use crate::compensation::feedforward::Feedforward;
 use crate::event::{Fault, Limits, State, Transitions};
-use crate::excitation::Player;
+use crate::excitation::{Player, Segments};
 use crate::kinematics::{Movement, SpeedEstimator, moved};
 use crate::law::{Memory, Motion, Response};
 use crate::passivity::Observer;
@@ -18,38 +19,43 @@ use crate::safety::Limiter;
 use crate::stillness::Stillness;
 use crate::thermal::Winding;
 use crate::units::{Counts, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians};
+use core::borrow::BorrowMut;
 pub use exchange::{Order, Sample, TickInput, TickOutput};
 use fixed::types::I16F16;
+pub use whole::Controller;
 
 /// Of eight ticks, the one in which the watch takes the count.
 const LOOK_TURN: u32 = 4;
 
-/// The control law with its memory.
+/// The control law with its memory, but for the segments that play.
 #[derive(Clone, Debug)]
-pub struct Controller {
-    plan: Plan,
+// In this order: on the board the longest tick takes 836 instructions with it and 863 with the compiler's, because the nearer a field is to
+// the beginning, the fewer instructions it takes to reach it.
+#[repr(C)]
+pub(crate) struct Core {
     mode: Mode,
-    /// What plays while exciting.
-    player: Option<Player>,
+    lines_agree: bool,
+    tripped: Option<Fault>,
     origin: Counts,
     previous: Option<Counts>,
-    speed: SpeedEstimator,
-    movement: Movement,
-    insertion: Insertion,
-    memory: Memory,
-    observer: Observer,
-    feedforward: Feedforward,
-    winding: Winding,
-    limiter: Limiter,
     silent_ticks: u32,
-    still: Stillness,
-    lines_agree: bool,
     /// Torque that was asked for in the tick before, within its limit.
     asked: I16F16,
-    runaway: runaway::Watch,
     /// Ticks, for what is done in one of eight or of sixteen only.
     turn: u32,
-    tripped: Option<Fault>,
+    still: Stillness,
+    limiter: Limiter,
+    winding: Winding,
+    observer: Observer,
+    insertion: Insertion,
+    plan: Plan,
+    memory: Memory,
+    movement: Movement,
+    runaway: runaway::Watch,
+    /// Plays while exciting.
+    player: Player,
+    feedforward: Feedforward,
+    speed: SpeedEstimator,
 }
 
 /// Those with power last.
@@ -67,14 +73,9 @@ impl Mode {
     }
 }
 
-impl Controller {
-    /// Torque off, waiting to be started.
-    pub fn new(plan: Plan) -> Self {
-        Self::warm(plan, 0)
-    }
-
-    /// The same, with a motor that has the heat which [`Self::heat`] gave before a reset.
-    pub fn warm(plan: Plan, heat: u32) -> Self {
+impl Core {
+    /// Torque off, waiting to be started, with a motor that has this heat.
+    fn warm(plan: Plan, heat: u32) -> Self {
         let mut winding = Winding::with_heat(heat);
         winding.allow(&plan.thermal, plan.torque_limits.torque);
         let mut feedforward = Feedforward::default();
@@ -86,7 +87,6 @@ impl Controller {
             memory: plan.law.memory(),
             plan,
             mode: Mode::Idle,
-            player: None,
             origin: Counts(0),
             previous: None,
             observer: Observer::default(),
@@ -100,35 +100,42 @@ impl Controller {
             runaway: runaway::Watch::default(),
             turn: 0,
             tripped: None,
+            player: Player::default(),
         }
     }
 
-    /// The plan in force.
-    pub fn plan(&self) -> &Plan {
+    fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// The winding's heat in (mN·m)², in Q16: what must not be forgotten in a reset.
-    pub fn heat(&self) -> u32 {
+    fn heat(&self) -> u32 {
         self.winding.heat()
     }
 
-    /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
-    pub fn order(&mut self, order: Order) {
+    fn order(&mut self, segments: &mut Segments, order: Order) {
         match order {
             Order::Start if !self.mode.is_powered() && self.plan.device().commissioned => {
                 self.insertion.begin();
                 self.power_up(Mode::Running, true);
             }
-            Order::Excite(excitation)
+            Order::Excite(ref excitation)
                 if !self.mode.is_powered() && (self.plan.device().commissioned || excitation.is_gentle()) =>
             {
                 let depth = self.plan.scale.depth(self.latest_count());
-                self.player = Some(Player::new(&excitation, depth));
-                self.withdraw();
-                self.power_up(Mode::Exciting, excitation.compensated);
+                self.player.begin_one(segments, excitation, depth);
+                self.play(excitation.compensated);
             }
-            Order::Stop if self.mode.is_powered() => self.mode = Mode::Idle,
+            Order::Play(ref sequence)
+                if !self.mode.is_powered() && self.plan.device().commissioned && !sequence.is_empty() =>
+            {
+                let depth = self.plan.scale.depth(self.latest_count());
+                self.player.begin(segments, sequence, depth);
+                self.play(sequence.is_compensated());
+            }
+            Order::Stop if self.mode.is_powered() => {
+                self.mode = Mode::Idle;
+                segments.forget();
+            }
             Order::Zero if !self.mode.is_powered() => {
                 self.origin = self.previous.unwrap_or_default();
                 self.withdraw();
@@ -152,25 +159,27 @@ impl Controller {
             | Order::Zero
             | Order::Configure(_)
             | Order::Excite(_)
+            | Order::Play(_)
             | Order::Index(_) => {}
         }
     }
 
-    /// [`Order::Heartbeat`], the one that comes while the needle moves.
-    pub fn heartbeat(&mut self) {
+    /// Torque on, to play what the player has.
+    fn play(&mut self, is_compensated: bool) {
+        self.withdraw();
+        self.power_up(Mode::Exciting, is_compensated);
+    }
+
+    fn heartbeat(&mut self) {
         self.silent_ticks = 0;
     }
 
-    /// Says that the tissue's surface is displaced by so much along the needle: the law of Paper 000 counts depth from there. At most 3 mm
-    /// count, they change by at most 20 mm/s, and they go back to 0 if they are not said again within 50 ms. The firmware never says it.
-    pub fn displace(&mut self, displacement: Millimetres) {
+    fn displace(&mut self, displacement: Millimetres) {
         self.memory.displace(displacement);
     }
 
-    /// Says, until it is said again, whether both of the encoder's lines are at one level, as they also are without its supply or
-    /// its ground. An encoder without lines, such as a simulated one, leaves it at `false`.
     #[inline]
-    pub fn set_lines_agree(&mut self, agree: bool) {
+    fn set_lines_agree(&mut self, agree: bool) {
         self.lines_agree = agree;
     }
 
@@ -192,8 +201,7 @@ impl Controller {
         self.mode = mode;
     }
 
-    /// One tick, 100 µs after the one before.
-    pub fn tick(&mut self, input: TickInput) -> TickOutput {
+    fn tick(&mut self, segments: &mut impl BorrowMut<Segments>, input: TickInput) -> TickOutput {
         let count = self.count(Counts(input.count.0.wrapping_mul(self.plan.encoder_sign)));
         let depth = self.plan.scale.depth(count);
         let speed = self.speed.tick(&self.plan.scale, count);
@@ -202,7 +210,8 @@ impl Controller {
         let angle = self.insertion.angle();
         self.watch_host();
         let has_given_way = transitions.puncture != 0;
-        let (torque, limits) = match self.wanted_torque(tissue.force, depth, speed, has_given_way) {
+        let (torque, limits) = match self.wanted_torque(segments, tissue.force, (depth, speed), has_given_way)
+        {
             Some((wanted, limits)) => {
                 let limits = if tissue.estimated { limits.with(Limits::ESTIMATED) } else { limits };
                 let (wanted, limits) = if self.feedforward.is_on() {
@@ -298,7 +307,7 @@ impl Controller {
             Mode::Running => count.0.unsigned_abs() > self.plan.travel_counts,
             Mode::Exciting => {
                 let depth = self.plan.scale.depth(count);
-                self.player.as_ref().is_some_and(|player| player.is_beyond(depth))
+                self.player.is_beyond(depth)
             }
             Mode::Idle | Mode::Faulted => return count,
         };

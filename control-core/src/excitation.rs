@@ -4,16 +4,19 @@
 //! The reference is a pure function of the signal and the tick, so the PC can write down what the servo was asked to
 //! follow: it plays the same [`Reference`].
 
+mod player;
 mod reference;
+mod sequence;
 
-use crate::TICK_HZ;
-use crate::math::{saturating_multiply, saturating_times};
 use crate::plan::Plan;
 use crate::refusal::{Field, Refusal, within};
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use fixed::types::{I2F30, I8F24, I16F16, I32F32};
+use fixed::types::{I8F24, I16F16, I32F32};
 use heapless::Vec;
-pub use reference::{Reference, Target};
+pub(crate) use player::Player;
+pub use player::{MAX_SEGMENTS, Prepared, Segments};
+pub use reference::{Reach, Reference, Target};
+pub use sequence::{MAX_SEQUENCE_MS, Sequence, SequenceRefusal};
 use serde::{Deserialize, Serialize};
 
 /// The most sines of a multisine.
@@ -210,64 +213,6 @@ fn check_frequency(hz: u16) -> Result<(), Refusal> {
 /// `base · ratio^exponent`, saturating.
 fn power(base: I16F16, ratio: I16F16, exponent: u8) -> I16F16 {
     (0..exponent).fold(base, |product, _| product.saturating_mul(ratio))
-}
-
-/// Plays an excitation against the motor: the reference, the servo and the end.
-#[derive(Clone, Debug)]
-pub(crate) struct Player {
-    reference: Reference,
-    servo: Servo,
-    begin: Millimetres,
-    travel: Millimetres,
-    /// The speed past which the motor no longer follows.
-    too_fast: MillimetresPerSecond,
-    remaining_ticks: u32,
-}
-
-impl Player {
-    pub(crate) fn new(excitation: &Excitation, begin: Millimetres) -> Self {
-        Self {
-            reference: Reference::new(&excitation.signal),
-            servo: excitation.servo,
-            begin,
-            travel: excitation.travel,
-            // Half as fast again: the servo overshoots where the reference turns round.
-            too_fast: MillimetresPerSecond(
-                excitation.fastest().0.saturating_mul(I16F16::from_bits(0x1_8000)),
-            ),
-            remaining_ticks: excitation.duration_ms.saturating_mul(TICK_HZ / 1000),
-        }
-    }
-
-    /// Torque in the insertion direction, or nothing at the end.
-    pub(crate) fn tick(
-        &mut self,
-        roller_radius: Millimetres,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
-    ) -> Option<MillinewtonMetres> {
-        self.remaining_ticks = self.remaining_ticks.checked_sub(1)?;
-        let target = self.reference.tick();
-        let behind = self.begin.0.saturating_add(target.position.0).saturating_sub(depth.0);
-        let slower = target.speed.0.saturating_sub(speed.0);
-        let damping = I2F30::saturating_from_num(self.servo.damping.0);
-        let force = saturating_multiply(behind, self.servo.stiffness.0)
-            .saturating_add(saturating_times(slower, damping));
-        Some(MillinewtonMetres(saturating_multiply(force, roller_radius.0).saturating_add(target.torque.0)))
-    }
-
-    /// True if the motor is faster than it has to be to follow, and than a torque without a servo makes it where a hand trips at `hand`:
-    /// three times that, half of what counts as a jump of the encoder. The pulses of `commission` reach 0.77 m/s where a hand
-    /// trips at 0.42, and a motor still runs on when the next excitation begins.
-    #[cold]
-    pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond, hand: MillimetresPerSecond) -> bool {
-        speed > self.too_fast && speed.0 > hand.0.saturating_mul_int(3)
-    }
-
-    /// Whether the motor is further from the beginning than allowed.
-    pub(crate) fn is_beyond(&self, depth: Millimetres) -> bool {
-        depth.0.saturating_sub(self.begin.0).saturating_abs() > self.travel.0
-    }
 }
 
 #[cfg(test)]

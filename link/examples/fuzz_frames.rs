@@ -3,9 +3,9 @@
 
 use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;
-use control_core::excitation::{Excitation, Servo, Signal};
+use control_core::excitation::{Excitation, MAX_SEGMENTS, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use control_core::{Controller, TickInput};
+use control_core::{Controller, Order, TickInput};
 use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
@@ -22,14 +22,15 @@ fn main() {
     let mut device = Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth();
     let mut controller = Controller::new(plan);
     let mut reception = Reception::default();
-    let (mut rounds, mut tick, mut id) = (0_u64, 0_u64, 0_u32);
+    let (mut rounds, mut ticks, mut id) = (0_u64, Ticks::default(), 0_u32);
+    let mut sent = Vec::new();
     while Instant::now() < end {
         for _ in 0..256 {
-            let mut bytes = command(&mut random, id);
+            let mut bytes = command(&mut random, id, &mut sent);
             id = id.wrapping_add(random.u32(0..3));
             damage(&mut random, &mut bytes);
             device.receive(&bytes);
-            run(&mut random, &mut device, &mut controller, &mut reception, &mut tick);
+            run(&mut random, &mut device, &mut controller, &mut reception, &mut ticks);
         }
         // Whatever went before, a hello behind a zero byte opens a session.
         device.receive(&[0]);
@@ -42,11 +43,13 @@ fn main() {
     }
     let counts = reception.counts();
     println!(
-        "fuzz_frames seed={seed} rounds={rounds} commands={} frames={} garbage={}",
+        "fuzz_frames seed={seed} rounds={rounds} commands={} frames={} garbage={} sequences={}",
         rounds * 256,
         counts.frames,
-        counts.garbage
+        counts.garbage,
+        ticks.sequences
     );
+    assert!(seconds < 10 || ticks.sequences > 0, "seed {seed}: no sequence was ever played");
 }
 
 fn argument(name: &str) -> Option<u64> {
@@ -62,8 +65,9 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
     out[..length].to_vec()
 }
 
-fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
-    let command = match random.u8(0..15) {
+/// `sent` are the segments that a device has which has taken each of them.
+fn command(random: &mut fastrand::Rng, id: u32, sent: &mut Vec<Excitation>) -> Vec<u8> {
+    let command = match random.u8(0..22) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
@@ -73,6 +77,11 @@ fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
         10 => Command::RestoreDevice(Record::of(&config(random).device, [0; 12])),
         11 => Command::Commission,
         12 | 13 => Command::Excite(excitation(random)),
+        14..=17 => segment(random, sent),
+        18 | 19 => Command::Play {
+            count: sent.len() as u8 ^ u8::from(random.u8(0..8) == 0),
+            checksum: codec::hash(&sent.as_slice()) ^ u32::from(random.u8(0..8) == 0),
+        },
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::Zero,
@@ -82,7 +91,28 @@ fn command(random: &mut fastrand::Rng, id: u32) -> Vec<u8> {
     encoded(&HostFrame { id, command })
 }
 
-/// A sound sequence, some of its values replaced by any other.
+/// The next segment of a sequence, the first of another one, or any at any place.
+fn segment(random: &mut fastrand::Rng, sent: &mut Vec<Excitation>) -> Command {
+    let mut segment = excitation(random);
+    if random.bool() {
+        segment.signal = Signal::Hold;
+        segment.duration_ms = random.u32(10..100);
+        segment.servo.stiffness = Stiffness::default();
+        (segment.travel.0, segment.compensated) = (fixed::types::I16F16::from_num(100), false);
+    }
+    let index = match random.u8(0..8) {
+        0 => random.u8(..),
+        1 | 2 => 0,
+        _ => sent.len() as u8,
+    };
+    sent.truncate(usize::from(index));
+    if sent.len() < MAX_SEGMENTS {
+        sent.push(segment.clone());
+    }
+    Command::Segment { index, excitation: segment }
+}
+
+/// A sound excitation, some of its values replaced by any other.
 fn excitation(random: &mut fastrand::Rng) -> Excitation {
     let any =
         |random: &mut fastrand::Rng| fixed::types::I16F16::from_bits(random.i32(..) >> random.u32(0..32));
@@ -163,22 +193,33 @@ fn damage(random: &mut fastrand::Rng, bytes: &mut Vec<u8>) {
     }
 }
 
+/// Ticks so far, and the sequences that began in them.
+#[derive(Default)]
+struct Ticks {
+    tick: u64,
+    sequences: u64,
+}
+
 fn run(
     random: &mut fastrand::Rng,
     device: &mut Endpoint,
     controller: &mut Controller,
     reception: &mut Reception,
-    tick: &mut u64,
+    ticks: &mut Ticks,
 ) {
     let mut out = [0; MAX_FRAME];
     for _ in 0..random.u8(0..40) {
         while let Some(order) = device.next_order() {
+            if matches!(order, Order::Play(_)) {
+                assert!(device.in_session(), "a sequence outlived its session");
+                ticks.sequences += 1;
+            }
             controller.order(order);
         }
         let count = control_core::units::Counts(random.i32(..) >> random.u32(0..32));
         let output = controller.tick(TickInput { count, ..TickInput::default() });
-        device.record(*tick, &output);
-        *tick += 1;
+        device.record(ticks.tick, &output);
+        ticks.tick += 1;
     }
     for _ in 0..random.u8(0..8) {
         let length = device.transmit(&mut out);

@@ -2,6 +2,7 @@
 //! share it. It never waits: what the PC does not take in time is dropped, oldest block first, and counted.
 
 mod commands;
+mod upload;
 mod waiting;
 
 use crate::build::Build;
@@ -19,6 +20,8 @@ use control_core::interlock::Interlocks;
 use control_core::{Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use heapless::HistoryBuf;
+pub use upload::LATE_TICKS;
+use upload::Upload;
 pub use waiting::Waiting;
 
 /// Commands whose answer is remembered.
@@ -54,6 +57,10 @@ pub struct Endpoint<W = Waiting> {
     in_session: bool,
     powered: bool,
     start_ordered: bool,
+    /// The sequence that waits for [`crate::Command::Play`].
+    upload: Upload,
+    /// The latest tick.
+    now: u64,
     /// Somebody has said where depth 0 is.
     zeroed: bool,
     proof: Proof,
@@ -90,6 +97,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             in_session: false,
             powered: false,
             start_ordered: false,
+            upload: Upload::NOTHING,
+            now: 0,
             zeroed: false,
             proof: Proof::None,
             interlocks: Interlocks::default(),
@@ -133,6 +142,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.in_session = false;
         self.start_ordered = false;
         self.proof.interrupt();
+        self.upload.forget();
         self.waiting.borrow_mut().orders.clear();
         self.decoder = Decoder::default();
         self.forget_waiting();
@@ -165,6 +175,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
 
     /// Takes what a tick gave. `tick` counts from power-on without a gap.
     pub fn record(&mut self, tick: u64, output: &TickOutput) {
+        self.now = tick;
         self.note_events(tick, output);
         self.proof.see(&output.sample, self.plan.device().dac.mid_scale(), output.tripped.is_some());
         if !self.in_session {
@@ -290,6 +301,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if let Some(cause) = output.tripped {
             self.fault = Some(cause);
             self.start_ordered = false;
+            self.upload.forget();
             self.event(tick, EventKind::Fault { cause });
         }
         // A slew limit of a tick or two at each puncture is no news; the pose shows it.

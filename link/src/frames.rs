@@ -7,7 +7,7 @@ use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
-use control_core::excitation::Excitation;
+use control_core::excitation::{Excitation, SequenceRefusal};
 use control_core::interlock::Interlock;
 use control_core::plan::{Field, Refusal};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
@@ -16,7 +16,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 8;
+pub const PROTOCOL_VERSION: u16 = 9;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -260,6 +260,8 @@ pub enum Rejection {
     Commissioned(Field),
     /// The device has not seen by pulses of its own that its motor and its encoder go together.
     NotShown,
+    /// A sequence, or one of its segments, is not taken; what was uploaded is forgotten.
+    Sequence(SequenceRefusal),
 }
 
 impl core::fmt::Display for Rejection {
@@ -267,9 +269,10 @@ impl core::fmt::Display for Rejection {
         match self {
             Rejection::Config(refusal) => refusal.fmt(f),
             Rejection::Powered => f.write_str("torque is on; stop the device first"),
-            Rejection::Version => {
-                write!(f, "the device speaks protocol {PROTOCOL_VERSION}; update the older side")
-            }
+            Rejection::Version => write!(
+                f,
+                "this program speaks protocol {PROTOCOL_VERSION} and the device another; flash the firmware that belongs to this program, or run the program that belongs to the firmware"
+            ),
             Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
             Rejection::NoSession => f.write_str("no program is connected to the device; connect first"),
             Rejection::Interlocked(interlock) => interlock.fmt(f),
@@ -280,6 +283,7 @@ impl core::fmt::Display for Rejection {
             Rejection::NotShown => f.write_str(
                 "the device was not commissioned with this configuration, and its own pulses have not shown that motor and encoder match; run host-sim commission",
             ),
+            Rejection::Sequence(refusal) => refusal.fmt(f),
         }
     }
 }
@@ -332,4 +336,20 @@ pub enum Command {
     /// Marks the device's configuration as found by commissioning: accepted if its own pulses have shown that the motor
     /// and the encoder go together, and only while torque is off. Nothing else commissions a device.
     Commission,
+    /// A segment of a sequence, kept by the device and not played; only while torque is off. The first begins another sequence, and each
+    /// must follow the one before it. One that is refused takes those before it along.
+    Segment {
+        /// Its place, from 0.
+        index: u8,
+        /// Its excitation.
+        excitation: Excitation,
+    },
+    /// Play the sequence that was uploaded, without a rest between its segments and with no hand on the needle; only while torque is off, and
+    /// only if it is whole. It is forgotten then, as it is at a stop, a fault, a new configuration and the end of the session.
+    Play {
+        /// The number of its segments.
+        count: u8,
+        /// [`crate::codec::hash`] of the segments, as a slice.
+        checksum: u32,
+    },
 }

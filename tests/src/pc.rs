@@ -8,8 +8,9 @@ use std::collections::BTreeMap;
 use control_core::Config;
 use control_core::config::Device;
 use control_core::controller::Sample;
+use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
-use link::codec::MAX_FRAME;
+use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
 use link::crash::Crash;
 use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
@@ -243,6 +244,17 @@ impl Pc {
     pub fn heard_event(&self, wanted: impl Fn(&EventKind) -> bool) -> bool {
         self.heard.events.iter().any(|event| wanted(&event.kind))
     }
+}
+
+/// The commands that upload a sequence and play it.
+#[must_use]
+pub fn sequence(segments: &[Excitation]) -> Vec<Command> {
+    let play = Command::Play { count: segments.len() as u8, checksum: codec::hash(&segments) };
+    let upload = (0_u8..).zip(segments);
+    upload
+        .map(|(index, excitation)| Command::Segment { index, excitation: excitation.clone() })
+        .chain([play])
+        .collect()
 }
 
 /// Plugs the cable in, waits for the port and opens it.

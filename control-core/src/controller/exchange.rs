@@ -2,7 +2,7 @@
 
 use crate::compensation::Gains;
 use crate::event::{Fault, Limits, Transitions, VesselState};
-use crate::excitation::Excitation;
+use crate::excitation::{Excitation, Prepared};
 use crate::plan::Plan;
 use crate::units::{Counts, DacCode, Millimetres, MillimetresPerSecond, Milliradians, Newtons};
 use serde::{Deserialize, Serialize};
@@ -78,6 +78,9 @@ pub enum Order {
     /// Play an excitation from where the motor is; only while torque is off, and on a device that has not been
     /// commissioned only where [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
     Excite(Excitation),
+    /// Play the segments of a sequence one after the other, without a rest between them; only while torque is off, and on a device that
+    /// has been commissioned.
+    Play(Prepared),
     /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
     /// [`crate::compensation::check::check`].
     Compensate(Gains),

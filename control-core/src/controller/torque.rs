@@ -1,20 +1,22 @@
 //! The torque of a tick: what the law or the excitation asks for, what is fed forward beside it, and what the limits leave of it.
 
-use super::{Controller, Mode};
+use super::{Core, Mode};
 use crate::compensation::feedforward::Here;
 use crate::event::Limits;
+use crate::excitation::Segments;
 use crate::math::{saturating_multiply, truncating_product};
 use crate::passivity::Elements;
 use crate::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians};
+use core::borrow::BorrowMut;
 use fixed::types::I16F16;
 
-impl Controller {
+impl Core {
     /// Motor torque that the law or the excitation asks for; none where torque is off. N times mm is mN·m.
     pub(super) fn wanted_torque(
         &mut self,
+        segments: &mut impl BorrowMut<Segments>,
         mut force: Elements,
-        depth: Millimetres,
-        speed: MillimetresPerSecond,
+        (depth, speed): (Millimetres, MillimetresPerSecond),
         has_given_way: bool,
     ) -> Option<(MillinewtonMetres, Limits)> {
         let radius = self.plan.config.device.roller_radius;
@@ -32,9 +34,11 @@ impl Controller {
                 Some((MillinewtonMetres(self.runaway.steady(torque, before)), limits))
             }
             Mode::Exciting => {
-                let torque = self.player.as_mut().and_then(|player| player.tick(radius, depth, speed));
+                let segments = segments.borrow_mut();
+                let torque = self.player.tick(segments, radius, depth, speed);
                 if torque.is_none() {
                     self.mode = Mode::Idle;
+                    segments.forget();
                 }
                 torque.map(|torque| (torque, Limits::default()))
             }

@@ -1,6 +1,6 @@
 //! What a tick watches beside the force: the host, the way the needle moves, an encoder that no longer counts, and the winding.
 
-use super::{Controller, LOOK_TURN, Mode};
+use super::{Core, LOOK_TURN, Mode};
 use crate::anatomy;
 use crate::event::Fault;
 use crate::kinematics;
@@ -10,7 +10,7 @@ use crate::thermal::WARM_TICKS;
 use crate::units::{Millimetres, Milliradians};
 use fixed::types::I16F16;
 
-impl Controller {
+impl Core {
     /// What is slow enough to be done in one tick of eight or sixteen, each in another one.
     #[inline(never)]
     pub(super) fn take_turn(&mut self, tilt: Milliradians, depth: Millimetres) {
@@ -44,12 +44,11 @@ impl Controller {
     #[cold]
     #[inline(never)]
     fn trip_by_movement(&mut self, fault: Fault) {
-        let is_asked_for = (self.mode, fault) == (Mode::Exciting, Fault::Overspeed)
-            && self.player.as_ref().is_some_and(|player| {
-                let mm_per_count = self.plan.scale.mm_per_count;
-                let hand = fastest(mm_per_count, self.plan.config.device.limits.max_counts_per_tick);
-                !player.is_too_fast(self.runaway.speed(mm_per_count), hand)
-            });
+        let is_asked_for = (self.mode, fault) == (Mode::Exciting, Fault::Overspeed) && {
+            let mm_per_count = self.plan.scale.mm_per_count;
+            let hand = fastest(mm_per_count, self.plan.config.device.limits.max_counts_per_tick);
+            !self.player.is_too_fast(self.runaway.speed(mm_per_count), hand)
+        };
         if !is_asked_for {
             self.trip(fault);
         }

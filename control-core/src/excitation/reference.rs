@@ -95,8 +95,13 @@ impl Reference {
                 target.speed.0 = self.leg.speed;
             }
         }
-        target.position.0 = self.position.saturating_to_num();
+        target.position = self.position();
         target
+    }
+
+    /// Where the reference is now, from where it began.
+    pub fn position(&self) -> Millimetres {
+        Millimetres(self.position.saturating_to_num())
     }
 
     fn next_leg(&mut self) {
@@ -105,12 +110,7 @@ impl Reference {
         }
         // Back where it began, to the last bit: nothing adds up over a long run.
         self.position = I32F32::ZERO;
-        let (steps, ratio) = match &self.signal {
-            Signal::SpeedStaircase { steps, ratio, .. } | Signal::ReversalLadder { steps, ratio, .. } => {
-                (*steps, *ratio)
-            }
-            _ => (1, I16F16::ONE),
-        };
+        let (steps, ratio) = steps_and_ratio(&self.signal);
         (self.step, self.stage) = if self.step + 1 >= steps {
             (0, first_stage(&self.signal))
         } else {
@@ -131,6 +131,70 @@ impl Reference {
         let way = way_per_tick(speed);
         let (speed, way_per_tick) = if outwards { (speed, way) } else { (-speed, -way) };
         self.leg = Leg { outwards, speed, way_per_tick, remaining_ticks: remaining_ticks.max(1) };
+    }
+}
+
+/// How far a reference gets, from where it began; it never goes the other way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reach {
+    /// Its position at the end.
+    pub end: Millimetres,
+    /// Its furthest position until then.
+    pub furthest: Millimetres,
+}
+
+impl Reach {
+    /// Of a signal that plays for so many ticks: what as many calls of [`Reference::tick`] give, leg by leg and without the cycles
+    /// that begin again.
+    pub fn after(signal: &Signal, ticks: u32) -> Self {
+        let legs = 2 * u32::from(steps_and_ratio(signal).0);
+        let mut walk =
+            Walk { reference: Reference::new(signal), furthest: I32F32::ZERO, remaining_ticks: ticks };
+        walk.go(legs);
+        // It is where it began after a whole cycle, and the furthest of it is known.
+        let cycle_ticks = ticks - walk.remaining_ticks;
+        walk.remaining_ticks = walk.remaining_ticks.checked_rem(cycle_ticks).unwrap_or(0);
+        walk.go(legs);
+        let furthest = Millimetres(walk.furthest.saturating_to_num());
+        Self { end: walk.reference.position(), furthest }
+    }
+}
+
+/// A reference that is followed leg by leg.
+struct Walk {
+    reference: Reference,
+    furthest: I32F32,
+    remaining_ticks: u32,
+}
+
+impl Walk {
+    /// Follows at most so many legs.
+    fn go(&mut self, legs: u32) {
+        for _ in 0..legs {
+            if self.remaining_ticks == 0 {
+                return;
+            }
+            if self.reference.leg.remaining_ticks == 0 {
+                self.reference.next_leg();
+            }
+            let leg = &mut self.reference.leg;
+            let ticks = leg.remaining_ticks.min(self.remaining_ticks);
+            leg.remaining_ticks -= ticks;
+            self.remaining_ticks -= ticks;
+            let way = I32F32::from_bits(leg.way_per_tick.to_bits().saturating_mul(i64::from(ticks)));
+            self.reference.position = self.reference.position.saturating_add(way);
+            self.furthest = self.furthest.max(self.reference.position);
+        }
+    }
+}
+
+/// The number of steps of a series, and the ratio of one to the one before; one step if the signal has none.
+fn steps_and_ratio(signal: &Signal) -> (u8, I16F16) {
+    match signal {
+        Signal::SpeedStaircase { steps, ratio, .. } | Signal::ReversalLadder { steps, ratio, .. } => {
+            (*steps, *ratio)
+        }
+        _ => (1, I16F16::ONE),
     }
 }
 

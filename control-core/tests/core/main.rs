@@ -9,6 +9,7 @@ mod orders;
 mod protections;
 mod ranges;
 mod refusals;
+mod sequences;
 mod sparte;
 mod stability;
 mod twin;

@@ -1,6 +1,7 @@
 //! The queues between tasks: one writer and one reader each, no lock.
 
 use control_core::compensation::Gains;
+use control_core::excitation::Segments;
 use control_core::{Order, TickOutput};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -25,7 +26,7 @@ pub enum SmallOrder {
     Heartbeat,
     /// Other gains of the compensation.
     Compensate(Gains),
-    /// Take the large one that waits: a plan, an excitation or the rotor's angle, which are rare and only for a device whose torque is off;
+    /// Take the large one that waits: a plan, an excitation, a sequence or the rotor's angle, which are rare and only for a device whose torque is off;
     /// in the session of this number.
     Large(u8),
 }
@@ -38,7 +39,7 @@ pub struct Ticked {
     pub output: TickOutput,
 }
 
-/// Memory of all queues.
+/// Memory of all queues, and what is too large for the tasks' own.
 pub struct Queues {
     orders: Queue<SmallOrder, 16>,
     large_orders: Queue<Order, 2>,
@@ -49,6 +50,7 @@ pub struct Queues {
     // 4 KiB: what a full-speed host takes in 4 ms at worst, 40 ms of stream.
     to_pc: Queue<Packet, 64>,
     waiting: Waiting,
+    segments: Segments,
 }
 
 /// The tick's ends.
@@ -85,8 +87,8 @@ pub struct TelemetryEnds {
 
 /// All ends.
 pub struct Ends {
-    /// The tick's.
-    pub tick: TickEnds,
+    /// The tick's, and its room for the excitations that play: out of the way of what every tick uses.
+    pub tick: (TickEnds, &'static mut Segments),
     /// The USB task's.
     pub usb: UsbEnds,
     /// Telemetry's, and its memory for what waits.
@@ -109,6 +111,7 @@ impl Queues {
             from_pc: Queue::new(),
             to_pc: Queue::new(),
             waiting: Waiting::new(),
+            segments: Segments::new(),
         }
     }
 
@@ -120,7 +123,7 @@ impl Queues {
         let (from_pc, from_pc_out) = self.from_pc.split();
         let (to_pc_in, to_pc) = self.to_pc.split();
         Ends {
-            tick: TickEnds { orders, large_orders, outputs },
+            tick: (TickEnds { orders, large_orders, outputs }, &mut self.segments),
             usb: UsbEnds { from_pc, to_pc },
             telemetry: (
                 TelemetryEnds {

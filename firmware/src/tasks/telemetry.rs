@@ -145,7 +145,7 @@ impl<B: Board> Telemetry<B> {
                     self.shared.trips.raise(fault);
                     continue;
                 }
-                large @ (Order::Configure(_) | Order::Excite(_) | Order::Index(_)) => {
+                large @ (Order::Configure(_) | Order::Excite(_) | Order::Play(_) | Order::Index(_)) => {
                     if !self.ends.orders.ready() || !self.ends.large_orders.ready() {
                         self.held = Some(large);
                         return;

@@ -9,6 +9,7 @@ use crate::timing;
 use control_core::config::DacWidth;
 use control_core::controller::TickInput;
 use control_core::event::Fault;
+use control_core::excitation::Segments;
 use control_core::interlock::Interlock;
 use control_core::{Controller, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
@@ -18,12 +19,13 @@ use link::frames::Stage;
 const HEAT_TICKS: u32 = 8;
 
 /// The tick's own state.
+// In this order: the nearer a field is to the beginning, the fewer instructions it takes to reach it.
+#[repr(C)]
 pub struct Tick<B: Board> {
     shared: &'static Shared,
     timer: B::Timer,
     encoder: B::Encoder,
     drive: BoardDrive<B>,
-    controller: Controller,
     width: DacWidth,
     ends: TickEnds,
     tick: u32,
@@ -31,6 +33,7 @@ pub struct Tick<B: Board> {
     entered: u32,
     supervised_ms: u32,
     unsupervised_ticks: u32,
+    controller: Controller<&'static mut Segments>,
 }
 
 /// Converters and amplifier enable of a board.
@@ -43,14 +46,14 @@ impl<B: Board> Tick<B> {
         (timer, encoder, drive): (B::Timer, B::Encoder, BoardDrive<B>),
         plan: &Plan,
         heat: u32,
-        ends: TickEnds,
+        (ends, segments): (TickEnds, &'static mut Segments),
     ) -> Self {
         Self {
             shared,
             timer,
             encoder,
             drive,
-            controller: Controller::warm(plan.clone(), heat),
+            controller: Controller::with(segments, plan.clone(), heat),
             width: plan.device().dac,
             ends,
             tick: 0,
@@ -120,16 +123,35 @@ impl<B: Board> Tick<B> {
             SmallOrder::Zero => self.controller.order(Order::Zero),
             SmallOrder::Heartbeat => self.controller.heartbeat(),
             SmallOrder::Compensate(gains) => self.controller.order(Order::Compensate(gains)),
-            SmallOrder::Large(session) => match self.ends.large_orders.dequeue() {
-                Some(excite @ Order::Excite(_)) => self.power_up(session, excite),
-                Some(order) => {
-                    self.controller.order(order);
-                    // A plan that came while torque was on has not been taken.
-                    self.width = self.controller.plan().config().device.dac;
-                }
-                None => {}
-            },
+            SmallOrder::Large(session) => self.take_large_order(session),
         }
+    }
+
+    /// On its own, because it is rare and an order takes much room.
+    #[cold]
+    #[inline(never)]
+    fn take_large_order(&mut self, session: u8) {
+        let Some(order) = self.ends.large_orders.dequeue() else { return };
+        if matches!(order, Order::Excite(_) | Order::Play(_)) && !self.may_power_up(session) {
+            return;
+        }
+        self.controller.order(order);
+        // A plan that came while torque was on has not been taken.
+        self.width = self.controller.plan().config().device.dac;
+    }
+
+    /// True for the PC that is there and under no interlock, which trips.
+    #[cold]
+    #[inline(never)]
+    fn may_power_up(&mut self, session: u8) -> bool {
+        if session != self.shared.session.load(Relaxed) {
+            return false;
+        }
+        let interlock = self.shared.conditions.get().first();
+        if let Some(interlock) = interlock {
+            self.controller.order(Order::Trip(interlock.fault()));
+        }
+        interlock.is_none()
     }
 
     /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before where it could know.

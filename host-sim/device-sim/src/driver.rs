@@ -7,7 +7,7 @@
 use control_core::compensation::Gains;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
-use link::codec::MAX_FRAME;
+use link::codec::{self, MAX_FRAME};
 use link::frames::{Ack, Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
 use link::host::{Commands, Counts, Reception};
 use std::collections::VecDeque;
@@ -33,6 +33,8 @@ pub enum Request {
     Zero,
     /// Play an excitation, with no hand on the needle.
     Excite(Excitation),
+    /// Play several excitations without a rest between them, with no hand on the needle.
+    Sequence(Vec<Excitation>),
     /// Another patient; torque goes off for it.
     Patient(Box<Patient>),
     /// Another device's part.
@@ -79,7 +81,7 @@ struct Pending {
 
 impl Pending {
     fn gives_torque(&self) -> bool {
-        matches!(self.command, Command::Start | Command::Excite(_))
+        matches!(self.command, Command::Start | Command::Excite(_) | Command::Play { .. })
     }
 }
 
@@ -140,17 +142,17 @@ impl Driver {
                     )
                 });
                 self.waiting.push_front(Command::Stop);
-                if self
-                    .pending
-                    .as_ref()
-                    .is_some_and(|p| matches!(p.command, Command::Start | Command::Zero | Command::Excite(_)))
-                {
+                if self.pending.as_ref().is_some_and(|pending| {
+                    pending.gives_torque()
+                        || matches!(pending.command, Command::Zero | Command::Segment { .. })
+                }) {
                     self.pending = None;
                 }
             }
             Request::Start => self.waiting.push_back(Command::Start),
             Request::Zero => self.waiting.push_back(Command::Zero),
             Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
+            Request::Sequence(segments) => self.sequence(segments),
             Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
             Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
             Request::Commission => self.waiting.push_back(Command::Commission),
@@ -162,6 +164,15 @@ impl Driver {
             }
             Request::Index(count) => self.waiting.push_back(Command::Index(Some(count))),
         }
+    }
+
+    /// Uploads segments one by one and has them played; the device checks that it has all of them.
+    fn sequence(&mut self, segments: Vec<Excitation>) {
+        let play = Command::Play { count: segments.len() as u8, checksum: codec::hash(&segments.as_slice()) };
+        for (index, excitation) in (0_u8..).zip(segments) {
+            self.waiting.push_back(Command::Segment { index, excitation });
+        }
+        self.waiting.push_back(play);
     }
 
     /// Takes bytes; gives every whole frame to `see`.
@@ -286,7 +297,9 @@ impl Driver {
                 self.has_started = true;
                 self.notice = None;
             }
-            (Ok(()), Command::Stop | Command::Zero | Command::Excite(_)) => self.notice = None,
+            (Ok(()), Command::Stop | Command::Zero | Command::Excite(_) | Command::Play { .. }) => {
+                self.notice = None;
+            }
             (Ok(()), _) => {}
             // The same bytes again, soon.
             (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
@@ -300,6 +313,7 @@ impl Driver {
             (
                 Err(
                     why @ (Rejection::Config(_)
+                    | Rejection::Sequence(_)
                     | Rejection::Version
                     | Rejection::Commissioned(_)
                     | Rejection::NotShown),

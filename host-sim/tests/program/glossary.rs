@@ -2,6 +2,7 @@
 
 use control_core::Refusal;
 use control_core::event::Fault;
+use control_core::excitation::SequenceRefusal;
 use control_core::interlock::Interlock;
 use control_core::plan::Field;
 use diagnosis::Verdict;
@@ -36,12 +37,23 @@ fn the_glossary_quotes_every_fault_and_rejection_exactly() {
         Rejection::NotShown,
     ];
     let interlocked = Interlock::ALL.map(Rejection::Interlocked);
+    let sequence = [
+        SequenceRefusal::TooLong { index: 1 },
+        SequenceRefusal::TooMany,
+        SequenceRefusal::OutOfOrder { index: 2, due: 1 },
+        SequenceRefusal::Mixed { index: 1 },
+        SequenceRefusal::Nothing,
+        SequenceRefusal::Count { found: 2, wanted: 3 },
+        SequenceRefusal::Damaged,
+        SequenceRefusal::Late,
+    ]
+    .map(Rejection::Sequence);
     let kept = [SaveFailure::Flash, SaveFailure::Full, SaveFailure::TooLong];
-    let sentences = own.iter().chain(&interlocked).map(ToString::to_string);
+    let sentences = own.iter().chain(&interlocked).chain(&sequence).map(ToString::to_string);
     let sentences: Vec<String> = sentences.chain(kept.map(|failure| failure.to_string())).collect();
     let rejections = rows("Rejections by the device");
-    // Two heads, and the row that points to the refusals.
-    assert_eq!(rejections.len(), 3 + sentences.len());
+    // Two heads, and the two rows that point to the refusals.
+    assert_eq!(rejections.len(), 4 + sentences.len());
     for sentence in sentences {
         assert!(rejections.iter().any(|row| row.ends_with(&format!("| {sentence} |"))), "{sentence}");
     }

@@ -22,6 +22,8 @@ fn needs_torque_off(command: &Command) -> bool {
             | Command::Zero
             | Command::Excite(_)
             | Command::Index(_)
+            | Command::Segment { .. }
+            | Command::Play { .. }
     )
 }
 
@@ -87,6 +89,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.order(Order::Compensate(gains))
             }
             Command::Index(index) => self.order(Order::Index(index.map(Counts))),
+            Command::Segment { index, excitation } => self.upload(index, excitation),
+            Command::Play { count, checksum } => self.play(count, checksum),
         }
     }
 
@@ -95,6 +99,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return Err(Rejection::Version);
         }
         self.forget_waiting();
+        self.upload.forget();
         self.in_session = true;
         self.hello_due = true;
         self.crash_due = true;
@@ -105,6 +110,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     fn stop(&mut self) -> Result<(), Rejection> {
         self.start_ordered = false;
         self.proof.interrupt();
+        self.upload.forget();
         // A stop must not wait behind other orders.
         self.waiting.borrow_mut().orders.clear();
         self.order(Order::Stop)
@@ -117,8 +123,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return Err(Rejection::Interlocked(Interlock::NotZeroed));
         }
         self.order(Order::Start)?;
-        self.start_ordered = true;
-        self.forget_fault();
+        self.will_power_up();
         Ok(())
     }
 
@@ -131,24 +136,25 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
         self.order(Order::Excite(excitation))?;
         self.proof = if is_gentle { Proof::Ordered } else { Proof::None };
-        self.start_ordered = true;
-        self.forget_fault();
+        self.will_power_up();
         Ok(())
     }
 
-    /// A person has started the device, and has been told what ended its last run.
-    fn forget_fault(&mut self) {
+    /// A person has started the device, and has been told what ended its last run. A sequence that still waits is not what was wanted.
+    pub(super) fn will_power_up(&mut self) {
+        self.start_ordered = true;
         self.fault = None;
         self.crash = None;
+        self.upload.forget();
     }
 
-    fn is_commissioned(&self) -> Result<(), Rejection> {
+    pub(super) fn is_commissioned(&self) -> Result<(), Rejection> {
         let is = self.plan.device().commissioned;
         if is { Ok(()) } else { Err(Rejection::Interlocked(Interlock::NotCommissioned)) }
     }
 
     /// Torque is given to a PC that listens, and under no interlock.
-    fn may_give_torque(&self) -> Result<(), Rejection> {
+    pub(super) fn may_give_torque(&self) -> Result<(), Rejection> {
         if !self.in_session {
             return Err(Rejection::NoSession);
         }
@@ -174,6 +180,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     fn configure(&mut self, plan: Plan) -> Result<(), Rejection> {
         self.order(Order::Configure(plan.clone()))?;
         self.plan = plan;
+        self.upload.forget();
         self.hello_due = true;
         Ok(())
     }

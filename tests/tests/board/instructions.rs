@@ -8,7 +8,7 @@ use control_core::config::{
     DacWidth, FrictionLaw, Law, Layer, MAX_LAYERS, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall,
 };
 use control_core::event::State;
-use control_core::excitation::{Excitation, MAX_LINES, Servo, Signal};
+use control_core::excitation::{Excitation, MAX_LINES, MAX_SEGMENTS, Servo, Signal};
 use control_core::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillimetresPerSecond, MillinewtonMetres,
     Newtons, Stiffness,
@@ -20,7 +20,7 @@ use tests::board::cache;
 use tests::board::plant::{self, PlantSide};
 use tests::board::{Board, MILLISECOND, Nanos};
 use tests::laws;
-use tests::pc::Pc;
+use tests::pc::{self, Pc};
 use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 
 /// The tick's interrupt handler.
@@ -52,7 +52,7 @@ impl Profile {
     fn add(
         &mut self,
         config: Config,
-        begin: Command,
+        begin: &[Command],
         plant: impl PlantSide + 'static,
         end: Nanos,
         mut meddle: impl FnMut(&mut Pc, &mut Board),
@@ -63,7 +63,7 @@ impl Profile {
         pc.configure(&mut board, &config);
         // Only with the rotor's angle is all of a compensation fed forward.
         pc.must(&mut board, Command::Index(Some(17)));
-        pc.must(&mut board, begin);
+        begin.iter().for_each(|command| pc.must(&mut board, command.clone()));
         board.count_runs_of(TICK);
         while board.now() < end {
             pc.run_ms(&mut board, 1);
@@ -197,7 +197,7 @@ fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
     let (mut board, _) =
-        profile.add(Config::commissioned_virtual(), Command::Start, venepuncture(BEGIN), end, |_, _| ());
+        profile.add(Config::commissioned_virtual(), &[Command::Start], venepuncture(BEGIN), end, |_, _| ());
     profile.has_worked();
     let longest = profile.longest("default");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
@@ -248,7 +248,7 @@ fn a_tick_that_feeds_all_of_it_forward_takes_at_most_1260_instructions() {
     config.device.compensation = all_fed_forward();
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
-    let (mut board, _) = profile.add(config, Command::Start, venepuncture(BEGIN), end, |_, _| ());
+    let (mut board, _) = profile.add(config, &[Command::Start], venepuncture(BEGIN), end, |_, _| ());
     profile.has_worked();
     let longest = profile.longest("all fed forward");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
@@ -283,7 +283,7 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
             }
         };
         let hand = plant::by_hand(plant::eased(path(moves)));
-        profile.add(config, Command::Start, hand, BEGIN + 580 * MILLISECOND, restart);
+        profile.add(config, &[Command::Start], hand, BEGIN + 580 * MILLISECOND, restart);
     }
     profile.has_worked();
     let longest = profile.longest("heaviest");
@@ -312,7 +312,7 @@ fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
             ];
             let hand = plant::by_hand(plant::eased(path(moves)));
             let end = BEGIN + (480.0 + 6.0 * ms) as u64 * MILLISECOND;
-            profile.add(make(count), Command::Start, hand, end, |_, _| ());
+            profile.add(make(count), &[Command::Start], hand, end, |_, _| ());
         }
         for state in WORKING.into_iter().filter(|state| puncture || *state != State::Puncture) {
             assert!(profile.by_state.contains_key(&(state as u8)), "{name}: {state:?} was not reached");
@@ -323,12 +323,10 @@ fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
     }
 }
 
-/// Every signal, as much of it as there may be and its legs as short as they may be, while the motor turns to and fro.
-#[test]
-fn nor_does_a_tick_that_plays_an_excitation() {
-    let torque = MillinewtonMetres(q(0.5));
+/// Every signal, as much of it as there may be and its legs as short as they may be.
+fn every_signal() -> [Signal; 6] {
     let speed = MillimetresPerSecond(q(50.0));
-    let signals = [
+    [
         Signal::SpeedStaircase {
             slowest: MillimetresPerSecond(q(1.0)),
             ratio: q(1.1),
@@ -337,26 +335,56 @@ fn nor_does_a_tick_that_plays_an_excitation() {
         },
         Signal::Triangle { stroke: Millimetres(q(1.0)), speed },
         Signal::ReversalLadder { smallest: Millimetres(q(0.1)), ratio: q(1.2), steps: 16, speed },
-        Signal::Multisine { torque, frequencies: (1..=MAX_LINES as u16).map(|line| 17 * line).collect() },
-        Signal::BreakawayRamps { torque, ramp_ms: 50 },
+        multisine(),
+        Signal::BreakawayRamps { torque: MillinewtonMetres(q(0.5)), ramp_ms: 50 },
         Signal::Hold,
-    ];
-    let turns = || (0..30).map(|turn| (f64::from(turn) * 20.0, i64::from(turn % 2) * 150));
+    ]
+}
+
+fn multisine() -> Signal {
+    let frequencies = (1..=MAX_LINES as u16).map(|line| 17 * line).collect();
+    Signal::Multisine { torque: MillinewtonMetres(q(0.5)), frequencies }
+}
+
+fn played(signal: Signal, duration_ms: u32) -> Excitation {
+    let servo = Servo { stiffness: Stiffness(q(0.5)), damping: Damping(I8F24::from_num(0.001)) };
+    Excitation { signal, duration_ms, servo, travel: Millimetres(q(100.0)), compensated: false }
+}
+
+/// A motor that turns to and fro.
+fn to_and_fro() -> Vec<(Nanos, i64)> {
+    path((0..30).map(|turn| (f64::from(turn) * 20.0, i64::from(turn % 2) * 150)))
+}
+
+#[test]
+fn nor_does_a_tick_that_plays_an_excitation() {
     let mut profile = Profile::default();
-    for signal in signals {
+    for signal in every_signal() {
         let config = heaviest(0.6).last().expect("there are some");
-        let servo = Servo { stiffness: Stiffness(q(0.5)), damping: Damping(I8F24::from_num(0.001)) };
-        let excitation = Excitation {
-            signal,
-            duration_ms: 10_000,
-            servo,
-            travel: Millimetres(q(100.0)),
-            compensated: false,
-        };
-        let end = BEGIN + 600 * MILLISECOND;
-        profile.add(config, Command::Excite(excitation), plant::path(path(turns())), end, |_, _| ());
+        let begin = [Command::Excite(played(signal, 10_000))];
+        profile.add(config, &begin, plant::path(to_and_fro()), BEGIN + 600 * MILLISECOND, |_, _| ());
     }
     assert!(profile.by_state.contains_key(&(State::Excitation as u8)), "nothing was played");
     let longest = profile.longest("excitations");
+    assert!(longest <= EXCITING, "a tick of {longest} instructions");
+}
+
+/// One of every signal, and one of multisines alone, which take longest, in segments as short as they may be: the ticks in which one segment
+/// gives way to the next are among them.
+#[test]
+fn nor_does_a_tick_that_plays_a_sequence() {
+    let mut every: Vec<Excitation> = every_signal().map(|signal| played(signal, 60)).into();
+    every.insert(3, played(multisine(), 10));
+    let multisines = vec![played(multisine(), 10); MAX_SEGMENTS];
+    let mut profile = Profile::default();
+    for segments in [every, multisines] {
+        let config = heaviest(0.6).last().expect("there are some");
+        let end = BEGIN + 600 * MILLISECOND;
+        profile.add(config, &pc::sequence(&segments), plant::path(to_and_fro()), end, |_, _| ());
+    }
+    let ticks = profile.by_state.get(&(State::Excitation as u8)).map_or(0, Vec::len);
+    assert!(ticks > 4_000, "{ticks} of 4,500 ticks of two sequences");
+    let longest = profile.longest("sequences");
+    println!("tick_instructions_sequence={longest}");
     assert!(longest <= EXCITING, "a tick of {longest} instructions");
 }

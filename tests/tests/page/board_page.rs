@@ -95,7 +95,9 @@ impl Bench {
     }
 
     fn gives_torque(&self) -> bool {
-        self.commands.iter().any(|command| matches!(command, Command::Start | Command::Excite(_)))
+        self.commands
+            .iter()
+            .any(|command| matches!(command, Command::Start | Command::Excite(_) | Command::Play { .. }))
     }
 
     /// Begins a step as a person does.

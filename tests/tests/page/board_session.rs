@@ -109,7 +109,9 @@ impl Cable {
     }
 
     fn gives_torque(&self) -> bool {
-        self.commands.iter().any(|command| matches!(command, Command::Start | Command::Excite(_)))
+        self.commands
+            .iter()
+            .any(|command| matches!(command, Command::Start | Command::Excite(_) | Command::Play { .. }))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::store::{ConfigFlash, Slot, StoreError};
 use crate::tilt::{Reading, TiltSource};
 use crate::timing;
 use control_core::config::DacWidth;
+use control_core::excitation::Segments;
 use control_core::units::{Counts, DacCode};
 use control_core::{Device, Patient, Plan};
 use core::cell::{Cell, RefCell};
@@ -266,7 +267,7 @@ pub(super) fn shared() -> &'static Shared {
 }
 
 /// The ends of queues that live as long as the test's process.
-pub(super) fn ends() -> (TickEnds, UsbEnds, (TelemetryEnds, &'static mut Waiting)) {
+pub(super) fn ends() -> ((TickEnds, &'static mut Segments), UsbEnds, (TelemetryEnds, &'static mut Waiting)) {
     let queues: &'static mut Queues = Box::leak(Box::new(Queues::new()));
     let ends = queues.split();
     (ends.tick, ends.usb, ends.telemetry)

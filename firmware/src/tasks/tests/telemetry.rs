@@ -30,7 +30,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let shared = shared();
-        let (tick, usb, telemetry_ends) = ends();
+        let ((tick, _), usb, telemetry_ends) = ends();
         let identity = Identity { firmware: [1, 2, 3], ..Identity::VIRTUAL };
         let blank = || std::vec![u32::MAX; Words::CELLS * CELL_WORDS];
         let (store, ..) = Store::open(Words([blank(), blank()]));
