@@ -26,9 +26,11 @@ impl Prediction {
         let mut plant = Plant::new(&rival.rig);
         let gain = rival.rig.actuator.gain;
         let mut out = Self::default();
+        // From segment to segment the reference goes on from where it is, as on the device.
+        let mut begin = plant.reading();
         for segment in &input.segments {
-            let begin = plant.reading();
-            for row in 0..(segment.seconds / STEP_S).round() as usize {
+            let rows = (segment.seconds / STEP_S).round() as usize;
+            for row in 0..rows {
                 let target = segment.signal.at(row as f64 * STEP_S);
                 let (position, velocity) = (plant.reading(), plant.velocity());
                 let reference = begin + target.position;
@@ -42,6 +44,7 @@ impl Prediction {
                 out.reference.push(reference);
                 plant.step(command, Surroundings::default(), STEP_S);
             }
+            begin += segment.signal.at(rows as f64 * STEP_S).position;
         }
         out
     }

@@ -1,11 +1,12 @@
-//! Plays one programme on whatever device answers: asks for a step, waits until it has been played, asks for the next, and
-//! keeps every sample. A fault, a refusal or a lost sample ends it: a recording with a hole is no recording.
+//! Plays one programme on whatever device answers: asks for a part of it, waits until it has been played, asks for the next, and
+//! keeps every sample. The steps of a part play without a rest, as one sequence that the device has taken before it begins.
+//! A fault, a refusal or a lost sample ends it: a recording with a hole is no recording.
 
+use super::following::Following;
 use super::programme::{Programme, Step};
 use super::written::Track;
 use control_core::controller::Sample;
 use control_core::event::{Fault, State};
-use control_core::excitation::Reference;
 use control_core::{Config, TICK_HZ};
 use device_sim::driver::{Driver, Request};
 use device_sim::failure::Failure;
@@ -23,35 +24,48 @@ const TO_ANSWER: Duration = Duration::from_secs(5);
 enum Phase {
     /// Waiting until the device has taken its configuration.
     Greeting { since: Duration },
-    /// Step `index` has been asked for.
+    /// Part `index` has been asked for.
     Asked { index: usize, since: Duration },
-    /// Step `index` is played.
+    /// Part `index` is played.
     Playing { index: usize, since: Duration },
-    /// All steps are done.
+    /// All parts are done.
     Over,
 }
 
 /// Plays one programme.
 pub struct Conductor<'a> {
     driver: Driver,
-    programme: &'a Programme,
+    file: &'static str,
+    /// Steps that play without a rest, in order.
+    parts: Vec<&'a [Step]>,
     phase: Phase,
     now: Duration,
     hello: Option<Hello>,
     mm_per_count: f64,
     samples: Vec<Sample>,
     reference: Vec<f64>,
-    following: Option<(Reference, f64)>,
+    following: Option<Following<'a>>,
     next_tick: Option<u64>,
     failure: Option<Failure>,
 }
 
 impl<'a> Conductor<'a> {
     /// Nothing is connected yet.
-    pub fn new(config: Config, programme: &'a Programme) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// A sentence if `config` is unsound.
+    pub fn new(config: Config, programme: &'a Programme) -> Result<Self, Failure> {
+        let plan = config.plan().map_err(Failure::failed)?;
+        let mut steps = programme.steps.as_slice();
+        let parts = programme.parts(&plan).into_iter().map(|count| {
+            let (part, rest) = steps.split_at(count);
+            steps = rest;
+            part
+        });
+        Ok(Self {
+            parts: parts.collect(),
             driver: Driver::new(config.patient),
-            programme,
+            file: programme.file,
             phase: Phase::Greeting { since: Duration::ZERO },
             now: Duration::ZERO,
             hello: None,
@@ -61,7 +75,7 @@ impl<'a> Conductor<'a> {
             following: None,
             next_tick: None,
             failure: None,
-        }
+        })
     }
 
     /// A connection is open.
@@ -82,7 +96,8 @@ impl<'a> Conductor<'a> {
                 self.fail("the device did not answer; check that it runs this project's firmware");
             }
             Phase::Asked { index, since } if now.saturating_sub(since) > TO_BEGIN => {
-                self.fail(format_args!("the device did not begin step {}; restart it", index + 1));
+                let step: usize = self.parts[..index].iter().map(|part| part.len()).sum();
+                self.fail(format_args!("the device did not begin step {}; restart it", step + 1));
             }
             _ => {}
         }
@@ -92,7 +107,7 @@ impl<'a> Conductor<'a> {
         if let Phase::Playing { index, .. } = self.phase
             && self.samples.last().is_some_and(|s| s.state == State::Idle as u8)
         {
-            if index + 1 < self.programme.steps.len() {
+            if index + 1 < self.parts.len() {
                 self.ask(index + 1, &mut begins);
             } else {
                 self.phase = Phase::Over;
@@ -116,10 +131,10 @@ impl<'a> Conductor<'a> {
         }
     }
 
-    /// The step that is played, and since when.
+    /// The first step of the part that is played, and since when.
     pub fn playing(&self) -> Option<(&Step, Duration)> {
         match self.phase {
-            Phase::Playing { index, since } => Some((&self.programme.steps[index], since)),
+            Phase::Playing { index, since } => Some((self.parts[index].first()?, since)),
             _ => None,
         }
     }
@@ -142,13 +157,16 @@ impl<'a> Conductor<'a> {
         let Some(hello) = self.hello else {
             return Err(Failure::failed("the device did not identify itself; restart it"));
         };
-        Ok(Track { file: self.programme.file, hello, samples: self.samples, reference: self.reference })
+        Ok(Track { file: self.file, hello, samples: self.samples, reference: self.reference })
     }
 
     fn ask(&mut self, index: usize, begins: &mut impl FnMut(&Step)) {
-        let step = &self.programme.steps[index];
-        begins(step);
-        self.driver.request(Request::Excite(step.excitation.clone()));
+        let part = self.parts[index];
+        part.iter().for_each(begins);
+        self.driver.request(match part {
+            [step] => Request::Excite(step.excitation.clone()),
+            _ => Request::Sequence(part.iter().map(|step| step.excitation.clone()).collect()),
+        });
         self.phase = Phase::Asked { index, since: self.now };
     }
 
@@ -192,10 +210,9 @@ impl<'a> Conductor<'a> {
         let is_played = sample.state == State::Excitation as u8;
         if let (true, Phase::Asked { index, .. }) = (is_played, self.phase) {
             self.phase = Phase::Playing { index, since: self.now };
-            let reference = Reference::new(&self.programme.steps[index].excitation.signal);
             // It begins where the motor was one tick earlier.
             let begin = self.samples.last().map_or(sample.count, |last| last.count);
-            self.following = Some((reference, f64::from(begin)));
+            self.following = Following::new(self.parts[index], f64::from(begin), self.mm_per_count);
         }
         if !is_played {
             self.following = None;
@@ -204,10 +221,8 @@ impl<'a> Conductor<'a> {
             return;
         }
         let reference = match &mut self.following {
-            Some((reference, begin)) => {
-                *begin + reference.tick().position.0.to_num::<f64>() / self.mm_per_count
-            }
-            // Between two steps torque is off and nothing is followed.
+            Some(following) => following.tick(sample.count),
+            // Between two parts torque is off and nothing is followed.
             None => self.reference.last().copied().unwrap_or(f64::from(sample.count)),
         };
         self.samples.push(*sample);

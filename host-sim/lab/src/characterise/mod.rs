@@ -2,6 +2,7 @@
 //! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
 
 pub mod conductor;
+mod following;
 pub mod mechanism;
 pub mod programme;
 pub mod written;
@@ -54,7 +55,7 @@ pub fn on_virtual(
     let mut tracks = Vec::new();
     for programme in programmes {
         news(News::Recording(programme));
-        let mut conductor = Conductor::new(configuration(), programme);
+        let mut conductor = Conductor::new(configuration(), programme)?;
         conductor.connected(lockstep::time(device.ticks()));
         while !conductor.is_over() {
             let now = lockstep::time(device.ticks());
@@ -95,7 +96,7 @@ pub fn on_port(
     let mut tracks = Vec::new();
     for programme in programmes {
         news(News::Recording(programme));
-        let mut conductor = Conductor::new(configuration(), programme);
+        let mut conductor = Conductor::new(configuration(), programme)?;
         conductor.connected(begin.elapsed());
         while !conductor.is_over() {
             if stop.load(Ordering::Relaxed) {
@@ -117,7 +118,7 @@ pub fn on_port(
     Ok(tracks)
 }
 
-/// Checks that every step may be played under `config`; the device checks it again.
+/// Checks that every step may be played under `config`; the device checks it again, and the sequences too.
 pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
     let refuse =
         |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));

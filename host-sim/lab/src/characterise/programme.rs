@@ -2,7 +2,8 @@
 //! the servo's gains. The held-out recording mixes the same signals with other numbers, so that a model fitted to the others
 //! must predict instead of repeating.
 
-use control_core::excitation::{Excitation, Servo, Signal};
+use control_core::Plan;
+use control_core::excitation::{Excitation, Sequence, Servo, Signal};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use device_setup::servo::servo;
 use diagnosis::rig::Rig;
@@ -44,6 +45,31 @@ impl Step {
 }
 
 impl Programme {
+    /// Returns the number of steps of each part in order. A part plays without a rest between its steps: as many as the device takes as one
+    /// sequence under `plan`, and alone a step with a prompt, which takes a person's time.
+    pub fn parts(&self, plan: &Plan) -> Vec<usize> {
+        let mut parts: Vec<usize> = Vec::new();
+        let mut sequence = Sequence::new();
+        for step in &self.steps {
+            let place = sequence.segments().len();
+            let follows = place > 0
+                && step.prompt.is_none()
+                && sequence.upload(place as u8, step.excitation.clone(), plan).is_ok();
+            match parts.last_mut().filter(|_| follows) {
+                Some(part) => *part += 1,
+                None => {
+                    parts.push(1);
+                    sequence.forget();
+                    if step.prompt.is_none() {
+                        // One that the device refuses is refused by it, alone.
+                        let _ = sequence.upload(0, step.excitation.clone(), plan);
+                    }
+                }
+            }
+        }
+        parts
+    }
+
     /// Length in s.
     pub fn seconds(&self) -> f64 {
         self.steps.iter().map(|s| f64::from(s.excitation.duration_ms)).sum::<f64>() * 1e-3
