@@ -5,6 +5,11 @@ use super::joint_terms::JointTerms;
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
+/// Longest delay worth looking for, s: a few rows of a slow controller.
+fn longest(span: &Span) -> f64 {
+    (5.0 * span.row).max(0.03)
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
@@ -28,11 +33,11 @@ impl EffectSearch for Defined {
         true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let delays = logarithmic((0.2 * span.row).max(1e-5), 0.03, 16);
+        let delays = logarithmic((0.2 * span.row).max(1e-5), longest(span), 16);
         delays.into_iter().map(|delay| Effect::shaped(name, &[("delay", delay)])).collect()
     }
-    fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
-        vec![("delay", 1e-6, 0.06)]
+    fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
+        vec![("delay", 1e-6, 2.0 * longest(span))]
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0

@@ -94,10 +94,14 @@ impl EffectReport for Defined {
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
-        let base = fitted.own_dry.abs();
-        let relative = (base > 0.0).then(|| Reported::new("change", (change / base, sd / base), "1"));
-        let time = Reported::new("time_constant", fitted.shape("time_constant"), "s");
-        relative.into_iter().chain([time]).collect()
+        let base = if fitted.own_dry == 0.0 { fitted.dry.unwrap_or(0.0) } else { fitted.own_dry }.abs();
+        let size = if base > 0.0 {
+            Reported::new("change", (change / base, sd / base), "1")
+        } else {
+            // There is no dry friction of which it could be a part.
+            Reported::new("coulomb", fitted.scaled((change, sd)), fitted.force)
+        };
+        vec![size, Reported::new("time_constant", fitted.shape("time_constant"), "s")]
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

@@ -25,21 +25,31 @@ use crate::validation::shares::laws::is_by_command;
 use crate::validation::shares::material::Material;
 use crate::validation::shares::select::{Selected, Selection};
 
+/// Part of what is left of the force from which an effect is most of it, so that noise does not limit.
+const MOST_OF_REST: f64 = 0.4;
+/// Factor below which one model leaves clearly less than another.
+const CLEARLY_LESS: f64 = 0.8;
+
 /// What shares of the force error make of what was found.
 pub(crate) enum ByShares {
     /// Noise limits, or nothing takes enough: what was found stands as it is.
     Nothing,
     /// The model found explains nearly all down to the noise, and shares name these of its effects too.
     Confirmed(Vec<Material>),
-    /// Other physics limits: the effects that shares select, with those found that a regression cannot judge or that take a
-    /// part of their own.
-    Selected(Box<Found>),
+    /// Other physics limits: the effects that shares select.
+    Selected {
+        /// With those found that a regression cannot judge or that take a part of their own.
+        with: Box<Found>,
+        /// Without those, where there are any.
+        alone: Option<Box<Found>>,
+    },
 }
 
-/// Selects effects by shares of the force error, except where physics without a name surely explains most: that is known better.
+/// Selects effects by shares of the force error, except where physics without a name surely explains most and takes more than they do
+/// together.
 pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let regime = Regime::of(prepared, found);
-    if regime == Regime::Noise || is_foreign(prepared, found) {
+    if regime == Regime::Noise {
         return ByShares::Nothing;
     }
     let context = prepared.context(&prepared.fit);
@@ -47,17 +57,19 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
         return ByShares::Nothing;
     };
     let own: &[Effect] = &found.standing.model.model.effects;
+    let mut selected = selection.select(TAKEN_SHARE, own);
+    let together: Vec<&Effect> = selected.iter().map(|one| &one.share.effect).collect();
+    if is_foreign(prepared, found) && selection.is_rather_unnamed(&together) {
+        return ByShares::Nothing;
+    }
+    selected.retain(|one| one.is_named() && one.class().len() <= MOST_IN_CLASS);
+    let regime = if is_most_of_rest(&selected, own) { Regime::Physics } else { regime };
     // The forms of the command, which speak against its laws next to noise, are none that a regression tries.
     let may_confirm = |effect: &&Effect| !is_by_command(effect);
     let in_own =
         |one: &Selected| own.iter().filter(may_confirm).find(|effect| one.class().contains(&effect.name));
-    let is_named = |one: &Selected| one.is_named() && one.class().len() <= MOST_IN_CLASS;
-    let mut selected = selection.select(TAKEN_SHARE);
-    selected.retain(|one| is_named(one) && (regime == Regime::Physics || in_own(one).is_some()));
-    let turn = prepared.nominal.rig.turn();
-    let linear = prepared.nominal.rig.kind == Kind::Linear;
-    let excitation = Excitation::of(&found.fit, prepared.span.count, turn).shown();
-    let shown = Shown { linear, count: prepared.span.count, ..excitation };
+    selected.retain(|one| regime == Regime::Physics || in_own(one).is_some());
+    let shown = shown(prepared, found);
     let material = |one: &Selected| {
         let same = in_own(one).filter(|_| regime == Regime::Explained);
         let name = same.map_or(one.share.effect.name, |effect| effect.name);
@@ -67,12 +79,43 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let materials: Vec<Material> = selected.iter().map(material).collect();
     match regime {
         _ if materials.is_empty() => ByShares::Nothing,
-        Regime::Physics => {
-            let (effects, rejected) = beside(found, &materials, &selected, &selection);
-            ByShares::Selected(Box::new(standing(prepared, found, effects, materials, rejected)))
-        }
+        Regime::Physics => standing_by_shares(prepared, found, &selected, materials, &selection),
         _ => ByShares::Confirmed(materials),
     }
+}
+
+/// What the recordings show of the axis.
+fn shown(prepared: &Prepared, found: &Found) -> Shown {
+    let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
+    let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
+    Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
+}
+
+/// True if shares name all that was found and besides something that takes most of what is left then, so that noise does not limit.
+fn is_most_of_rest(selected: &[Selected], own: &[Effect]) -> bool {
+    let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
+    let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));
+    own.iter().all(|effect| selected.iter().any(|one| is_same(one, effect)))
+        && selected.iter().any(|one| is_new(one) && one.share.least() >= MOST_OF_REST)
+}
+
+/// The recordings with the effects selected, unless what was found leaves clearly less.
+fn standing_by_shares(
+    prepared: &Prepared,
+    found: &Found,
+    selected: &[Selected],
+    materials: Vec<Material>,
+    selection: &Selection,
+) -> ByShares {
+    let alone: Vec<Effect> = selected.iter().map(|one| one.share.effect.clone()).collect();
+    let (effects, rejected) = beside(found, &materials, selected, selection);
+    let has_more = effects.len() > alone.len();
+    let with = standing(prepared, found, effects, materials.clone(), rejected);
+    if is_found_closer(prepared, found, &with, selection) {
+        return ByShares::Nothing;
+    }
+    let alone = has_more.then(|| Box::new(standing(prepared, found, alone, materials, Vec::new())));
+    ByShares::Selected { with: Box::new(with), alone }
 }
 
 /// True if physics without a name explains most of what a refit leaves, as surely as a name must.
@@ -80,6 +123,14 @@ fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
     let context = prepared.context(&found.fit);
     let refit = context.fit(Model::default(), &found.null.noise, Colour::White);
     out_of_library::alone(&context, &refit, &found.holdout).is_some()
+}
+
+/// True if a regression can judge all that was found, and it leaves clearly less than what was selected.
+fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
+    let own: &[Effect] = &found.standing.model.model.effects;
+    let is_judged = own.iter().all(|effect| selection.judges(effect));
+    let left = |of: &Found| discrepancy(prepared, of, &of.standing.model);
+    is_judged && left(found) < CLEARLY_LESS * left(selected)
 }
 
 /// The effects that were selected, with those found that stand beside them; and those found that do not.

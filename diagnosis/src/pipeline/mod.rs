@@ -63,11 +63,30 @@ fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
     match by_shares(prepared, &found) {
         ByShares::Nothing => assess::assess(prepared, found),
         ByShares::Confirmed(materials) => assess::assess(prepared, confirmed(found, materials)),
-        ByShares::Selected(selected) => match assess::assess(prepared, *selected) {
-            Ok(assessment) if !assessment.weighed.named().is_empty() => Ok(assessment),
-            _ => assess::assess(prepared, found),
-        },
+        ByShares::Selected { with, alone } => {
+            by_selected(prepared, *with, alone).map_or_else(|| assess::assess(prepared, found), Ok)
+        }
     }
+}
+
+/// The assessment of what shares selected, `with` what they cannot judge or `alone`, whichever has more of it named; none where nothing is
+/// named.
+fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> Option<Assessment> {
+    let all = with.standing.materials.len();
+    let assessed = |found| assess::assess(prepared, found).ok();
+    let named = |one: &Assessment| {
+        let is_selected = |i: &&usize| one.weighed.effects[**i].found.material.is_some();
+        one.weighed.named().iter().filter(is_selected).count()
+    };
+    let with = assessed(with);
+    // What a regression cannot judge may stand where a selected effect would.
+    let is_short = with.as_ref().is_none_or(|one| named(one) < all);
+    let alone = alone.filter(|_| is_short).and_then(|alone| assessed(*alone));
+    let best = match (with, alone) {
+        (Some(with), Some(alone)) if named(&alone) > named(&with) => Some(alone),
+        (with, alone) => with.or(alone),
+    };
+    best.filter(|one| !one.weighed.named().is_empty())
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.

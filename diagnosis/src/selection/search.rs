@@ -50,15 +50,18 @@ fn along(
 impl FitContext<'_> {
     /// The wanted effects that are not in a model yet and that these recordings may show beside it.
     pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
-        let there = |name: N| model.effects.iter().any(|e| e.name == name);
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);
+        self.that_may_show(model, &|name| (dry || !name.definition().needs_dry()) && wanted(name))
+    }
+
+    /// The same, with those that refine a dry friction which neither the rig nor the model has.
+    pub(crate) fn that_may_show(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
+        let there = |name: N| model.effects.iter().any(|e| e.name == name);
         let no_losses = self.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
         let is_tried = |name: &N| {
-            let definition = name.definition();
             !there(*name)
-                && (!definition.needs_dry() || dry)
-                && (!definition.is_of_jumps() || !no_losses)
+                && (!name.definition().is_of_jumps() || !no_losses)
                 && candidates::is_seen(*name, self.nominal)
                 && wanted(*name)
         };

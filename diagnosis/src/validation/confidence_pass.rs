@@ -144,18 +144,16 @@ impl WeighedModel {
         })
     }
 
-    /// Returns what rules out an effect that shares of the force error name; none if nothing does.
-    fn contradiction_of_material(&self, assessed: &WeighedEffect) -> Option<Rejection> {
-        if !assessed.is_there {
-            return Some(Rejection::NoSize);
-        }
-        immaterial(&assessed.found).or_else(|| assessed.rather.clone().map(Rejection::Rather))
+    /// Returns what rules out an effect that shares of the force error name; none if nothing does. Physics without a name was weighed by
+    /// shares then.
+    fn contradiction_of_material(assessed: &WeighedEffect) -> Option<Rejection> {
+        if assessed.is_there { immaterial(&assessed.found) } else { Some(Rejection::NoSize) }
     }
 
     /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         if assessed.found.material.is_some() {
-            return self.contradiction_of_material(assessed);
+            return Self::contradiction_of_material(assessed);
         }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })

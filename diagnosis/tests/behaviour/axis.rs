@@ -10,7 +10,8 @@ use std::f64::consts::TAU;
 /// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
 /// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, dry
 /// friction that comes and goes along the travel where the axis is slow, cogging of twelve a turn, a push that follows the time since
-/// the start, and the frequency of the belt behind which half of it stands (none where zero).
+/// the start, the frequency of the belt behind which half of it stands (none where zero), and the part of its dry friction that comes
+/// on top while it is cold, for some 3 s.
 #[derive(Clone, Copy)]
 pub struct Machine {
     pub inertia: f64,
@@ -27,6 +28,7 @@ pub struct Machine {
     pub cogging: f64,
     pub push: f64,
     pub belt_hz: f64,
+    pub cold: f64,
     /// White disturbance, as a part of the forward dry friction.
     pub disturbance: f64,
 }
@@ -46,6 +48,7 @@ pub const AXIS: Machine = Machine {
     cogging: 0.0,
     push: 0.0,
     belt_hz: 0.0,
+    cold: 0.0,
     disturbance: 0.05,
 };
 
@@ -92,8 +95,8 @@ pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -
                 + machine.push * (TAU * (3.0 * t + 0.6 * t * t)).sin();
             let at = q;
             let grip = machine.slow_grip * (4.0 * q).sin().abs() * (-(v / 0.3).abs()).exp();
-            let dry =
-                grip + if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
+            let slides = if v > 0.0 || (v == 0.0 && free > 0.0) { machine.forward } else { machine.backward };
+            let dry = grip + slides * (1.0 + machine.cold * (-t / 3.0).exp());
             let before = v;
             if machine.belt_hz > 0.0 {
                 let (half, rate) = (0.5 * machine.inertia, TAU * machine.belt_hz);

@@ -1,6 +1,6 @@
 //! Effects beside physics without a name that is far above the noise: shares of the force error decide there.
 
-use crate::axis::{AXIS, BENCH, Machine, diagnosed, mixed, names, record, rig};
+use crate::axis::{AXIS, BENCH, Machine, Taken, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;
 use diagnosis::effects::EffectName as N;
 
@@ -22,4 +22,24 @@ fn dry_friction_is_named_beside_a_push_that_has_no_name() {
 fn a_push_that_has_no_name_alone_is_not_named() {
     let outcome = pushed(Machine { push: 2.0, ..AXIS }, "inertia = 2.0\nviscous = 8.0\ncoulomb = 3.0");
     assert!(names(&outcome).is_empty(), "{}", outcome.report.sentence);
+}
+
+#[test]
+fn friction_that_only_a_cold_axis_has_needs_no_dry_friction_in_the_rig() {
+    let machine = Machine { push: 2.0, forward: 0.2, backward: 0.2, cold: 60.0, disturbance: 0.0, ..AXIS };
+    let outcome = pushed(machine, "inertia = 2.0\nviscous = 8.0");
+    let named = outcome.report.effects.iter().find(|effect| effect.class.contains(&N::FrictionDrift));
+    let drift = named.unwrap_or_else(|| panic!("{}", outcome.report.sentence));
+    let change = drift.parameters["change"].value;
+    assert!((-1.05..-0.9).contains(&change), "{change}: from 12.2 N to 0.2 N");
+}
+
+#[test]
+fn a_delay_of_four_rows_is_named_at_fifty_rows_a_second() {
+    let machine = Machine { delay_s: 0.08, ..AXIS };
+    let slow = Taken { rate: 50.0, seconds: 30.0, ..BENCH };
+    let taken = |seed: u64| record(machine, slow, seed, mixed(40.0, seed as f64));
+    let rig = rig("inertia = 2.0\nviscous = 8.0\ncoulomb = 3.0", "", "", slow.counts);
+    let outcome = diagnosed(&rig, &[taken(1), taken(2)], &[taken(3)]);
+    assert!(names(&outcome).contains(&N::CommandDelay), "{}", outcome.report.sentence);
 }

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 /// Part of a dead band over which its inverse rises from one side to the other.
 const RAMP: f64 = 0.3;
 /// Bounds of the coefficient of a law of the command, which is one if the shape alone is right.
-pub(crate) const AS_IT_IS: (f64, f64) = (0.5, 2.0);
+pub(crate) const AS_IT_IS: (f64, f64) = (0.75, 1.33);
 
 /// The columns of an effect on every recording, per term.
 pub(crate) struct Columns {
@@ -89,10 +89,10 @@ pub(crate) fn columns(
     Some(Columns { effect: effect.clone(), of, own: definition.has_own_phase(), bounds, sd: f64::INFINITY })
 }
 
-/// Bounds of a term, as a force. A friction that may have either sign is not held to what the rig says of its friction: shares judge it.
+/// Bounds of a term, as a force. A law that may have either sign is not held to what the rig says of friction or gain: shares judge it.
 fn bounds(effect: &Effect, term: usize, nominal: &Nominal, scale: Scale) -> (f64, f64) {
     let (low, high) = nominal.limits(effect.name, term);
-    if low < 0.0 && high > 0.0 && !effect.name.definition().scales_drive() {
+    if low < 0.0 && high > 0.0 {
         return FREE;
     }
     (low * scale.inertia, high * scale.inertia)

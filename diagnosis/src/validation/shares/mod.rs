@@ -10,4 +10,6 @@ pub(crate) mod forms;
 pub(crate) mod laws;
 pub(crate) mod material;
 pub(crate) mod select;
+pub(crate) mod share;
 pub(crate) mod sight;
+mod state;
