@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 /// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
 /// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, dry
 /// friction that comes and goes along the travel where the axis is slow, cogging of twelve a turn, a push that follows the time since
-/// the start, the frequency of the belt behind which half of it stands (none where zero), and the part of its dry friction that comes
-/// on top while it is cold, for some 3 s.
+/// the start, the frequency of the belt behind which half of it stands (none where zero), the part of its dry friction that comes
+/// on top while it is cold, for some 3 s, and the part of its drive's force that is lost after that time.
 #[derive(Clone, Copy)]
 pub struct Machine {
     pub inertia: f64,
@@ -29,6 +29,7 @@ pub struct Machine {
     pub push: f64,
     pub belt_hz: f64,
     pub cold: f64,
+    pub fades: f64,
     /// White disturbance, as a part of the forward dry friction.
     pub disturbance: f64,
 }
@@ -49,6 +50,7 @@ pub const AXIS: Machine = Machine {
     push: 0.0,
     belt_hz: 0.0,
     cold: 0.0,
+    fades: 0.0,
     disturbance: 0.05,
 };
 
@@ -90,7 +92,9 @@ pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -
             let rows = f64::from(row) + f64::from(i) / f64::from(steps) - machine.delay_s * taken.rate;
             let u = command((rows + 1e-9).floor() / taken.rate);
             driven += (u.clamp(-machine.limit, machine.limit) - driven) * follow(machine.lag_s);
-            let free = driven + machine.offset + disturbance - machine.gravity * q.sin()
+            let warm = 1.0 - (-t / 3.0).exp();
+            let free = driven * (1.0 - machine.fades * warm) + machine.offset + disturbance
+                - machine.gravity * q.sin()
                 + machine.cogging * (12.0 * q).sin()
                 + machine.push * (TAU * (3.0 * t + 0.6 * t * t)).sin();
             let at = q;

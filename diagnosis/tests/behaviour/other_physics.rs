@@ -43,3 +43,9 @@ fn a_delay_of_four_rows_is_named_at_fifty_rows_a_second() {
     let outcome = diagnosed(&rig, &[taken(1), taken(2)], &[taken(3)]);
     assert!(names(&outcome).contains(&N::CommandDelay), "{}", outcome.report.sentence);
 }
+
+#[test]
+fn a_drive_that_loses_more_than_half_its_force_drifts() {
+    let outcome = pushed(Machine { push: 4.0, fades: 0.6, ..AXIS }, crate::axis::WHOLE);
+    assert!(names(&outcome).contains(&N::GainDrift), "{}", outcome.report.sentence);
+}
