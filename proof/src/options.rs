@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+/// The sources of inputs that `--settle` compares, the judged one first.
+const INPUTS: [&str; 3] = ["designed", "multisines", "characterise"];
+
 /// The flags of `prove`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -48,7 +51,7 @@ impl Default for Options {
             cases: None,
             quick: false,
             settle: false,
-            inputs: crate::settle::INPUTS.to_vec(),
+            inputs: INPUTS.to_vec(),
             jobs: 2,
             minutes: None,
             write: None,
@@ -203,10 +206,9 @@ impl Options {
 
 /// The sources of inputs in a list with commas.
 fn inputs(list: &str) -> Result<Vec<&'static str>, String> {
-    let known = crate::settle::INPUTS;
     let one = |name: &str| {
-        let found = known.into_iter().find(|known| *known == name);
-        found.ok_or_else(|| format!("--inputs takes some of {}, not `{name}`", known.join(", ")))
+        let found = INPUTS.into_iter().find(|known| *known == name);
+        found.ok_or_else(|| format!("--inputs takes some of {}, not `{name}`", INPUTS.join(", ")))
     };
     list.split(',').map(one).collect()
 }

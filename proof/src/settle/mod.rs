@@ -19,9 +19,6 @@ const SURE: f64 = 0.9;
 /// The least motion that the others get, s: `host-sim settle` takes no less.
 const LEAST_MOTION_S: f64 = 20.0;
 
-/// The sources of inputs, the judged one first.
-pub(crate) const INPUTS: [&str; 3] = ["designed", "multisines", "characterise"];
-
 /// The answer of one run of `host-sim settle`.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Answer {
