@@ -125,10 +125,11 @@ fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
     out_of_library::alone(&context, &refit, &found.holdout).is_some()
 }
 
-/// True if a regression can judge all that was found, and it leaves clearly less than what was selected.
+/// True if a regression can judge all that was found, and it leaves clearly less than what was selected. A law that reshapes the command
+/// shrinks what is to be explained, so what it leaves says nothing here.
 fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
     let own: &[Effect] = &found.standing.model.model.effects;
-    let is_judged = own.iter().all(|effect| selection.judges(effect));
+    let is_judged = own.iter().all(|effect| CommandLaw::new(effect).is_none() && selection.judges(effect));
     let left = |of: &Found| discrepancy(prepared, of, &of.standing.model);
     is_judged && left(found) < CLEARLY_LESS * left(selected)
 }
