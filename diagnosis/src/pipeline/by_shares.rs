@@ -25,8 +25,6 @@ use crate::validation::shares::laws::is_by_command;
 use crate::validation::shares::material::Material;
 use crate::validation::shares::select::{Selected, Selection};
 
-/// Part of what is left of the force from which an effect is most of it, so that noise does not limit.
-const MOST_OF_REST: f64 = 0.4;
 /// Factor below which one model leaves clearly less than another.
 const CLEARLY_LESS: f64 = 0.8;
 
@@ -63,7 +61,6 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
         return ByShares::Nothing;
     }
     selected.retain(|one| one.is_named() && one.class().len() <= MOST_IN_CLASS);
-    let regime = if is_most_of_rest(&selected, own) { Regime::Physics } else { regime };
     // The forms of the command, which speak against its laws next to noise, are none that a regression tries.
     let may_confirm = |effect: &&Effect| !is_by_command(effect);
     let in_own =
@@ -89,14 +86,6 @@ fn shown(prepared: &Prepared, found: &Found) -> Shown {
     let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
     let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
-}
-
-/// True if shares name all that was found and besides something that takes most of what is left then, so that noise does not limit.
-fn is_most_of_rest(selected: &[Selected], own: &[Effect]) -> bool {
-    let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
-    let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));
-    own.iter().all(|effect| selected.iter().any(|one| is_same(one, effect)))
-        && selected.iter().any(|one| is_new(one) && one.share.least() >= MOST_OF_REST)
 }
 
 /// The recordings with the effects selected, unless what was found leaves clearly less.
@@ -129,7 +118,7 @@ fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
 /// shrinks what is to be explained, so what it leaves says nothing here.
 fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
     let own: &[Effect] = &found.standing.model.model.effects;
-    let is_judged = own.iter().all(|effect| CommandLaw::new(effect).is_none() && selection.judges(effect));
+    let is_judged = own.iter().all(|effect| CommandLaw::new(effect).is_none()) && selection.judges(own);
     let left = |of: &Found| discrepancy(prepared, of, &of.standing.model);
     is_judged && left(found) < CLEARLY_LESS * left(selected)
 }

@@ -62,7 +62,7 @@ impl Selection<'_> {
         self.judged(taken)
     }
 
-    /// Mean of what laws leave on folds of the fitted recordings and on held-out ones, root mean square.
+    /// Geometric mean of what laws leave on folds of the fitted recordings and on held-out ones, root mean square.
     fn left(&self, laws: &[Columns]) -> f64 {
         let (fit, holdout) = State::new(self, laws.iter().collect()).left;
         (fit.sqrt() * holdout.sqrt()).sqrt()
@@ -118,10 +118,11 @@ impl Selection<'_> {
         ranked.into_iter().enumerate().filter_map(again).collect()
     }
 
-    /// True if a regression has a law of an effect.
-    pub(crate) fn judges(&self, effect: &Effect) -> bool {
+    /// True if a regression has a law of every effect.
+    pub(crate) fn judges(&self, effects: &[Effect]) -> bool {
         let first = State::new(self, Vec::new());
-        columns(effect, &self.sights, self.context.nominal, &first.asked).is_some()
+        let nominal = self.context.nominal;
+        effects.iter().all(|effect| columns(effect, &self.sights, nominal, &first.asked).is_some())
     }
 
     /// True if physics without a name takes more alone than effects take together.
