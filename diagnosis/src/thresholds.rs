@@ -125,6 +125,10 @@ pub(crate) const MISTAKEN: f64 = 0.2;
 /// Residual of a model, over that of a motion read in whole counts, from which other physics limits, not noise, and shares decide: it
 /// is 1.9 in the median on generated nulls and 22 on axes of real machines (`docs/diagnosis-design.md`).
 pub(crate) const LIMITED_BY_PHYSICS: f64 = 3.0;
+/// The same of the refit, below which noise is all there is, and what was found needs no share.
+pub(crate) const LEAVES_SOMETHING: f64 = 2.0;
+/// Most probability of a name that no share confirms where other physics limits: the gain of a law says little there.
+pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
 /// Part of the force error, root mean square, on stretches left out of the fit and on held-out recordings, from which an effect joins
 /// the regression: with two effects in the recordings the first alone takes little.
 pub(crate) const TAKEN_SHARE: f64 = 0.1;

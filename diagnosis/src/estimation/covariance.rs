@@ -16,6 +16,15 @@ pub(crate) struct Noise {
     pub(crate) tau: f64,
     /// White acceleration at rest, where friction is a reaction, (rad/s²)²·s.
     pub(crate) rest: f64,
+    /// Variance that a fit adds to the sensor's, as a multiple too: it hides what is faster than a band.
+    pub(crate) blur: f64,
+}
+
+impl Noise {
+    /// Variance of a reading as a fit assumes it, as a multiple of the quantisation variance.
+    fn reading(&self) -> f64 {
+        self.sensor + self.blur
+    }
 }
 
 /// A view of a recording for the filter, block by block.
@@ -105,7 +114,7 @@ pub(super) fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covari
     let speed = 100.0 * reach / duration.min(1.0);
     // Where the reading's own error is the larger, the start has to be unsure against that: an estimator may count in errors
     // of one, whatever the unit of length.
-    let error = DIFFUSE * noise.sensor * track.quantum[0];
+    let error = DIFFUSE * noise.reading() * track.quantum[0];
     let span = track.span[0].max(1e-9);
     let mut p = [[0.0; N]; N];
     p[0][0] = (reach * reach).max(error);
@@ -195,7 +204,7 @@ pub(super) fn covariances<const N: usize>(
             Some(rhos) => Step::<N>::with_rho(track, noise, j, rhos[j]),
             None => Step::<N>::new(track, noise, j),
         };
-        let (s, own, after) = update(&p, &step.seen, noise.sensor * track.quantum[j]);
+        let (s, own, after) = update(&p, &step.seen, noise.reading() * track.quantum[j]);
         p = predict(&after, &step);
         let mut k = [0.0; 4];
         k[..N].copy_from_slice(&own);

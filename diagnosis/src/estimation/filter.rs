@@ -244,7 +244,7 @@ mod tests {
             let mut rig = Rig::of_values(0.01, 0.0, 0.0);
             rig.encoder.filter_s = filter_s;
             let track = BlockedRecording::new(&recording, &rig);
-            let noise = Noise { sensor: 1.3, white: 2.0, slow: 3.0, tau: 0.02, rest: 1.0 };
+            let noise = Noise { sensor: 1.3, white: 2.0, slow: 3.0, tau: 0.02, rest: 1.0, blur: 0.0 };
             let (observed, total) = (track.observed(), track.command_total(10.0));
             let gains = Gains::new(&observed, &noise);
             let (e, log_det) = innovations(&observed, &noise, &rhos(&observed, noise.tau), &total);

@@ -47,7 +47,7 @@ impl Estimator {
         let even = Observed { z, quantum: &vec![1.0; n], rest: &vec![false; n], ..track.observed() };
         let tau = 1e3;
         let walk = (TAU * self.bandwidth_hz).powi(6) * h;
-        let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0 };
+        let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0, blur: 0.0 };
         motion(&even, &noise, total, Knows::All).d
     }
 }
@@ -71,21 +71,22 @@ impl Estimator {
 
 /// Returns the error of an acceleration estimate of some bandwidth that the sensor alone causes, root mean square.
 fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
-    let mut sum = 0.0;
-    let mut count = 0.0;
-    for track in tracks {
-        let h = 1.0 / track.block_rate();
-        let mut quantum: Vec<f64> = track.blocks.quantum.clone();
-        quantum.sort_by(f64::total_cmp);
-        // Behind a filter of the reading the axis is known that much worse, at the end of the band.
-        let lag = track.blocks.filter_s.map_or(0.0, |s| TAU * hz * s);
-        sum += noise.sensor * quantum[quantum.len() / 2] * h * (1.0 + lag * lag);
-        count += 1.0;
-    }
     // ∫ ω⁴/(1 + (ω/ωc)⁶)² df over both sides = ωc⁵/(2π) · 2 · π/36 · 1/sin(5π/6)
     let integral = (TAU * hz).powi(5) / TAU * 2.0 * (std::f64::consts::PI / 36.0)
         / (5.0 * std::f64::consts::PI / 6.0).sin();
-    (sum / count * integral).sqrt()
+    (noise.sensor * counting_density(tracks, hz) * integral).sqrt()
+}
+
+/// Density of the error of reading whole counts at the end of a band, rad²·s or m²·s, the mean over recordings.
+fn counting_density(tracks: &[BlockedRecording], hz: f64) -> f64 {
+    let density = |track: &BlockedRecording| {
+        let mut quantum: Vec<f64> = track.blocks.quantum.clone();
+        quantum.sort_by(f64::total_cmp);
+        // Behind a filter of the reading the axis is known that much worse.
+        let lag = track.blocks.filter_s.map_or(0.0, |s| TAU * hz * s);
+        quantum[quantum.len() / 2] / track.block_rate() * (1.0 + lag * lag)
+    };
+    tracks.iter().map(density).sum::<f64>() / tracks.len() as f64
 }
 
 impl Estimator {
@@ -130,6 +131,13 @@ impl Estimator {
         self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
     }
 
+    /// Returns noise under which a fit weighs forces within the band alike and those beyond it the less the faster they are.
+    pub(crate) fn weighing(&self, tracks: &[BlockedRecording], noise: &Noise) -> Noise {
+        let hz = self.bandwidth_hz;
+        let sensor = noise.white / (counting_density(tracks, hz) * (TAU * hz).powi(4));
+        Noise { blur: (sensor - noise.sensor).max(0.0), ..*noise }
+    }
+
     /// Returns the residual that a white disturbance alone causes, as an acceleration, root mean square.
     pub(crate) fn white(&self, noise: &Noise) -> f64 {
         // ∫ 1/(1 + (f/fc)⁶)² df over both sides = 2·fc · 5/6 · (π/6)/sin(π/6)
@@ -155,6 +163,9 @@ impl Estimator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimation::fit::Fit;
+    use crate::estimation::model::Model;
+    use crate::estimation::nominal::{Key, Nominal};
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
     use crate::numerics::bootstrap::Random;
@@ -179,7 +190,39 @@ mod tests {
         let residual = estimator.residual(&track, &Total::zero(track.block_count()));
         let inner = &residual[50..residual.len() - 50];
         let rms = (inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64).sqrt();
-        let said = estimator.white(&Noise { sensor: 1.0, white, slow: 0.0, tau: 1.0, rest: 0.0 });
+        let said = estimator.white(&Noise { sensor: 1.0, white, slow: 0.0, tau: 1.0, rest: 0.0, blur: 0.0 });
         assert!((rms / said - 1.0).abs() < 0.05, "{rms} instead of {said}");
+    }
+
+    /// An axis with a load on a spring: within the band it moves with the load, and far beyond it alone.
+    #[test]
+    fn a_fit_in_the_band_knows_nothing_of_faster_motion() {
+        let (dt, slow_hz, fast_hz) = (1e-3, 2.0, 60.0);
+        let (slow_gain, fast_gain) = (1.0, 2.0);
+        let of = |hz: f64, gain: f64, t: f64| -gain * (TAU * hz * t).sin() / (TAU * hz).powi(2);
+        let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) * dt).collect();
+        let command =
+            |t: &f64| (TAU * slow_hz * (t + 0.5 * dt)).sin() + (TAU * fast_hz * (t + 0.5 * dt)).sin();
+        let counts = |t: &f64| 1e7 * (of(slow_hz, slow_gain, *t) + of(fast_hz, fast_gain, *t));
+        let recording = Recording {
+            command: time_s.iter().map(command).collect(),
+            position_counts: time_s.iter().map(counts).map(f64::round).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let mut rig = Rig::of_values(1.0, 0.0, 0.0);
+        rig.encoder.counts_per_unit = 1e7;
+        rig.actuator.gain = 1.3;
+        rig.uncertainty.inertia = Some(0.9);
+        let tracks = [BlockedRecording::new(&recording, &rig)];
+        let nominal = Nominal::of(&rig);
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 0.0, tau: 1.0, rest: 0.0, blur: 0.0 };
+        let gain = |noise: &Noise| {
+            Fit::new(&Model::default(), &nominal, &tracks, noise).value(Key::Gain).expect("it has one")
+        };
+        let in_band = gain(&Estimator { bandwidth_hz: 8.0 }.weighing(&tracks, &noise));
+        assert!((in_band / slow_gain - 1.0).abs() < 0.03, "{in_band} in the band");
+        let everywhere = gain(&noise);
+        assert!(everywhere > 1.2 * slow_gain, "{everywhere} over all frequencies");
     }
 }

@@ -330,7 +330,7 @@ mod tests {
         let mut tracks = [BlockedRecording::new(&recording, &rig)];
         tracks[0].motion.v.fill(3.0);
         let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
-        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
         let lost = find(&tracks[0], &fit, count, asked, None).lost;
         (lost.iter().map(|lost| lost / count).collect(), tracks[0].blocks.start.clone())
@@ -376,7 +376,7 @@ mod tests {
             tracks[0].motion.v.fill(3.0);
             tracks[0].motion.rest.fill(false);
             let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
-            let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+            let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
             let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
             let found = find(&tracks[0], &fit, count, any, Some(2.0 * count));
             jumps += found.sizes.len();
@@ -402,7 +402,7 @@ mod tests {
         };
         let mut track = BlockedRecording::new(&recording, &Rig::of_values(0.01, 0.0, 0.0));
         track.motion.rest.fill(false);
-        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
         let gains = Gains::new(&track.observed(), &noise);
         let at = |time: f64| {
             let block = track.blocks.start.partition_point(|start| *start < time);

@@ -130,6 +130,7 @@ pub(crate) fn estimate(
         slow: at[2].exp(),
         tau: at[3].exp(),
         rest: from.rest,
+        blur: 0.0,
     };
     let moved_values = match colour {
         Colour::White => 2,
@@ -188,5 +189,6 @@ pub(crate) fn guess(tracks: &[BlockedRecording], scale: f64) -> Noise {
         slow: (0.1 * scale).powi(2),
         tau: 0.1,
         rest: scale * scale * span.max(1e-3),
+        blur: 0.0,
     }
 }

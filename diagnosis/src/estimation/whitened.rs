@@ -102,7 +102,7 @@ mod tests {
     fn values(track: &BlockedRecording, white: f64) -> Vec<f64> {
         let rig = Rig::of_values(0.01, 0.02, 0.05);
         let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
-        let noise = Noise { sensor: 1.0, white, slow: 1.0, tau: 0.05, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white, slow: 1.0, tau: 0.05, rest: 1.0, blur: 0.0 };
         let shape = [("gap", 0.01), ("coast", 3.0), ("contact_hz", 180.0), ("ratio", 1.0), ("dry", 5.0)];
         let effects = vec![Effect::shaped(EffectName::Backlash, &shape)];
         let model = Model { effects, ..Model::default() };

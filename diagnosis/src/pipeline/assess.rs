@@ -6,7 +6,6 @@ use super::search::Found;
 use super::verdict::misfit;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
-use crate::estimation::noise::Colour;
 use crate::estimation::refit::is_driven;
 use crate::selection::context::FittedModel;
 use crate::selection::excitation::Excitation;
@@ -46,7 +45,8 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let context = prepared.context(&fit);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let excitation = Excitation::of(&fit, count, nominal.rig.turn());
-    let refit = context.fit(Model::default(), &null.noise, Colour::White);
+    let by_shares = !standing.materials.is_empty();
+    let refit = context.fit_shown(Model::default(), &null.noise, by_shares);
     let scales =
         Scales { context: &context, refit: &refit, null: &null, holdout: &holdout, excitation: &excitation };
     let weighed = weigh(&scales, standing);
@@ -89,7 +89,7 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
         let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
         let model = Model { effects, ..last.model.clone() };
         let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
-        let patched = context.fit(slow.model, &slow.noise, Colour::White);
+        let patched = context.fit_shown(slow.model, &slow.noise, !weighed.materials.is_empty());
         let is_there = |place: usize| {
             let values = parameters::parameters(context, &patched, place);
             let name = patched.model.effects[place].name;

@@ -21,6 +21,7 @@ use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
+use crate::thresholds::MATERIAL;
 use assess::Assessment;
 use by_shares::{ByShares, by_shares, confirmed};
 use diagnosis::{Diagnosis, Reason};
@@ -70,7 +71,7 @@ fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
 }
 
 /// The assessment of what shares selected, `with` what they cannot judge or `alone`, whichever has more of it named; none where nothing is
-/// named.
+/// named or what is named lowers no error.
 fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> Option<Assessment> {
     let all = with.standing.materials.len();
     let assessed = |found| assess::assess(prepared, found).ok();
@@ -86,7 +87,13 @@ fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> O
         (Some(with), Some(alone)) if named(&alone) > named(&with) => Some(alone),
         (with, alone) => with.or(alone),
     };
-    best.filter(|one| !one.weighed.named().is_empty())
+    best.filter(|one| !one.weighed.named().is_empty() && lowers_error(one))
+}
+
+/// True if the named effects together take a material part off the held-out force error.
+fn lowers_error(one: &Assessment) -> bool {
+    let table = &one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table;
+    table.patched.holdout <= (1.0 - MATERIAL) * table.refit.holdout
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.

@@ -168,7 +168,7 @@ mod tests {
         (track, nominal, total)
     }
 
-    const NOISE: Noise = Noise { sensor: 1.0, white: 10.0, slow: 1e-3, tau: 0.1, rest: 1.0 };
+    const NOISE: Noise = Noise { sensor: 1.0, white: 10.0, slow: 1e-3, tau: 0.1, rest: 1.0, blur: 0.0 };
 
     /// Largest difference of what an effect puts into the blocks before `until`, over its largest value there.
     fn difference(a: &Input, b: &Input, until: usize) -> f64 {

@@ -6,6 +6,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::effective_command::effective_commands;
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
+use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::Nominal;
@@ -53,6 +54,20 @@ impl FitContext<'_> {
         let fit = Fit::new(&model, self.nominal, self.tracks, &noise);
         let merit = fit.log_likelihood - self.spent(&model);
         FittedModel { model, noise, fit, merit }
+    }
+
+    /// Fits a model whose values are shown. Where shares of the force error select, its values are fitted to the force in the band that
+    /// people see: likelihoods count what is fast most, where a machine is least like its model.
+    pub(crate) fn fit_shown(&self, model: Model, from: &Noise, by_shares: bool) -> FittedModel {
+        let white = self.fit(model, from, Colour::White);
+        if by_shares { self.fit_in_band(white) } else { white }
+    }
+
+    /// Fits a model again, to the force in the band that people see.
+    pub(crate) fn fit_in_band(&self, white: FittedModel) -> FittedModel {
+        let estimator = Estimator::new(self.tracks, &white.noise, self.scale);
+        let noise = estimator.weighing(self.tracks, &white.noise);
+        if noise == white.noise { white } else { self.fit_at(white.model, &noise) }
     }
 
     /// Returns the cost of the freedom of all effects of a model, nats.

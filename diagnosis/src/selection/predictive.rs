@@ -136,7 +136,7 @@ mod tests {
         track.motion.v = v;
         let tracks = [track];
         let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
-        let noise = Noise { sensor: 1.0, white: 2e-3, slow: 1e-9, tau: 0.1, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white: 2e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
         let cost = |effects: Vec<Effect>| -> f64 {
             let model = Model { effects, ..Model::default() };
             left_out_costs(&Fit::new(&model, &nominal, &tracks, &noise)).iter().sum()

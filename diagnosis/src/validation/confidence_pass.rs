@@ -6,12 +6,14 @@ use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
-use crate::estimation::noise::Colour;
 use crate::io::schema::Parameter;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{BEHIND_Z, LEAVES_MUCH, MATERIAL, MUCH_OF_REFIT, NAMED, UNDECIDED, UNDERSTOOD};
+use crate::thresholds::{
+    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MATERIAL, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS,
+    UNDECIDED, UNDERSTOOD,
+};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
 use crate::validation::comparison::Shown;
@@ -65,7 +67,7 @@ pub(crate) struct WeighedModel {
     /// The hypotheses that were rejected on the way.
     pub(crate) rejected: Vec<RejectedHypothesis>,
     /// The effects that shares of the force error name.
-    materials: Vec<Material>,
+    pub(crate) materials: Vec<Material>,
     pub(crate) shown: Shown,
     pub(crate) estimator: Estimator,
     /// Residual that reading whole counts alone causes, N·m or N.
@@ -289,7 +291,8 @@ impl Scales<'_> {
             let StandingModel { model, effects, .. } = standing;
             alternatives::fit_rivals(self.context, patched, model, self.holdout, effects);
         };
-        let patched = self.context.fit(standing.model.model.clone(), &standing.model.noise, Colour::White);
+        let StandingModel { model: last, materials, .. } = &standing;
+        let patched = self.context.fit_shown(last.model.clone(), &last.noise, !materials.is_empty());
         contest(&mut standing, &patched);
         let leader = alternatives::leader(&standing.effects);
         match leader.and_then(|(i, rival)| self.replaced(&standing, i, rival)) {
@@ -313,7 +316,7 @@ impl Scales<'_> {
         let mut with = model.model.clone();
         with.effects[i] = rival;
         let slow = context.fit_slow(with, &[&self.null.noise, &model.noise]);
-        let white = context.fit(slow.model.clone(), &slow.noise, Colour::White);
+        let white = context.fit_shown(slow.model.clone(), &slow.noise, !materials.is_empty());
         let effects = gather_evidence(context, &white, &slow.noise, holdout);
         let may_stand = effects.iter().all(|one| one.rejection().is_none())
             && parameters::absence(context, &white, i).is_none();
@@ -346,7 +349,9 @@ impl Scales<'_> {
         let helps_much = left_holdout < MUCH_OF_REFIT * refit_holdout;
         let understood = part_of_force < UNDERSTOOD.0 || (helps_much && part_of_force < UNDERSTOOD.1);
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
-        LeftOver { floor, evidence, understood, leaves_much }
+        let left = left_holdout.min(table.patched.fit);
+        let is_other_physics = left >= LIMITED_BY_PHYSICS * floor;
+        LeftOver { floor, evidence, understood, leaves_much, is_other_physics }
     }
 
     /// Correlation of the residual between repeats of a motion in all recordings.
@@ -390,7 +395,11 @@ impl Scales<'_> {
         }
         let class = alternatives::class(&found, self.excitation, left.leaves_much, context);
         let undecided = alternatives::nearest(&found, &class) < BEHIND_Z;
-        let most = if undecided { UNDECIDED } else { 1.0 };
+        let most = match (undecided, left.is_other_physics) {
+            (true, _) => UNDECIDED,
+            (false, true) => SUREST_BESIDE_PHYSICS,
+            (false, false) => 1.0,
+        };
         let confidence = confidence::confidence(&evidence).min(most);
         let creeps = candidates::creeps(&found.effect, context.span)
             // A spring that creeps depends on time, so no law of the travel fits it everywhere, however far it bends.
@@ -408,6 +417,8 @@ struct LeftOver {
     understood: bool,
     /// True if the model leaves much of what the refit left.
     leaves_much: bool,
+    /// True if what the model leaves is other physics and not noise.
+    is_other_physics: bool,
 }
 
 fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {

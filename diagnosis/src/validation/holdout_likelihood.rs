@@ -317,7 +317,7 @@ mod tests {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let track = BlockedRecording::new(&recording, &rig);
         let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
-        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0, blur: 0.0 };
         let model = Model::default();
         let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);
         let fitted = FittedModel { model, noise, fit, merit: 0.0 };

@@ -5,11 +5,11 @@ use super::laws::{Columns, columns};
 use super::share::Share;
 pub(crate) use super::state::Selection;
 use super::state::State;
-use crate::effects::definition::Unnamed;
+use crate::effects::definition::{NominalTerm, Unnamed};
 use crate::effects::{Effect, EffectName as N};
 use crate::numerics::parallel;
 use crate::selection::context::MOST;
-use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE};
+use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE, TAKEN_SHARE};
 use crate::validation::out_of_library::unnamed_like;
 
 /// Additional share that a rival must take to replace an effect.
@@ -184,20 +184,23 @@ impl Selection<'_> {
         let share = state.share(&taken[i])?;
         let ranked = state.ranked(&|other| other != name);
         let rivals = ranked.iter().map(|(share, _)| share.clone()).collect();
-        let most = (1.0 - share.least()) * (1.0 + PLAIN_LEAVES);
-        let is_plainer = |rival: &Share| is_plain(rival.effect.name) && !is_plain(name);
-        let is_better = |rival: &Share| {
-            let is_as_good = is_plainer(rival) && 1.0 - rival.least() <= most;
-            rival.fits() && (is_as_good || rival.least() > share.least() + SURELY)
-        };
-        let better = ranked.into_iter().find(|(rival, _)| is_better(rival)).map(|(_, columns)| columns);
+        let better = ranked.into_iter().find(|(rival, _)| goes_before(rival, &share));
+        let better = better.map(|(_, columns)| columns);
         Some(Ranked { share, rivals, better })
     }
 }
 
+/// True if a rival surely takes more than a law does, or is a plain friction that takes enough by itself and leaves little more.
+fn goes_before(rival: &Share, law: &Share) -> bool {
+    let is_plainer = is_plain(rival.effect.name) && !is_plain(law.effect.name);
+    let most = (1.0 - law.least()) * (1.0 + PLAIN_LEAVES);
+    let is_as_good = is_plainer && rival.least() >= TAKEN_SHARE && 1.0 - rival.least() <= most;
+    rival.fits() && (is_as_good || rival.least() > law.least() + SURELY)
+}
+
 /// True for a friction that a rig may have.
 fn is_plain(name: N) -> bool {
-    name.definition().nominal_term().is_some()
+    matches!(name.definition().nominal_term(), Some(NominalTerm::Viscous | NominalTerm::Coulomb))
 }
 
 /// An effect with its rank among others.
@@ -206,4 +209,34 @@ struct Ranked {
     rivals: Vec<Share>,
     /// The rival that surely takes more.
     better: Option<Columns>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn share(name: N, part: f64) -> Share {
+        let effect = Effect::shaped(name, &[]);
+        Share { effect, on_fit: part, on_holdout: part, size: 1.0, at_bound: false }
+    }
+
+    #[test]
+    fn a_plain_friction_goes_before_a_law_that_refines_it() {
+        let law = share(N::StribeckFriction, 0.5);
+        assert!(goes_before(&share(N::CoulombFriction, 0.4), &law));
+        assert!(!goes_before(&share(N::CoulombFriction, 0.3), &law), "it leaves much more");
+        assert!(!goes_before(&share(N::QuadraticDrag, 0.5), &law), "it is no plain friction");
+        assert!(goes_before(&share(N::QuadraticDrag, 0.52), &law));
+        assert!(!goes_before(&Share { size: 3.0, ..share(N::QuadraticDrag, 0.52) }, &law));
+    }
+
+    #[test]
+    fn what_takes_nothing_goes_before_no_law() {
+        let law = share(N::LoadDependentFriction, 0.14);
+        for name in [N::CoulombFriction, N::ViscousFriction, N::MassImbalance] {
+            assert!(!goes_before(&share(name, 0.0), &law), "{name}");
+            assert!(!goes_before(&share(name, 0.05), &law), "{name}");
+        }
+        assert!(!goes_before(&share(N::MassImbalance, 0.12), &law), "gravity is no plain friction");
+    }
 }

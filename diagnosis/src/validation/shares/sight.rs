@@ -193,7 +193,7 @@ mod tests {
         };
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let track = BlockedRecording::new(&recording, &rig);
-        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1.0, tau: 0.1, rest: 1.0 };
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1.0, tau: 0.1, rest: 1.0, blur: 0.0 };
         let estimator = Estimator { bandwidth_hz: 12.0 };
         let sight = Sight::new(&track, 0, &Nominal::of(&rig), &noise, estimator);
         let force: Vec<f64> = track.blocks.start.iter().map(|t| (2.0 * t).sin() + (40.0 * t).cos()).collect();
