@@ -93,11 +93,13 @@ fn shown(prepared: &Prepared, found: &Found) -> Shown {
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
-/// True if shares name all that was found and besides something that takes most of what is left then, so that noise does not limit.
+/// True if shares name all that was found and besides something that takes most of what is left then, so that noise does not limit. A law
+/// that reshapes the command may have been found because it shrinks what is to be explained, so it need not be among them.
 fn is_most_of_rest(selected: &[Selected], own: &[Effect]) -> bool {
     let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
     let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));
-    own.iter().all(|effect| selected.iter().any(|one| is_same(one, effect)))
+    let mut to_name = own.iter().filter(|effect| CommandLaw::new(effect).is_none());
+    to_name.all(|effect| selected.iter().any(|one| is_same(one, effect)))
         && selected.iter().any(|one| is_new(one) && one.share.least() >= MOST_OF_REST)
 }
 
