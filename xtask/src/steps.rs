@@ -236,6 +236,8 @@ fn parquet() -> Result<(), Failure> {
         "--features",
         "host-sim/parquet,host-sim/ros",
         "--test",
+        "program",
+        "--",
         "import",
     ]);
     shell::run(&mut import)
@@ -248,9 +250,15 @@ fn class() -> Result<(), Failure> {
     clippy.arg("clippy").args(BUILD).arg("--all-targets").args(features);
     shell::run(clippy.args(["--", "-D", "warnings"]))?;
     let mut test = cargo();
-    test.arg("test").args(BUILD).args(features).args(["--test", "class", "--test", "class_hostile"]);
+    test.arg("test").args(BUILD).args(features).args([
+        "--test",
+        "program",
+        "--",
+        "class::",
+        "class_hostile::",
+    ]);
     // One after the other: what is measured must not share the machine.
-    test.args(["--", "--include-ignored", "--nocapture", "--test-threads", "1"]);
+    test.args(["--include-ignored", "--nocapture", "--test-threads", "1"]);
     shell::run(&mut test)
 }
 

@@ -103,7 +103,7 @@ pub(crate) fn python(script: &str) -> Result<Command, Failure> {
 /// One, ten and thirty devices with their instructor: a build of its own, with Zenoh.
 pub(crate) fn class() -> Result<Values, Failure> {
     let mut test = cargo();
-    test.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/class", "--test", "class", "--"]);
+    test.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/class", "--test", "program", "--"]);
     test.args(["--ignored", "--nocapture", "thirty_devices_cost_less_than_a_core"]);
     shell::output(&mut test).map(|text| values_in(&text))
 }

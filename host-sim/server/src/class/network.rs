@@ -159,7 +159,7 @@ enum Side {
 }
 
 fn open(meeting: &Meeting, side: Side) -> Result<Session, zenoh::Error> {
-    let mut config = Config::commissioned_virtual();
+    let mut config = Config::default();
     let at = format!("[\"tcp/{}\"]", meeting.address);
     let (connect, listen) = match side {
         Side::Device => (at.as_str(), "[]"),
