@@ -39,6 +39,26 @@ fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
     out
 }
 
+/// Time over which the reading of a held axis is looked at, s.
+const HELD_S: f64 = 0.05;
+
+/// Part of the fast speed below which a reading that goes no further in that time is jitter about a place, not motion.
+const JITTER: f64 = 0.004;
+
+/// Blocks at which a drive holds the axis: a fine encoder counts the jitter of a loop or a frame there, and the friction is a reaction.
+/// `fast` is the fast speed of the recording, rad/s or m/s.
+fn held(track: &BlockedRecording, fast: f64) -> Vec<bool> {
+    let (n, rate) = (track.block_count(), track.block_rate());
+    let half = ((0.5 * HELD_S * rate).round() as usize).max(1);
+    let most = JITTER * fast * (2 * half) as f64 / rate;
+    let is_held = |j: usize| {
+        let near = &track.blocks.z[j.saturating_sub(half)..(j + half + 1).min(n)];
+        let (low, high) = near.iter().fold((f64::MAX, f64::MIN), |(l, h), z| (l.min(*z), h.max(*z)));
+        high - low < most
+    };
+    (0..n).map(is_held).collect()
+}
+
 /// Estimates the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
 /// encoder's.
 pub(crate) fn estimate_motion(
@@ -69,8 +89,8 @@ pub(crate) fn estimate_motion(
         let floor = (2.5 * typical).min(0.25 * fast).max(1e-6 * fast);
         let still = still(track, &state.v, count);
         let n = still.len();
-        let slow: Vec<bool> =
-            state.v.iter().zip(&still).map(|(v, still)| *still || v.abs() < floor).collect();
+        let held = held(track, fast);
+        let slow: Vec<bool> = (0..n).map(|j| still[j] || held[j] || state.v[j].abs() < floor).collect();
         track.motion.rest = (0..n)
             .map(|j| {
                 let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));

@@ -5,6 +5,7 @@ mod common;
 mod estimation;
 mod formulas;
 mod free_form;
+mod held;
 mod input_files;
 mod layout;
 mod naming;
