@@ -70,13 +70,14 @@ impl EffectLaw for Defined {
 
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        if !span.rig.has_stroke {
-            return Vec::new();
-        }
         // A rig without an offset has no other term for a spring that is not at rest where the recording starts. Where the
         // inertia is hardly known one more term explains slow motion as well as forces in balance do.
         let preload = f64::from(u8::from(!span.rig.has_offset && !span.rig.is_anchored));
         let mut out = vec![Effect::shaped(name, &[("from", 0.0), ("preload", preload)])];
+        if !span.rig.has_stroke {
+            // Where each recording starts is not known, and only a spring that never goes slack is the same from anywhere.
+            return out;
+        }
         for part in [0.25, 0.5, 0.75] {
             let from = span.low + part * span.travel();
             out.push(Effect::shaped(name, &[("from", from), ("one_sided", 1.0)]));

@@ -14,7 +14,9 @@ use crate::estimation::noise::Colour;
 use crate::io::rig::Kind;
 use crate::selection::context::{FittedModel, MOST};
 use crate::selection::excitation::Excitation;
-use crate::thresholds::{LEAVES_SOMETHING, LIMITED_BY_PHYSICS, MATERIAL, MOST_IN_CLASS, TAKEN_SHARE};
+use crate::thresholds::{
+    LEAVES_SOMETHING, LIMITED_BY_PHYSICS, MATERIAL, MOST_IN_CLASS, MOST_SHARE, TAKEN_SHARE,
+};
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::{RejectedHypothesis, StandingModel};
 use crate::validation::holdout_likelihood::evaluate_all;
@@ -66,10 +68,10 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     }
     selected.retain(|one| one.is_named() && one.class().len() <= MOST_IN_CLASS);
     let regime = if is_most_of_rest(&selected, own) { Regime::Physics } else { regime };
-    // The forms of the command, which speak against its laws next to noise, are none that a regression tries.
-    let may_confirm = |effect: &&Effect| !is_by_command(effect);
-    let in_own =
-        |one: &Selected| own.iter().filter(may_confirm).find(|effect| one.class().contains(&effect.name));
+    let in_own = |one: &Selected| {
+        let class = one.class();
+        own.iter().find(|effect| class.contains(&effect.name) && may_confirm(effect, one))
+    };
     selected.retain(|one| regime == Regime::Physics || in_own(one).is_some());
     let shown = shown(prepared, found);
     let material = |one: &Selected| {
@@ -84,6 +86,12 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
         Regime::Physics => standing_by_shares(prepared, found, &selected, materials, &selection),
         _ => ByShares::Confirmed(materials),
     }
+}
+
+/// True if shares can confirm an effect that was found next to noise. The forms of the command, which speak against its laws there, are
+/// none that a regression tries, so it has to take most of the force error.
+fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
+    !is_by_command(effect) || (CommandLaw::new(effect).is_none() && selected.share.least() >= MOST_SHARE)
 }
 
 /// What the recordings show of the axis.
@@ -116,10 +124,20 @@ fn standing_by_shares(
     let has_more = effects.len() > alone.len();
     let with = standing(prepared, found, effects, materials.clone(), rejected);
     if is_found_closer(prepared, found, &with, selection) {
-        return ByShares::Nothing;
+        return as_found(&found.standing.model.model.effects, materials);
     }
     let alone = has_more.then(|| Box::new(standing(prepared, found, alone, materials, Vec::new())));
     ByShares::Selected { with: Box::new(with), alone }
+}
+
+/// What was found, with those of its effects confirmed that shares name too, whatever the shape that a regression gives them.
+fn as_found(own: &[Effect], materials: Vec<Material>) -> ByShares {
+    let confirmed = |one: Material| {
+        let name = own.iter().map(|effect| effect.name).find(|name| one.class.contains(name))?;
+        Some(Material { name, ..one })
+    };
+    let confirmed: Vec<Material> = materials.into_iter().filter_map(confirmed).collect();
+    if confirmed.is_empty() { ByShares::Nothing } else { ByShares::Confirmed(confirmed) }
 }
 
 /// True if physics without a name explains most of what a refit leaves, as surely as a name must.
@@ -129,12 +147,16 @@ fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
     out_of_library::alone(&context, &refit, &found.holdout).is_some()
 }
 
-/// True if a regression can judge all that was found, and it leaves clearly less than what was selected. A law that reshapes the command
-/// shrinks what is to be explained, so what it leaves says nothing here.
+/// True if a regression can judge all that was found, and it leaves clearly less than what was selected. A law that reshapes or scales the
+/// recorded command shrinks what is to be explained, so what it leaves says nothing here, unless it scales the command and was selected too.
 fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
     let model = &found.standing.model.model;
     let own: &[Effect] = &model.effects;
-    let is_judged = own.iter().all(|effect| CommandLaw::new(effect).is_none()) && selection.judges(own);
+    let is_selected = |effect: &Effect| Material::is_of_class(&selected.standing.materials, effect.name);
+    let says_much = |effect: &Effect| {
+        !is_by_command(effect) || (CommandLaw::new(effect).is_none() && is_selected(effect))
+    };
+    let is_judged = own.iter().all(says_much) && selection.judges(own);
     // Both fitted, and both judged, under one noise.
     let again = prepared.context(&found.fit).fit_at(model.clone(), &selected.standing.model.noise);
     let left = |of: &Found, model| discrepancy(prepared, of, model, &found.null.noise);
@@ -148,7 +170,7 @@ fn beside(
     selected: &[Selected],
     selection: &Selection,
 ) -> (Vec<Effect>, Vec<RejectedHypothesis>) {
-    let is_known = |effect: &Effect| materials.iter().any(|one| one.class.contains(&effect.name));
+    let is_known = |effect: &Effect| Material::is_of_class(materials, effect.name);
     let mut effects: Vec<Effect> = selected.iter().map(|one| one.share.effect.clone()).collect();
     let mut rejected = Vec::new();
     for one in found.standing.effects.iter().filter(|one| !is_known(&one.effect)) {

@@ -77,7 +77,9 @@ pub(crate) fn columns(
             sd: f64::INFINITY,
         });
     }
-    let with_asked = is_by_command(effect).then(|| asked.tracks(sights, scale));
+    // A loss in proportion to the recorded command would shrink what it is to explain.
+    let rests_on_command = is_by_command(effect) || effect.is_set("of_drive");
+    let with_asked = rests_on_command.then(|| asked.tracks(sights, scale));
     let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
     let of: Vec<Vec<Vec<f64>>> =
         sights.iter().enumerate().map(|(r, sight)| seen(effect, sight, track(r))).collect();
@@ -143,5 +145,40 @@ fn more(law: &CommandLaw, sight: &Sight, asked: &[f64], scale: Scale) -> Option<
                 })
                 .collect(),
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::EffectName as N;
+    use crate::estimation::filter::Noise;
+    use crate::estimation::force_residual::Estimator;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    #[test]
+    fn a_loss_of_the_drives_force_is_of_the_force_asked_for() {
+        let time_s: Vec<f64> = (0..6000).map(|row| f64::from(row) * 1e-3).collect();
+        let recording = Recording {
+            command: time_s.iter().map(|t| (40.0 * t).sin()).collect(),
+            position_counts: time_s.iter().map(|t| (9000.0 * (3.0 * t).sin()).round()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.0, 0.0);
+        let (mut track, nominal) = (BlockedRecording::new(&recording, &rig), Nominal::of(&rig));
+        track.motion.v = track.blocks.start.iter().map(|t| (3.0 * t).cos()).collect();
+        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1.0, tau: 0.1, rest: 1.0, blur: 0.0 };
+        let sights = [Sight::new(&track, 0, &nominal, &noise, Estimator { bandwidth_hz: 12.0 })];
+        let loss = Effect::shaped(N::LoadDependentFriction, &[("of_drive", 1.0)]);
+        let largest = |asked: f64| {
+            let asked = Asked::new(vec![vec![asked; track.block_count()]]);
+            let columns = columns(&loss, &sights, &nominal, &asked).expect("a regression has this law");
+            columns.of[0][0].iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+        };
+        // Whatever was recorded: a motion that asks for no force loses none.
+        assert_eq!(largest(0.0), 0.0);
+        assert!(largest(1.0) > 0.0, "{}", largest(1.0));
     }
 }

@@ -20,6 +20,11 @@ impl Material {
         (1.0 / (1.0 + (-score).exp())).clamp(CLAIMED.0, CLAIMED.1)
     }
 
+    /// True if an effect is in the class of one of some.
+    pub(crate) fn is_of_class(all: &[Self], name: EffectName) -> bool {
+        all.iter().any(|one| one.class.contains(&name))
+    }
+
     /// Returns the one of some that is of an effect.
     pub(crate) fn find(all: &[Self], name: EffectName) -> Option<&Self> {
         all.iter().find(|one| one.name == name)

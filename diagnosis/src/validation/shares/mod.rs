@@ -13,3 +13,4 @@ pub(crate) mod select;
 pub(crate) mod share;
 pub(crate) mod sight;
 mod state;
+mod waves;

@@ -171,6 +171,10 @@ impl<'a> Sight<'a> {
         sum / self.kept.len().max(1) as f64
     }
 
+    pub(crate) fn bandwidth_hz(&self) -> f64 {
+        self.estimator.bandwidth_hz
+    }
+
     pub(crate) fn rows(&self) -> usize {
         self.kept.len()
     }

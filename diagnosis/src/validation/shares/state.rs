@@ -46,6 +46,11 @@ impl<'a> Selection<'a> {
         (fits > 0 && fits < sights.len()).then_some(Self { context, noise, sights, priors, fits })
     }
 
+    /// The band in which everything is seen, Hz.
+    pub(super) fn bandwidth_hz(&self) -> f64 {
+        self.sights[0].bandwidth_hz()
+    }
+
     fn designs(&self, laws: &[&Columns]) -> (Design, Design) {
         let of = |from: usize, to: usize| Design::new(&self.sights[from..to], from, &self.priors, laws);
         (of(0, self.fits), of(self.fits, self.sights.len()))
@@ -54,7 +59,7 @@ impl<'a> Selection<'a> {
 
 /// The laws so far, with what they leave.
 pub(super) struct State<'a> {
-    on: &'a Selection<'a>,
+    pub(super) on: &'a Selection<'a>,
     laws: Vec<&'a Columns>,
     /// Mean squares that are left on folds of the fitted recordings and on held-out ones.
     pub(super) left: (f64, f64),
@@ -75,7 +80,7 @@ impl<'a> State<'a> {
     }
 
     /// Part of the error that a law takes on stretches left out of the fit, with the design.
-    fn on_fit(&self, tried: &Columns) -> f64 {
+    pub(super) fn on_fit(&self, tried: &Columns) -> f64 {
         let mut laws = self.laws.clone();
         laws.push(tried);
         let on = self.on;
@@ -133,17 +138,8 @@ impl<'a> State<'a> {
         found
     }
 
-    fn columns(&self, effect: &Effect) -> Option<Columns> {
+    pub(super) fn columns(&self, effect: &Effect) -> Option<Columns> {
         columns(effect, &self.on.sights, self.on.context.nominal, &self.asked)
-    }
-
-    /// The waves that take most on stretches left out of the fit, as those of one effect.
-    fn best_waves(&self, name: N, waves: &[Effect]) -> Option<Columns> {
-        let tried = waves.iter().filter_map(|found| {
-            let columns = self.columns(&Effect { name, ..found.clone() })?;
-            Some((self.on_fit(&columns), columns))
-        });
-        Some(tried.max_by(|a, b| a.0.total_cmp(&b.0))?.1)
     }
 
     /// The shape of an effect that takes most on stretches left out of the fit.

@@ -1,0 +1,69 @@
+//! The waves of an effect that repeats along the travel: those that stand out under the noise, and the whole orders of a known turn
+//! by their own shares, since other physics may hide them from a likelihood.
+
+use super::laws::Columns;
+use super::state::State;
+use crate::effects::{Effect, EffectName as N};
+
+/// Orders of a turn that are tried.
+const ORDERS: usize = 24;
+/// Periods that the travel must hold.
+const PERIODS: f64 = 1.5;
+/// Orders that are tried together, the best alone first, and how many of them one effect may have.
+const TOGETHER: (usize, usize) = (6, 4);
+/// Additional share that a further order must take.
+const FURTHER: f64 = 0.02;
+
+/// Waves with the share that they take on stretches left out of the fit.
+type Tried = (f64, Columns);
+
+impl State<'_> {
+    /// The waves that take most on stretches left out of the fit, as those of one effect; `found` stand out under the noise.
+    pub(super) fn best_waves(&self, name: N, found: &[Effect]) -> Option<Columns> {
+        let standing = found.iter().filter_map(|one| self.tried(Effect { name, ..one.clone() }));
+        let best = standing.chain(self.best_orders(name)).max_by(|a, b| a.0.total_cmp(&b.0));
+        Some(best?.1)
+    }
+
+    fn tried(&self, effect: Effect) -> Option<Tried> {
+        let columns = self.columns(&effect)?;
+        Some((self.on_fit(&columns), columns))
+    }
+
+    /// The whole orders of the turn that take most together, one after another; none where the turn is not known.
+    fn best_orders(&self, name: N) -> Option<Tried> {
+        let span = self.on.context.span;
+        let turn = span.rig.turn?;
+        let is_seen = |order: &f64| {
+            let is_in_band = *order == 1.0 || order * span.speed <= 2.0 * self.on.bandwidth_hz() * turn;
+            order * span.travel() >= PERIODS * turn && is_in_band
+        };
+        let orders = (1..=ORDERS).map(|order| order as f64).filter(is_seen);
+        let alone = |order: f64| Some((order, self.tried(of_orders(name, turn, &[order]))?));
+        let mut ranked: Vec<(f64, Tried)> = orders.filter_map(alone).collect();
+        ranked.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
+        ranked.truncate(TOGETHER.0);
+        let others: Vec<f64> = ranked.iter().skip(1).map(|(order, _)| *order).collect();
+        let (first, mut best) = ranked.into_iter().next()?;
+        let mut taken = vec![first];
+        for order in others {
+            if taken.len() == TOGETHER.1 {
+                break;
+            }
+            let with: Vec<f64> = taken.iter().copied().chain([order]).collect();
+            let Some(more) = self.tried(of_orders(name, turn, &with)) else { continue };
+            if more.0 > best.0 + FURTHER {
+                (best, taken) = (more, with);
+            }
+        }
+        name.definition().is_of_orders(&taken).then_some(best)
+    }
+}
+
+/// An effect that is made of whole orders of a turn, rad or m.
+fn of_orders(name: N, turn: f64, orders: &[f64]) -> Effect {
+    let keys: Vec<String> = orders.iter().map(|order| format!("order_{order}")).collect();
+    let waves = keys.iter().map(String::as_str).zip(orders.iter().copied());
+    let shape: Vec<(&str, f64)> = std::iter::once(("turn", turn)).chain(waves).collect();
+    Effect::shaped(name, &shape)
+}
