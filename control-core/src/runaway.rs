@@ -8,6 +8,10 @@
 //! the needle leaps as well, but there the torque falls first: while it is less than three quarters of what it was, no leap
 //! counts.
 //!
+//! During an excitation nobody's hand is on the needle, and the torque swings faster than a hand does. Then a rightly wired needle may go
+//! against it as well: a load that flies on through a gap knocks the motor on, and a drive that obeys late gives the torque
+//! of before. Either is over within 4 ms, while a servo whose motor is swapped drives the needle away for good.
+//!
 //! **Too fast.** Whatever drives it.
 //!
 //! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again. So does a needle
@@ -39,6 +43,8 @@ const HOLD_TICKS: u32 = 100;
 const COASTING_TURNS: u32 = 1;
 /// Looks in a row at which a needle must go as if it were driven: a knock of 40 mm/s is one.
 const DRIVEN_LOOKS: u32 = 2;
+/// The same under the servo of an excitation, 4 ms: longer than a late drive or a knock of the load.
+const SERVO_DRIVEN_LOOKS: u32 = 5;
 /// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
 const LEAST_COUNTS: i32 = 5;
 
@@ -207,6 +213,12 @@ impl Watch {
         let per_span_q30 = i64::from(mm_per_count.to_bits()).saturating_mul(counts.into());
         let bits = (per_span_q30.saturating_mul(TICK_HZ.into()) / SPAN_TICKS) >> 14;
         MillimetresPerSecond(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+    }
+
+    /// True if the needle has been driven against its motor for no longer than a drive that is wired rightly may do so under a servo.
+    #[cold]
+    pub(crate) fn is_knock(&self) -> bool {
+        self.driven_looks < SERVO_DRIVEN_LOOKS
     }
 
     /// True if the motion of the spans continues in the last 3.2 ms. A motor that drives continues; a knock is over.

@@ -39,18 +39,27 @@ impl Core {
         }
     }
 
-    /// Trips because of the way the needle moves. An excitation may be faster than a hand on purpose, and then only up to a bound of its
-    /// own.
+    /// Trips because of the way the needle moves, unless an excitation asks for it.
     #[cold]
     #[inline(never)]
     fn trip_by_movement(&mut self, fault: Fault) {
-        let is_asked_for = (self.mode, fault) == (Mode::Exciting, Fault::Overspeed) && {
-            let mm_per_count = self.plan.scale.mm_per_count;
-            let hand = fastest(mm_per_count, self.plan.config.device.limits.max_counts_per_tick);
-            !self.player.is_too_fast(self.runaway.speed(mm_per_count), hand)
-        };
-        if !is_asked_for {
+        if self.mode != Mode::Exciting || !self.is_asked_for(fault) {
             self.trip(fault);
+        }
+    }
+
+    /// True if an excitation moves a needle so that is wired rightly: it may be faster than a hand on purpose, up to a bound of its own; under
+    /// its servo the mechanism may drive the needle against the motor for a moment; and its sines may shake the needle over one count.
+    fn is_asked_for(&self, fault: Fault) -> bool {
+        match fault {
+            Fault::Overspeed => {
+                let mm_per_count = self.plan.scale.mm_per_count;
+                let hand = fastest(mm_per_count, self.plan.config.device.limits.max_counts_per_tick);
+                !self.player.is_too_fast(self.runaway.speed(mm_per_count), hand)
+            }
+            Fault::WrongWay => self.player.has_servo() && self.runaway.is_knock(),
+            Fault::EncoderChannel => self.player.shakes(),
+            _ => false,
         }
     }
 

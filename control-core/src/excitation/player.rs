@@ -1,6 +1,6 @@
 //! What plays against the motor: one excitation, or the segments of a sequence one after the other.
 
-use super::{Excitation, Reference, Servo};
+use super::{Excitation, Reference, Servo, Signal};
 use crate::TICK_HZ;
 use crate::math::{saturating_multiply, saturating_times};
 use crate::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
@@ -40,6 +40,8 @@ struct Segment {
     travel: Millimetres,
     /// The speed past which the motor no longer follows.
     too_fast: MillimetresPerSecond,
+    /// True if sines swing the torque about a reference at rest.
+    shakes: bool,
     remaining_ticks: u32,
 }
 
@@ -53,6 +55,7 @@ impl Segment {
             too_fast: MillimetresPerSecond(
                 excitation.fastest().0.saturating_mul(I16F16::from_bits(0x1_8000)),
             ),
+            shakes: matches!(excitation.signal, Signal::Multisine { .. }),
             remaining_ticks: ticks(excitation),
         }
     }
@@ -94,6 +97,8 @@ pub(crate) struct Player {
     begin: Millimetres,
     travel: Millimetres,
     too_fast: MillimetresPerSecond,
+    shakes: bool,
+    has_servo: bool,
 }
 
 impl Player {
@@ -121,6 +126,8 @@ impl Player {
     fn take_limits(&mut self, segments: &Segments) {
         if let Some(segment) = segments.0.get(self.current) {
             (self.travel, self.too_fast) = (segment.travel, segment.too_fast);
+            self.shakes = segment.shakes;
+            self.has_servo = segment.servo.stiffness.0 != I16F16::ZERO;
         }
     }
 
@@ -168,6 +175,18 @@ impl Player {
     #[cold]
     pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond, hand: MillimetresPerSecond) -> bool {
         speed > self.too_fast && speed.0 > hand.0.saturating_mul_int(3)
+    }
+
+    /// True if a servo holds the motor to a reference.
+    #[cold]
+    pub(crate) fn has_servo(&self) -> bool {
+        self.has_servo
+    }
+
+    /// True if sines shake the motor, which turns to and fro without getting on.
+    #[cold]
+    pub(crate) fn shakes(&self) -> bool {
+        self.shakes
     }
 
     /// True if the motor is further from the beginning of all than this segment allows.

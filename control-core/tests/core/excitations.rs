@@ -256,3 +256,81 @@ fn overspeed_trips_during_an_excitation() {
         assert_eq!(trips_at(signal.clone(), speed), None, "{signal:?} at {speed} mm/s");
     }
 }
+
+/// A needle of 14 g with 0.04 N of dry friction under a motor that gives `sign` times the torque that was asked for `late` ticks ago: the
+/// fault that ends `signal`, and how far the needle has then gone, in mm.
+fn driven(signal: Signal, sign: f64, late: usize) -> Option<(Fault, f64)> {
+    let plan = Config::commissioned_virtual().plan().expect("sound");
+    let (mm_per_count, zero) = (plan.mm_per_count().to_num::<f64>(), f64::from(plan.zero_torque_code().0));
+    let mut c = Controller::new(plan);
+    c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
+    let servo = Servo { stiffness: Stiffness(q(0.035)), damping: Damping(I8F24::from_num(0.001_26)) };
+    let travel = Millimetres(q(500.0));
+    c.order(Order::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
+    let (mut at, mut speed) = (0.0_f64, 0.0_f64);
+    let mut asked = std::collections::VecDeque::from(vec![0.0; late]);
+    (0..20_000).find_map(|_| {
+        c.order(Order::Heartbeat);
+        let count = Counts((at / mm_per_count).floor() as i32);
+        let output = c.tick(TickInput { count, tilt: STRAIGHT });
+        if let Some(fault) = output.tripped {
+            return Some((fault, at));
+        }
+        // N at 10 mm; mm/s in a tick for a N.
+        asked.push_back((f64::from(output.dac.0) - zero) * 28.8 / 2047.0 / 10.0);
+        let (force, per_newton) = (sign * asked.pop_front().expect("one is there"), 1e3 / 0.014 * 1e-4);
+        let friction = (force + speed / per_newton).clamp(-0.04, 0.04);
+        speed += (force - friction) * per_newton;
+        at += speed * 1e-4;
+        None
+    })
+}
+
+fn sines(frequencies: &[u16]) -> Signal {
+    Signal::Multisine {
+        torque: MillinewtonMetres(q(1.33)),
+        frequencies: frequencies.iter().copied().collect(),
+    }
+}
+
+#[test]
+fn swapped_leads_under_a_servo_are_found_in_every_signal() {
+    let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(q(2.0)), ramp_ms: 250 };
+    let triangle = |speed: f64| Signal::Triangle {
+        stroke: Millimetres(q(200.0)),
+        speed: MillimetresPerSecond(q(speed)),
+    };
+    let low = sines(&[3, 5, 9, 14, 21, 32]);
+    for signal in [staircase(5, 2.0), ladder(5, 2.0), triangle(20.0), triangle(400.0), ramps, low] {
+        let (fault, way) = driven(signal.clone(), -1.0, 0).unwrap_or_else(|| panic!("{signal:?}"));
+        println!("{signal:?}: {fault:?} after {way:.1} mm");
+        assert!(fault == Fault::WrongWay && way.abs() < 20.0, "{signal:?}: {fault:?} at {way} mm");
+    }
+}
+
+/// Sines of a quarter of a period in 4 ms and less: the motor gives one way what is asked for the other way.
+#[test]
+fn a_motor_that_obeys_late_is_not_wired_the_wrong_way() {
+    for late in [10, 20, 28, 34, 40] {
+        let signal = sines(&[5, 8, 11, 17, 24, 36, 59, 76, 116, 177, 286, 421]);
+        assert_eq!(driven(signal, 1.0, late), None, "{late} ticks");
+    }
+}
+
+/// Two counts to and fro at 0.5 kHz: an encoder with a dead channel, or a needle that sines shake over one edge.
+#[test]
+fn counts_to_and_fro_are_a_dead_channel_unless_sines_shake() {
+    let fault_of = |signal: Signal| {
+        let mut c = Controller::new(Config::commissioned_virtual().plan().expect("sound"));
+        c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
+        c.order(Order::Excite(played(signal)));
+        (0..5_000).find_map(|tick| {
+            c.order(Order::Heartbeat);
+            c.tick(TickInput { count: Counts(tick / 10 % 2), tilt: STRAIGHT }).tripped
+        })
+    };
+    assert_eq!(fault_of(sines(&[62, 70, 88, 110, 492])), None);
+    for signal in [Signal::Hold, ladder(5, 2.0), staircase(3, 2.0)] {
+        assert_eq!(fault_of(signal.clone()), Some(Fault::EncoderChannel), "{signal:?}");
+    }
+}

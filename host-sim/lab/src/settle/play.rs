@@ -154,6 +154,7 @@ mod tests {
     use super::*;
     use crate::characterise::configuration;
     use crate::characterise::written::nominal_rig;
+    use crate::settle::{Plant, Subject};
 
     fn limited() -> Limited {
         let hello = characterise::scale(&configuration()).expect("the configuration is sound");
@@ -179,5 +180,83 @@ mod tests {
         let general = limited.general("", 12.0).expect("the first round is within the limits");
         let seconds: f64 = general.programmes.iter().map(Programme::seconds).sum();
         assert!((seconds - 24.0).abs() < 0.01, "{seconds} s");
+    }
+
+    /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step, with `effects` concealed in it.
+    fn played(input: &Input, gain: f64, effects: &str) -> Result<(), String> {
+        let text = format!(
+            "format = 1\nname = \"concealed\"\nkind = \"rotary\"\n\
+             [model]\ninertia = 1.4e-6\nviscous = 1.1e-6\ncoulomb = 4.2e-4\n\
+             [actuator]\ngain = {gain:e}\ncommand_unit = \"dac\"\nlimit = 2047.0\n\
+             [encoder]\ncounts_per_unit = 636.6197772990716\nturn = 6.283185307179586\n{effects}"
+        );
+        let rig = Rig::parse(&text, "concealed").expect("a rig");
+        let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "concealed".into() }));
+        let asked = limited().of_input(input, String::new(), None).expect("it is within the limits");
+        let tracks = subject.play(&asked.programmes, |_| {});
+        tracks.map(drop).map_err(|failure| failure.to_string())
+    }
+
+    fn multisine(newton_metres: f64, frequencies: [u16; 12]) -> Input {
+        let signal = Signal::Multisine { force: newton_metres, frequencies: frequencies.into() };
+        Input { segments: vec![Segment { signal, seconds: 2.0 }] }
+    }
+
+    const GAIN: f64 = 1.4e-5;
+
+    /// The motor stops at a reversal, its load flies on through the gap and knocks the motor on against its torque.
+    #[test]
+    fn a_load_that_knocks_in_its_gap_is_no_swapped_lead() {
+        for (coast, contact, ratio) in [(237.8, 186.5, 0.87), (150.0, 100.0, 1.0), (240.0, 250.0, 0.4)] {
+            let gap = format!(
+                "[[effect]]\nname = \"backlash\"\ncoefficients = {{ inertia_ratio = {:e} }}\n\
+                 shape = {{ gap = 0.0422, coast = {coast}, contact_hz = {contact}, ratio = {ratio}, dry = 285.7, \
+                 viscous = 0.857, per_command = 10.05 }}\n",
+                ratio * GAIN
+            );
+            let speeds = Signal::Staircase { slowest: 0.5, ratio: 2.2, steps: 6, dwell_s: 0.4 };
+            let reversals = Signal::Ladder { smallest: 0.006, ratio: 2.0, steps: 8, speed: 1.2 };
+            let segment = |signal, seconds| Segment { signal, seconds };
+            let input = Input { segments: vec![segment(speeds, 4.8), segment(reversals, 4.2)] };
+            assert_eq!(played(&input, GAIN, &gap), Ok(()), "{contact} Hz, {ratio}");
+        }
+    }
+
+    /// A torque that swings faster than its delay drives the motor against what is asked for at that moment.
+    #[test]
+    fn a_motor_that_obeys_late_is_no_swapped_lead() {
+        let frequencies = [5, 8, 11, 17, 24, 36, 59, 76, 116, 177, 286, 421];
+        for delay in [0.001, 0.00285, 0.004] {
+            let late = format!("[[effect]]\nname = \"command_delay\"\nshape = {{ delay = {delay} }}\n");
+            assert_eq!(played(&multisine(1.33e-3, frequencies), GAIN, &late), Ok(()), "{delay} s");
+        }
+    }
+
+    /// An unbalanced roller rests where sines of up to half a kilohertz shake it over one edge of the encoder.
+    #[test]
+    fn a_motor_shaken_over_one_count_is_no_dead_channel() {
+        let late = "[[effect]]\nname = \"command_delay\"\nshape = { delay = 0.00186 }\n\
+                    [[effect]]\nname = \"mass_imbalance\"\nshape = { turn = 6.283185307179586 }\n\
+                    coefficients = { cos_1 = 0.00014, sin_1 = -5.46e-5 }\n";
+        let frequencies = [62, 70, 88, 110, 126, 156, 187, 238, 282, 336, 414, 492];
+        assert_eq!(played(&multisine(1.31e-3, frequencies), GAIN, late), Ok(()));
+    }
+
+    /// Every kind of signal with the servo that follows it: the motor runs away from where it should be.
+    #[test]
+    fn swapped_leads_end_an_input_as_what_they_are() {
+        let limited = limited();
+        let general = [
+            Signal::Staircase { slowest: 0.5, ratio: 2.2, steps: 6, dwell_s: 0.4 },
+            Signal::Triangle { stroke: 23.7, speed: 23.7 },
+            Signal::Ladder { smallest: 0.006, ratio: 2.0, steps: 8, speed: 1.2 },
+            Signal::Multisine { force: limited.dry, frequencies: vec![3, 5, 9, 14, 21, 32] },
+            Signal::Ramps { force: 3.0 * limited.dry, ramp_s: 0.25 },
+        ];
+        for signal in general {
+            let input = Input { segments: vec![Segment { signal: signal.clone(), seconds: 2.0 }] };
+            let ended = played(&input, -GAIN, "").expect_err("it runs away");
+            assert!(ended.contains("sped up against the motor"), "{signal:?}: {ended}");
+        }
     }
 }
