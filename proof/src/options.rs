@@ -102,7 +102,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --inputs A,B  with --settle: only these of designed, multisines and characterise; the first sets the time of motion
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
-  --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz
+  --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz; with --settle
+                also the folder of one plant, such as plant-5
   --cases-from DIR  judge the cases of a folder with its key.json or believed.tsv and draw none; again for more folders.
                     docs/benchmark.md tells the format
   --inject DIR  conceal known effects in the recordings of real machines of a folder (a folder a machine, with rig.toml,

@@ -112,8 +112,10 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     std::fs::create_dir_all(&out).map_err(|e| format!("cannot create {}: {e}", out.display()))?;
     let base = base(&program, &out)?;
     let count = options.cases.unwrap_or(PLANTS);
-    let plants: Vec<(usize, Plant)> =
-        (0..count).map(|index| (index, plants::draw(&base, options.seed, index))).collect();
+    let plants: Vec<(usize, Plant)> = (0..count)
+        .map(|index| (index, plants::draw(&base, options.seed, index)))
+        .filter(|(index, plant)| is_wanted(options.only.as_deref(), *index, plant))
+        .collect();
     let inputs = &options.inputs;
     let judged = pool::map(options.jobs, options.budget(), "settled", &plants, |(index, plant)| {
         let folder = out.join(format!("plant-{index}"));
@@ -134,6 +136,15 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
     }
     Ok(())
+}
+
+/// True if `only` is the folder of plant `index`, or a part of its kind or of its effects; all are wanted if it is absent.
+fn is_wanted(only: Option<&str>, index: usize, plant: &Plant) -> bool {
+    only.is_none_or(|text| {
+        let number = text.strip_prefix("plant-").and_then(|number| number.parse().ok());
+        let is_within = || plant.kind.words().contains(text) || plant.names.join(" + ").contains(text);
+        number.map_or_else(is_within, |number: usize| number == index)
+    })
 }
 
 fn json_of(plant: &Judged, inputs: &[&str]) -> Value {
@@ -237,6 +248,18 @@ mod tests {
         let both = answer(&[&["cogging"], &["command_delay"]], 0.95);
         assert!(both.is_right(&["command_delay", "cogging"]));
         assert!(!both.is_right(&["command_delay", "torque_ripple"]));
+    }
+
+    #[test]
+    fn only_the_plants_that_are_asked_for_are_settled() {
+        let names = vec!["cogging", "command_delay"];
+        let plant = Plant { kind: Kind::Pair, names, toml: String::new() };
+        for wanted in [None, Some("plant-12"), Some("cogging"), Some("pairs")] {
+            assert!(is_wanted(wanted, 12, &plant), "{wanted:?}");
+        }
+        for other in ["plant-1", "plant-123", "backlash", "nulls"] {
+            assert!(!is_wanted(Some(other), 12, &plant), "{other}");
+        }
     }
 
     #[test]
