@@ -23,7 +23,7 @@ pub(super) fn following(
     let (played, rounds) = (settled.motion_s(), settled.rounds.len());
     let left_s = settings.motion_s - played;
     let is_sure = settled.unsure.is_empty() || settings.inputs != Inputs::Designed;
-    if let Some(conclusion) = is_settled(report, rounds).filter(|_| is_sure) {
+    if let Some(conclusion) = is_settled(report, settled).filter(|_| is_sure) {
         return Ok(Err(conclusion));
     }
     if rounds >= settings.rounds {
@@ -38,10 +38,11 @@ pub(super) fn following(
     next(limited, report, folder, settings, (rounds as u64 + settings.seed, left_s))
 }
 
-/// The conclusion if each name is single, or nothing is there to be named; `rounds` were played.
-fn is_settled(report: &Report, rounds: usize) -> Option<String> {
+/// The conclusion if each name is single, or nothing is there to be named.
+fn is_settled(report: &Report, settled: &Settled) -> Option<String> {
     let explained = matches!(report.verdict, Verdict::NoMismatch | Verdict::ParametersOnly);
-    if explained && rounds >= 2 {
+    let has_names = settled.rounds.last().is_some_and(|round| !round.names.is_empty());
+    if explained && !has_names && settled.rounds.len() >= 2 {
         return Some("two rounds or more leave nothing that an effect would explain".to_owned());
     }
     let rivals = report.contenders.iter().filter(|one| one.name.is_some()).count();

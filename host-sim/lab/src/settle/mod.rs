@@ -3,6 +3,7 @@
 
 mod feel;
 mod following;
+mod kept;
 mod looks;
 mod page;
 mod play;
@@ -89,7 +90,7 @@ pub struct Round {
     pub sentence: String,
     /// Names that contend afterwards, with their probabilities; `none` for none of them.
     pub contenders: Vec<(String, f64)>,
-    /// Names of the diagnosis of all recordings so far, with the confidence of that diagnosis alone.
+    /// Names after the diagnosis of all recordings so far, with the confidence of that diagnosis alone.
     pub names: Vec<Name>,
 }
 
@@ -225,7 +226,9 @@ impl Run<'_> {
                 }
             };
             progress(Progress::Said(&report.sentence))?;
-            settled.rounds.push(round(asked, &report));
+            let before = settled.rounds.last().map_or(&[][..], |round| &round.names);
+            let round = round(asked, &report, before);
+            settled.rounds.push(round);
             settled.count_looks(self.settings.most_rounds());
             let folder = folder.join("report");
             match following(&self.limited, &report, &folder, self.settings, settled)? {
@@ -307,15 +310,18 @@ fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Failure> {
     Ok(outcome)
 }
 
-fn round(asked: Asked, report: &Report) -> Round {
+/// The round of a report; `before` are the names of the round before.
+fn round(asked: Asked, report: &Report, before: &[Name]) -> Round {
     let name = |name: Option<diagnosis::effects::EffectName>| name.map_or("none", |name| name.as_str());
+    let contenders: Vec<(String, f64)> =
+        report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect();
     Round {
         seconds: asked.programmes.iter().map(Programme::seconds).sum(),
         asked: asked.words,
         why: asked.why,
         sentence: report.sentence.clone(),
-        contenders: report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect(),
-        names: names(report),
+        names: kept::kept(before, names(report), &contenders),
+        contenders,
     }
 }
 
