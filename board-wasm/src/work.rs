@@ -4,7 +4,7 @@ use device_setup::bench::{Act, Line};
 use device_setup::commission::{self, Wish};
 use device_setup::compensate;
 use device_setup::pause::pause;
-use device_sim::device::part;
+use device_sim::device::device_config;
 use device_sim::failure::Failure;
 use device_sim::page::guide::{GuideAnswer, GuideState, Reading};
 use diagnosis::rig::Rig;
@@ -181,7 +181,7 @@ async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Resu
     let mut line = BrowserLine(Rc::clone(&shared));
     let asks = async |step: compensate::Step| ask(&shared, &step, step.moves()).await;
     let outcome = compensate::compensate(&mut line, &rig, share, asks).await?;
-    let finding = Finding { lines: outcome.lines(), file: part::to_toml("board", &outcome.record)? };
+    let finding = Finding { lines: outcome.lines(), file: device_config::to_toml("board", &outcome.record)? };
     outcome.refusal().map_or(Ok(finding), Err)
 }
 

@@ -1,8 +1,8 @@
 //! Friction along the needle inside tissue (Paper 001, eq. 2): as printed, as a clamped proxy that holds, and as one with a static and a
 //! dynamic level.
 
+use crate::anchor::Anchor;
 use crate::math::{exp, saturating_multiply, saturating_product, truncating_product};
-use crate::proxy::Anchor;
 use crate::units::{Millimetres, Newtons, Stiffness};
 use fixed::types::{I2F30, I16F16};
 

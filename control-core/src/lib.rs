@@ -18,6 +18,7 @@
 )]
 
 pub mod anatomy;
+mod anchor;
 pub mod ceilings;
 pub mod compensation;
 pub mod config;
@@ -32,7 +33,6 @@ mod law;
 mod math;
 mod passivity;
 pub mod plan;
-mod proxy;
 mod refusal;
 mod runaway;
 pub mod safety;

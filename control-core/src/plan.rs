@@ -48,7 +48,7 @@ pub struct Plan {
     pub(crate) bounce_damping: BounceDamping,
     pub(crate) runaway: runaway::Bounds,
     pub(crate) damping: I2F30,
-    pub(crate) compensation: feedforward::Ready,
+    pub(crate) compensation: feedforward::FeedforwardPlan,
     pub(crate) dac: DacScale,
     /// −1 where the encoder counts down on the way in.
     pub(crate) encoder_sign: i32,
@@ -67,7 +67,7 @@ impl Plan {
         let scale = Scale::new(mm_per_count);
         within(Field::Scale, patient.scale, milli(100), I16F16::ONE)?;
         let met = layers::met(config)?;
-        let ground = law::Ground {
+        let force_limits = law::ForceLimits {
             layers: &met.layers,
             configured: patient.layers.len(),
             travel: device.limits.travel.0,
@@ -75,7 +75,7 @@ impl Plan {
             stiffest: stiffest(config),
             count: I16F16::saturating_from_num(mm_per_count),
         };
-        let law = law::Plan::new(&patient.law, &ground)?;
+        let law = law::Plan::new(&patient.law, &force_limits)?;
         let anatomy = layers::plan(config, &met, law.ruptures());
         let lever = device.roller_radius.0.saturating_mul(patient.scale);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;

@@ -11,14 +11,14 @@
 extern crate std;
 
 pub mod drive;
-pub mod lines;
 mod log;
 pub mod monitor;
 pub mod port;
 pub mod reset;
-pub mod stages;
+pub mod stage_timing;
 pub mod store;
 pub mod supervision;
 pub mod tasks;
 pub mod tilt;
 pub mod timing;
+pub mod wire_check;

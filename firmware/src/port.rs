@@ -2,10 +2,10 @@
 //! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
 
 use crate::drive::Converters;
-use crate::lines::PulledLines;
 use crate::monitor::Readings;
 use crate::store::ConfigFlash;
 use crate::tilt::TiltSource;
+use crate::wire_check::PulledLines;
 use control_core::units::Counts;
 use embedded_hal::digital::OutputPin;
 

@@ -11,7 +11,7 @@ import { PatientEditor } from "./patient.js";
 import { PhasePlot, TimePlot, WINDOW_S } from "./plots.js";
 import { PlaceEditor } from "./place.js";
 import { Practice } from "./practice.js";
-import { OwnForces } from "./own_forces.js";
+import { CompensationSlider } from "./compensation_slider.js";
 import { Scrub } from "./scrub.js";
 import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
@@ -77,7 +77,7 @@ const receive = {
   frame(message) {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
-    ownForces.follow(linkStatus.compensation);
+    compensationSlider.follow(linkStatus.compensation);
     practice.follow(linkStatus);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
@@ -137,7 +137,7 @@ const link = new Link((message) => receive[message.type]?.(message));
 const hand = new Hand(byId("section"), section, link);
 body.setHand(hand);
 const scrub = new Scrub(link);
-const ownForces = new OwnForces(link);
+const compensationSlider = new CompensationSlider(link);
 const patient = new PatientEditor(link, palette);
 const place = new PlaceEditor(link, hand);
 body.entered = (found) => place.enter(found);
@@ -157,7 +157,7 @@ let lastPanel = -Infinity;
 function draw(nowMs) {
   hand.tell();
   scrub.tell();
-  ownForces.tell();
+  compensationSlider.tell();
   view.seconds = Math.min(0.1, (nowMs - lastDrawn) / 1000);
   lastDrawn = nowMs;
   view.hand = hand.depth;

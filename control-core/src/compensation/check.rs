@@ -1,6 +1,6 @@
 //! Checks that a compensation may be fed forward on a device, and prepares the values for the tick.
 
-use super::feedforward::Ready;
+use super::feedforward::FeedforwardPlan;
 use super::{Friction, Gains, VERSION, Wave};
 use crate::config::Device;
 use crate::refusal::{Field, Refusal, within};
@@ -111,7 +111,7 @@ fn version() -> I16F16 {
 }
 
 /// Divides what the tick is not to divide. The device has passed [`check`].
-pub(crate) fn prepare(device: &Device) -> Ready {
+pub(crate) fn prepare(device: &Device) -> FeedforwardPlan {
     let found = &device.compensation;
     let counts = u64::from(device.counts_per_turn.max(1));
     let per_speed = |friction: &Friction| {
@@ -128,7 +128,7 @@ pub(crate) fn prepare(device: &Device) -> Ready {
     });
     let span = found.full_speed.0.saturating_sub(found.rest_speed.0);
     let inverse = |x: I16F16| I16F16::ONE.checked_div(x).unwrap_or_default();
-    Ready {
+    FeedforwardPlan {
         is_some: found.is_some(),
         phase_per_count: u32::try_from(((1_u64 << 32) + counts / 2) / counts).unwrap_or(u32::MAX),
         viscous: [per_speed(&found.inwards), per_speed(&found.outwards)],

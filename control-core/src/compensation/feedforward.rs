@@ -20,7 +20,7 @@ const RELEASE_PLACES: u32 = 11;
 
 /// A compensation ready for the tick: every division done. [`super::check::prepare`] makes it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Ready {
+pub(crate) struct FeedforwardPlan {
     /// True if there is anything to feed forward.
     pub(super) is_some: bool,
     /// The phase of a count; 2^32 are a turn.
@@ -37,7 +37,7 @@ pub(crate) struct Ready {
 
 /// The rotor's angle and the needle's speed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Here {
+pub(crate) struct RotorState {
     /// The encoder's absolute count, in the direction of insertion.
     pub(crate) count: i32,
     pub(crate) speed: MillimetresPerSecond,
@@ -100,9 +100,9 @@ impl Feedforward {
     }
 
     /// Begins from nothing at an absolute count, where anything is to be fed forward.
-    pub(crate) fn restart(&mut self, ready: &Ready, count: i32, is_wanted: bool) {
+    pub(crate) fn restart(&mut self, plan: &FeedforwardPlan, count: i32, is_wanted: bool) {
         let (wanted, index) = (self.wanted, self.index);
-        *self = Self { is_on: ready.is_some && is_wanted, wanted, index, count, ..Self::default() };
+        *self = Self { is_on: plan.is_some && is_wanted, wanted, index, count, ..Self::default() };
     }
 
     /// True if [`Self::tick`] has anything to do.
@@ -121,32 +121,32 @@ impl Feedforward {
     pub(crate) fn tick(
         &mut self,
         found: &Compensation,
-        ready: &Ready,
-        here: Here,
+        plan: &FeedforwardPlan,
+        rotor: RotorState,
         wanted: I16F16,
     ) -> (I16F16, bool) {
         let [angle, friction, _, drive] = self.gains;
-        if here.turn == RENEW_TURN {
-            self.renew(found, here.tilt);
+        if rotor.turn == RENEW_TURN {
+            self.renew(found, rotor.tilt);
         } else if let Some(index) = self.index {
-            let phase = (here.count.wrapping_sub(index).cast_unsigned()).wrapping_mul(ready.phase_per_count);
-            if here.turn.is_multiple_of(2) {
+            let phase = (rotor.count.wrapping_sub(index).cast_unsigned()).wrapping_mul(plan.phase_per_count);
+            if rotor.turn.is_multiple_of(2) {
                 self.waves = -at_gain(sum(&found.angle, phase), angle);
             } else {
                 self.ripple = at_gain(sum(&found.ripple, phase), drive);
             }
         }
-        let way = here.count.wrapping_sub(self.count);
-        self.count = here.count;
-        let rubs = rubbing(found, ready, here.speed);
+        let way = rotor.count.wrapping_sub(self.count);
+        self.count = rotor.count;
+        let rubs = rubbing(found, plan, rotor.speed);
         let found_friction = rubs.found;
         self.rubbing = released(self.rubbing, rubs);
         let given = self.waves + at_gain(self.rubbing, friction);
-        let (given, is_held) = self.account.allow(ready.store, self.given, found_friction, way, given);
+        let (given, is_held) = self.account.allow(plan.store, self.given, found_friction, way, given);
         self.given = given;
         let asked = wanted.saturating_add(given).saturating_add(self.steady);
         let straightened = asked.saturating_sub(at_gain(asked, self.ripple));
-        let torque = straightened.saturating_add(self.over_deadband(found, ready, straightened, drive));
+        let torque = straightened.saturating_add(self.over_deadband(found, plan, straightened, drive));
         self.fed = torque.saturating_sub(wanted);
         (torque, is_held)
     }
@@ -165,14 +165,20 @@ impl Feedforward {
 
     /// Returns the addition that lifts a torque over the drive's deadband: the half width for torques of at least twice that, less
     /// below, so that there is no step at zero.
-    fn over_deadband(&self, found: &Compensation, ready: &Ready, asked: I16F16, drive: I16F16) -> I16F16 {
+    fn over_deadband(
+        &self,
+        found: &Compensation,
+        plan: &FeedforwardPlan,
+        asked: I16F16,
+        drive: I16F16,
+    ) -> I16F16 {
         let width = found.deadband.0;
         if width == I16F16::ZERO {
             return I16F16::ZERO;
         }
         let reach = width + width;
         let within = asked.min(reach).max(-reach);
-        let share = I16F16::from_bits(truncating_product(within.to_bits(), ready.per_deadband.to_bits(), 16));
+        let share = I16F16::from_bits(truncating_product(within.to_bits(), plan.per_deadband.to_bits(), 16));
         at_gain(I16F16::from_bits(truncating_product(width.to_bits(), share.to_bits(), 16)), drive)
     }
 }
@@ -187,8 +193,8 @@ struct Rubbing {
     moves_outwards: Option<bool>,
 }
 
-fn rubbing(found: &Compensation, ready: &Ready, speed: MillimetresPerSecond) -> Rubbing {
-    let [inwards, outwards] = ready.viscous;
+fn rubbing(found: &Compensation, plan: &FeedforwardPlan, speed: MillimetresPerSecond) -> Rubbing {
+    let [inwards, outwards] = plan.viscous;
     let is_outwards = speed.0 < I16F16::ZERO;
     let (dry, viscous) =
         if is_outwards { (found.outwards.dry.0, outwards) } else { (found.inwards.dry.0, inwards) };
@@ -203,7 +209,7 @@ fn rubbing(found: &Compensation, ready: &Ready, speed: MillimetresPerSecond) -> 
         force
     } else {
         // t²·(3 − 2t), t in Q30.
-        let part = truncating_product(above.to_bits(), ready.per_blend.to_bits(), 16);
+        let part = truncating_product(above.to_bits(), plan.per_blend.to_bits(), 16);
         let smooth = upper_half(upper_half(part, part), (3 << 29) - part);
         // Q28 times Q29 without 32 places.
         I16F16::from_bits(truncating_product(force.to_bits(), smooth, 25))

@@ -1,7 +1,7 @@
 //! The torque of a tick: what the law or the excitation asks for, what is fed forward beside it, and what the limits leave of it.
 
 use super::{Core, Mode};
-use crate::compensation::feedforward::Here;
+use crate::compensation::feedforward::RotorState;
 use crate::event::Limits;
 use crate::excitation::Segments;
 use crate::math::{saturating_multiply, truncating_product};
@@ -56,9 +56,9 @@ impl Core {
         tilt: Milliradians,
     ) -> (MillinewtonMetres, Limits) {
         let count = self.previous.unwrap_or_default().0;
-        let here = Here { count, speed, tilt, turn: self.turn };
+        let rotor = RotorState { count, speed, tilt, turn: self.turn };
         let found = &self.plan.config.device.compensation;
-        let (torque, is_held) = self.feedforward.tick(found, &self.plan.compensation, here, wanted);
+        let (torque, is_held) = self.feedforward.tick(found, &self.plan.compensation, rotor, wanted);
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 

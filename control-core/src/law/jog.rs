@@ -1,6 +1,6 @@
 //! The law of seed 001: the jog effect of each wall and the friction between them.
 
-use super::{Ground, Met, Motion, Response, follow_share};
+use super::{ForceLimits, LayerHit, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
 use crate::friction::{self, Hold};
@@ -81,12 +81,12 @@ impl FrictionLaw {
 
 impl Plan {
     /// Checks the law of friction and all the walls with it, at whatever angle they are met.
-    pub(crate) fn new(friction: &FrictionLaw, ground: &Ground) -> Result<Self, Refusal> {
-        check_friction(friction, ground)?;
-        check_along(ground)?;
+    pub(crate) fn new(friction: &FrictionLaw, limits: &ForceLimits) -> Result<Self, Refusal> {
+        check_friction(friction, limits)?;
+        check_along(limits)?;
         let mut rubs = Vec::new();
         let mut above: Option<(&Layer, I32F32)> = None;
-        for Met { layer, .. } in ground.layers {
+        for LayerHit { layer, .. } in limits.layers {
             let rub_above = above.map_or(I32F32::ZERO, |(last, rub)| {
                 let thickness = layer.depth.0.saturating_sub(last.depth.0);
                 rub.saturating_add(thickness.wide_mul(last.friction.0))
@@ -96,7 +96,7 @@ impl Plan {
             // It holds MAX_LAYERS: the push cannot fail.
             let _ = rubs.push(Rub { per_mm, above: I8F24::saturating_from_num(rub_above) });
         }
-        let walls = wall::all(ground.layers.iter().map(|met| &met.layer));
+        let walls = wall::all(limits.layers.iter().map(|met| &met.layer));
         Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: plan_friction(friction) })
     }
 }
@@ -204,17 +204,17 @@ fn stretched(straight: I8F24, path_per_depth: I8F24) -> I16F16 {
     I16F16::from_bits(saturating_product(straight.to_bits(), path_per_depth.to_bits(), 32))
 }
 
-fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
-    let layer = ground.configured as u8;
-    let limit = ground.stiffest;
+fn check_friction(law: &FrictionLaw, limits: &ForceLimits) -> Result<(), Refusal> {
+    let layer = limits.configured as u8;
+    let limit = limits.stiffest;
     match *law {
         FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit: force, limit_out } => {
             within(Field::LevelLength, level_length.0, milli(1_000), milli(1_000_000))?;
             within(Field::LevelCap, level_cap, milli(1_000), milli(32_000))?;
             within(Field::AnchorMs, I16F16::from_num(anchor_ms.min(30_000)), milli(5_000), milli(1_000_000))?;
             within(Field::FrictionStiffness, stiffness.0, milli(1), limit)?;
-            within(Field::FrictionLimit, force.0, milli(1), ground.largest)?;
-            within(Field::FrictionLimitOut, limit_out.0, milli(1), ground.largest)?;
+            within(Field::FrictionLimit, force.0, milli(1), limits.largest)?;
+            within(Field::FrictionLimitOut, limit_out.0, milli(1), limits.largest)?;
             let slope = law.hold();
             if slope > limit { Err(Refusal::TooStiff { layer, slope, limit }) } else { Ok(()) }
         }
@@ -228,14 +228,16 @@ fn check_friction(law: &FrictionLaw, ground: &Ground) -> Result<(), Refusal> {
 
 fn plan_friction(law: &FrictionLaw) -> friction::Law {
     match *law {
-        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => friction::Law::Paper {
-            per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
-            level_cap,
-            follow: follow_share(anchor_ms),
-            stiffness,
-            limit,
-            least: Newtons(limit_out.0.saturating_neg()),
-        },
+        FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => {
+            friction::Law::Paper {
+                per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
+                level_cap,
+                follow: follow_share(anchor_ms),
+                stiffness,
+                limit,
+                least: Newtons(limit_out.0.saturating_neg()),
+            }
+        }
         FrictionLaw::Cone { stiffness } => {
             friction::Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
         }
@@ -249,12 +251,12 @@ fn plan_friction(law: &FrictionLaw) -> friction::Law {
 
 /// At whatever angle: each wall with the friction up to it, and friction at the end of the travel. The flatter the needle,
 /// the longer its way through each layer, and the force is largest where the next layer is just out of reach.
-fn check_along(ground: &Ground) -> Result<(), Refusal> {
-    let travel = ground.travel;
+fn check_along(limits: &ForceLimits) -> Result<(), Refusal> {
+    let travel = limits.travel;
     let flattest = reciprocal(sine(SMALLEST_ANGLE));
-    let just_reached = ground.layers.iter().map(|met| reaching(travel, met.layer.depth.0).min(flattest));
+    let just_reached = limits.layers.iter().map(|met| reaching(travel, met.layer.depth.0).min(flattest));
     for stretch in just_reached.chain([I8F24::ONE, flattest]) {
-        check_at(ground, stretch)?;
+        check_at(limits, stretch)?;
     }
     Ok(())
 }
@@ -266,11 +268,11 @@ fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
 }
 
 /// The same with layers met at `stretch` times their depth.
-fn check_at(ground: &Ground, stretch: I8F24) -> Result<(), Refusal> {
-    let (travel, limit) = (ground.travel, ground.largest);
+fn check_at(limits: &ForceLimits, stretch: I8F24) -> Result<(), Refusal> {
+    let (travel, limit) = (limits.travel, limits.largest);
     let along = |depth: I16F16| I16F16::from_bits(truncating_product(depth.to_bits(), stretch.to_bits(), 24));
     let (mut friction, mut at, mut per_mm, mut deepest) = (I16F16::ZERO, I16F16::ZERO, I16F16::ZERO, 0);
-    for Met { number, layer } in ground.layers {
+    for LayerHit { number, layer } in limits.layers {
         let top = along(layer.depth.0);
         if top > travel {
             break;

@@ -1,6 +1,6 @@
 //! The laws of force: what the needle feels of the anatomy that it has met. Each is a file with what a person configures,
 //! what of it may run (`Plan`), what the tick remembers (`Memory`) and the tick itself; a fourth is one more file and one more
-//! line at the end of this one. A law knows no device: [`Ground`] says what it may ask for.
+//! line at the end of this one. A law knows no device: [`ForceLimits`] says what it may ask for.
 
 use crate::anatomy::Insertion;
 use crate::event::State;
@@ -24,7 +24,7 @@ pub(crate) struct Motion<'a> {
 
 /// A layer as the needle meets it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Met {
+pub(crate) struct LayerHit {
     /// Its number in the configuration.
     pub(crate) number: u8,
     pub(crate) layer: Layer,
@@ -32,9 +32,9 @@ pub(crate) struct Met {
 
 /// Where a law is to act, and how much it may ask for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ground<'a> {
+pub(crate) struct ForceLimits<'a> {
     /// Outermost first; without those of a vessel that the needle passes beside.
-    pub(crate) layers: &'a [Met],
+    pub(crate) layers: &'a [LayerHit],
     /// How many layers are configured.
     pub(crate) configured: usize,
     /// Largest depth along the needle, mm.
@@ -118,8 +118,8 @@ macro_rules! laws {
 
         impl Plan {
             /// Checks `law` and prepares it for the tick.
-            pub(crate) fn new(law: &Law, ground: &Ground) -> Result<Self, Refusal> {
-                match law { $(Law::$name(config) => $module::Plan::new(config, ground).map(Self::$name)),+ }
+            pub(crate) fn new(law: &Law, limits: &ForceLimits) -> Result<Self, Refusal> {
+                match law { $(Law::$name(config) => $module::Plan::new(config, limits).map(Self::$name)),+ }
             }
 
             /// A bit for each layer that gives way by this law rather than by a wall of its own.

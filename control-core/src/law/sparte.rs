@@ -10,13 +10,13 @@
 //! LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s − F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped
 //! implicitly over the tick's own travel Δx, `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
 
-use super::{Ground, Met, Motion, Response, follow_share, reach};
+use super::{ForceLimits, LayerHit, Motion, Response, follow_share, reach};
 use crate::anatomy::Insertion;
+use crate::anchor::Anchor;
 use crate::event::State;
 use crate::kinematics::Direction;
 use crate::math::{exp_negative, saturating_multiply, share, truncating_product};
 use crate::passivity::Elements;
-use crate::proxy::Anchor;
 use crate::refusal::{Field, Refusal, count, milli, within};
 use crate::tissue::MAX_LAYERS;
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
@@ -126,15 +126,15 @@ impl Sparte {
 
 impl Plan {
     /// Checks what each layer asks for with friction at [`FASTEST`] on top.
-    pub(crate) fn new(sparte: &Sparte, ground: &Ground) -> Result<Self, Refusal> {
-        check(sparte, ground)?;
-        let cut = |met: &Met| sparte.cutting.get(usize::from(met.number)).copied().unwrap_or_default();
-        let walls = wall::all(ground.layers.iter().map(|met| &met.layer));
+    pub(crate) fn new(sparte: &Sparte, limits: &ForceLimits) -> Result<Self, Refusal> {
+        check(sparte, limits)?;
+        let cut = |met: &LayerHit| sparte.cutting.get(usize::from(met.number)).copied().unwrap_or_default();
+        let walls = wall::all(limits.layers.iter().map(|met| &met.layer));
         let rub = &sparte.friction;
         Ok(Self {
             walls_that_close: walls.len().min(1),
             walls,
-            cuts: ground.layers.iter().map(cut).collect(),
+            cuts: limits.layers.iter().map(cut).collect(),
             inverse_tracking: I16F16::ONE.saturating_div(sparte.tracking.0),
             relax: follow_share(sparte.relax_ms),
             rub: Rub {
@@ -287,8 +287,8 @@ fn pressed(plan: &Plan, met: &Insertion, depth: Millimetres) -> Option<I16F16> {
     (travel >= I16F16::ZERO).then(|| wall.elastic_force(travel).0)
 }
 
-fn check(sparte: &Sparte, ground: &Ground) -> Result<(), Refusal> {
-    let (stiff, largest) = (ground.stiffest, ground.largest);
+fn check(sparte: &Sparte, limits: &ForceLimits) -> Result<(), Refusal> {
+    let (stiff, largest) = (limits.stiffest, limits.largest);
     let rub = &sparte.friction;
     within(Field::TrackingStiffness, sparte.tracking.0, milli(50), stiff)?;
     within(Field::RelaxMs, I16F16::from_num(sparte.relax_ms.min(30_000)), milli(10_000), milli(10_000_000))?;
@@ -301,8 +301,8 @@ fn check(sparte: &Sparte, ground: &Ground) -> Result<(), Refusal> {
     within(Field::StribeckSpeed, rub.speed.0, milli(100), milli(100_000))?;
     within(Field::LateralForce, sparte.fixture.per_mrad.0, I16F16::ZERO, milli(100))?;
     within(Field::LargestAngle, I16F16::from_num(sparte.fixture.largest.0), milli(1_000), milli(785_000))?;
-    count(Field::CuttingForce, sparte.cutting.len(), ground.configured)?;
-    let layer = ground.configured as u8;
+    count(Field::CuttingForce, sparte.cutting.len(), limits.configured)?;
+    let layer = limits.configured as u8;
     let slope = sparte.hold();
     if slope > stiff {
         return Err(Refusal::TooStiff { layer, slope, limit: stiff });
@@ -310,7 +310,7 @@ fn check(sparte: &Sparte, ground: &Ground) -> Result<(), Refusal> {
     // At the fastest, with bristles that are stretched as far as they go.
     let rubbing = rub.sticking.0.saturating_add(I16F16::from_num(rub.viscous.0).saturating_mul(FASTEST));
     let mut before = I16F16::ZERO;
-    for Met { number, layer } in ground.layers {
+    for LayerHit { number, layer } in limits.layers {
         let Some(cut) = sparte.cutting.get(usize::from(*number)) else { continue };
         for force in [cut.inwards.0, cut.outwards.0] {
             within(Field::CuttingForce, force, I16F16::ZERO, milli(100_000))?;

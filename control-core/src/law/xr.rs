@@ -16,14 +16,14 @@ mod surface;
 use cells::{Cells, Gaps};
 use surface::Surface;
 
-use super::{Ground, Motion, Response, reach};
+use super::{ForceLimits, Motion, Response, reach};
 use crate::anatomy::Insertion;
+use crate::anchor::Anchor;
 use crate::event::State;
 use crate::interpolator::Interpolator;
 use crate::kinematics::Direction;
 use crate::math::{saturating_multiply, share, truncating_product, upper_half};
 use crate::passivity::Elements;
-use crate::proxy::Anchor;
 use crate::refusal::Refusal;
 use crate::tissue::MAX_LAYERS;
 use crate::units::{Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
@@ -126,9 +126,9 @@ impl ForceTable {
 
 impl Plan {
     /// Checks the table against what the motor gives and the stiffness that holds the needle.
-    pub(crate) fn new(table: &ForceTable, ground: &Ground) -> Result<Self, Refusal> {
-        check::check(table, ground)?;
-        let has_wall = ground.layers.iter().any(|met| met.layer.wall.is_some());
+    pub(crate) fn new(table: &ForceTable, limits: &ForceLimits) -> Result<Self, Refusal> {
+        check::check(table, limits)?;
+        let has_wall = limits.layers.iter().any(|met| met.layer.wall.is_some());
         let cells = table.cells();
         let knots = table.forces.len() / cells.max(1);
         let in_each = table.depths.len() > knots;
@@ -142,15 +142,15 @@ impl Plan {
             ruptures: Vec::new(),
             inverse_stiffness: I16F16::ONE.saturating_div(table.stiffness.0),
             walls_that_close: usize::from(has_wall),
-            count: ground.count,
+            count: limits.count,
         };
         for &knot in &table.gives_way {
             let knot = usize::from(knot);
             let shallowest = (0..cells).map(|cell| plan.depth(table, knot, cell)).min().unwrap_or(0);
             let above =
                 |depth: Millimetres| i64::from(depth.0.to_bits()) * 100 <= i64::from(shallowest) << 16;
-            let met = ground.layers.iter().rposition(|met| above(met.layer.depth)).unwrap_or(0);
-            let number = ground.layers.get(met).map_or(0, |met| met.number);
+            let met = limits.layers.iter().rposition(|met| above(met.layer.depth)).unwrap_or(0);
+            let number = limits.layers.get(met).map_or(0, |met| met.number);
             // There is room for as many as the table may have.
             let _ = plan.ruptures.push(Rupture { knot, met, layer: 1_u8.unbounded_shl(number.into()) });
         }

@@ -3,7 +3,7 @@
 use super::stiffest;
 use crate::anatomy::{self, Anatomy};
 use crate::config::{self, Config, Layer, MAX_LAYERS, Tissue, Vessel, Wall};
-use crate::law::Met;
+use crate::law::LayerHit;
 use crate::refusal::{Field, Refusal, milli, within};
 use crate::units::Millimetres;
 use crate::wall::Parabola;
@@ -17,7 +17,7 @@ const LEAST_LUMEN: I16F16 = I16F16::from_bits(13_107);
 
 /// The layers that the needle meets, and its way to the vessel.
 pub(super) struct Meeting {
-    pub(super) layers: Vec<Met, MAX_LAYERS>,
+    pub(super) layers: Vec<LayerHit, MAX_LAYERS>,
     way: Option<Way>,
 }
 
@@ -34,7 +34,7 @@ enum Way {
 pub(super) fn plan(config: &Config, met: &Meeting, ruptures: u8) -> Anatomy {
     let mut anatomy =
         Anatomy { vessel: None, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
-    for (index, Met { number, layer }) in met.layers.iter().enumerate() {
+    for (index, LayerHit { number, layer }) in met.layers.iter().enumerate() {
         // All vectors hold MAX_LAYERS: no push can fail.
         let _ = anatomy.layers.push(anatomy::Layer {
             number: *number,
@@ -123,8 +123,8 @@ fn vessel_walls(config: &Config) -> Result<Option<(usize, Option<usize>)>, Refus
 pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     check_layers(config)?;
     let layers = &config.patient.layers;
-    let mut met: Vec<Met, MAX_LAYERS> =
-        (0..).zip(layers).map(|(number, layer)| Met { number, layer: *layer }).collect();
+    let mut met: Vec<LayerHit, MAX_LAYERS> =
+        (0..).zip(layers).map(|(number, layer)| LayerHit { number, layer: *layer }).collect();
     let Some((near, far)) = vessel_walls(config)? else { return Ok(Meeting { layers: met, way: None }) };
     let through = Way::Through { near, far };
     let (Some(shape), Some(far)) = (config.patient.vessel, far) else {

@@ -4,8 +4,8 @@
 use super::monitors::Line;
 use super::pin::{Pin, Placed};
 use control_core::units::Counts;
-use firmware::lines::{Pull, PulledLines};
 use firmware::timing;
+use firmware::wire_check::{Pull, PulledLines};
 use stm32f4xx_hal::gpio::{self, PushPull, alt};
 use stm32f4xx_hal::pac::TIM2;
 use stm32f4xx_hal::prelude::*;

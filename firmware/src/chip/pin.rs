@@ -1,7 +1,7 @@
 //! A pin by its registers, for what the HAL leaves out and for a crash, which may trust nobody who owns a pin.
 #![allow(unsafe_code, reason = "pins are reached past their owners")]
 
-use firmware::lines::Pull;
+use firmware::wire_check::Pull;
 use stm32f4xx_hal::gpio;
 use stm32f4xx_hal::pac::{GPIOA, gpioa::RegisterBlock};
 

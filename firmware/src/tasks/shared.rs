@@ -1,7 +1,7 @@
 //! The single words that tasks share. Each has one writer, or is a set of bits.
 
 use crate::reset::LastWords;
-use crate::stages::Stages;
+use crate::stage_timing::Stages;
 use crate::supervision::{Conditions, Reports, Trips};
 use control_core::config::DacWidth;
 use control_core::units::{DacCode, Milliradians};

@@ -2,13 +2,13 @@
 //! what a debugger may stop.
 
 use super::shared::Shared;
-use crate::lines::WireWatch;
 use crate::log;
 use crate::monitor::{Asked, DriveMonitor};
 use crate::port::{Board, ReadDrive, SupplyLevel, Watchdog};
 use crate::reset::{Crash, CrashKind};
 use crate::supervision::Supervisor;
 use crate::timing::{SUPERVISOR_HZ, TILT_PERIOD_MS};
+use crate::wire_check::WireWatch;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use core::sync::atomic::Ordering::Relaxed;

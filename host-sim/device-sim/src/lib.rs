@@ -6,8 +6,8 @@
 pub mod device;
 pub mod driver;
 pub mod failure;
-pub mod library;
 pub mod lockstep;
+pub mod named_files;
 pub mod page;
 pub mod patients;
 pub mod plant;

@@ -5,7 +5,7 @@
 pub mod task;
 
 use crate::failure::Failure;
-use crate::library::{self, Text};
+use crate::named_files::{self, Text};
 use crate::plant::hand::Grip;
 use crate::profile::{Profile, TissueName, puncture_path_mm};
 use control_core::config::Tissue;
@@ -115,13 +115,13 @@ impl Procedure {
     pub fn find(wanted: &str, profile: &Profile) -> Result<Self, Failure> {
         match insertion(wanted) {
             Some(text) => Self::parse(&text, profile),
-            None => Self::parse(&library::find("procedure", wanted, &BUILT_IN)?, profile),
+            None => Self::parse(&named_files::find("procedure", wanted, &BUILT_IN)?, profile),
         }
     }
 
     /// Checks the text of a procedure against the tissue of `profile`.
     pub fn parse(source: &Text, profile: &Profile) -> Result<Self, Failure> {
-        let file: File = library::parse(source)?;
+        let file: File = named_files::parse(source)?;
         file.resolve(profile).map_err(|what| Failure::input(format_args!("{}: {what}", source.origin)))
     }
 

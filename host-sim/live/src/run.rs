@@ -9,7 +9,7 @@ use crate::streams::StreamFlags;
 use crate::training::without_insertion;
 use clap::{Args, ValueEnum};
 use control_core::{Device, TICK_HZ};
-use device_sim::device::part::DevicePart;
+use device_sim::device::device_config::DeviceConfig;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
 use device_sim::failure::Failure;
@@ -18,13 +18,13 @@ use device_sim::profile::{Model, Profile};
 use device_sim::session::{self, Session, Source, Subscription};
 use recording::messages::Setup;
 use recording::read::Recording;
-use recording::tally::Tally;
+use recording::run_stats::RunStats;
 use recording::write::Recorder;
-use server::bedside::Bedside;
 use server::outlets::Outlets;
-use server::pace::Pace;
+use server::patient_manager::PatientManager;
+use server::realtime_clock::RealtimeClock;
+use server::run_loop::{Outcome, RunLoop};
 use server::saved_patients::SavedPatients;
-use server::station::{Outcome, Station};
 use server::visualizer;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -122,7 +122,7 @@ impl From<ModelName> for Model {
 struct Chosen {
     device: Device,
     /// The device's part as its file has it.
-    part: Option<DevicePart>,
+    part: Option<DeviceConfig>,
     profile: Profile,
     /// Name or file of the procedure.
     wanted: String,
@@ -152,9 +152,9 @@ impl Run {
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;
 
-        let outlets = Outlets::new(publisher, recorder, Tally::new(limit));
-        let station = self.station(&chosen, setup, outlets, looks, &stop);
-        let outcome = self.play(station, serial, chosen, seconds)?;
+        let outlets = Outlets::new(publisher, recorder, RunStats::new(limit));
+        let run_loop = self.run_loop(&chosen, setup, outlets, looks, &stop);
+        let outcome = self.play(run_loop, serial, chosen, seconds)?;
         self.report(&outcome);
         Ok(())
     }
@@ -169,7 +169,7 @@ impl Run {
 
     /// Reads the device's file and finds the patient and the procedure.
     fn choose(&self) -> Result<Chosen, Failure> {
-        let mut part = self.device_config.as_deref().map(DevicePart::read).transpose()?;
+        let mut part = self.device_config.as_deref().map(DeviceConfig::read).transpose()?;
         if let Some(part) = part.as_mut().filter(|_| self.is_virtual()) {
             // It is built as its file says.
             part.device.commissioned = true;
@@ -203,37 +203,37 @@ impl Run {
     }
 
     /// Builds the loop between the device and its outlets. `looks` is what the page's practice sees.
-    fn station<'a>(
+    fn run_loop<'a>(
         &self,
         chosen: &Chosen,
         setup: Setup,
         outlets: Outlets,
         looks: Option<Subscription>,
         stop: &'a AtomicBool,
-    ) -> Station<'a> {
+    ) -> RunLoop<'a> {
         let hand = self.is_virtual().then(|| chosen.wanted.clone());
-        let bedside = Bedside::new(chosen.profile.clone(), self.source(), hand, setup)
+        let patients = PatientManager::new(chosen.profile.clone(), self.source(), hand, setup)
             .saving_in(SavedPatients::new(PATIENTS));
         let driver = Driver::new(chosen.profile.config.patient.clone());
         let driver = chosen.part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
-        let station = Station::new(driver, outlets, stop).with_bedside(bedside);
-        let station = match looks {
-            Some(subscription) => station.with_practice(subscription),
-            None => station,
+        let run_loop = RunLoop::new(driver, outlets, stop).with_patients(patients);
+        let run_loop = match looks {
+            Some(subscription) => run_loop.with_practice(subscription),
+            None => run_loop,
         };
         if self.is_virtual() || self.headless {
-            if self.zero { station.zeroing_first() } else { station }
+            if self.zero { run_loop.zeroing_first() } else { run_loop }
         } else {
             // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
             note!("the torque is off: press Start in the page");
-            station.wait_for_a_person()
+            run_loop.wait_for_a_person()
         }
     }
 
     /// Runs the device on the serial port or, without one, a virtual device.
     fn play(
         &self,
-        station: Station<'_>,
+        run_loop: RunLoop<'_>,
         serial: Option<SerialPort>,
         chosen: Chosen,
         seconds: Option<f64>,
@@ -241,7 +241,7 @@ impl Run {
         let mut bar = Progress::new("running");
         let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
         if let Some(mut port) = serial {
-            return station.run_in_real_time(&mut port, seconds, progress);
+            return run_loop.run_in_real_time(&mut port, seconds, progress);
         }
         let Chosen { profile, procedure, part, .. } = chosen;
         let mut device = VirtualDevice::built(&profile, procedure, part.as_ref());
@@ -251,8 +251,8 @@ impl Run {
         if !self.fast {
             device.take_times();
         }
-        let pace = if self.fast { Pace::Free } else { Pace::real_time() };
-        station.run_in_step(device, pace, progress)
+        let clock = if self.fast { RealtimeClock::Free } else { RealtimeClock::real_time() };
+        run_loop.run_in_step(device, clock, progress)
     }
 
     /// Returns the requested patient, or the default one of the requested law.
@@ -303,18 +303,18 @@ impl Run {
         if let (Some(path), Some(bytes)) = (&self.record, outcome.recorded_bytes) {
             say!("recorded {bytes} bytes to {}", path.display());
         }
-        let (link, tally) = (&outcome.link, &outcome.tally);
+        let (link, stats) = (&outcome.link, &outcome.stats);
         say!(
             "samples={} frames={} lost={} punctures={} peak_force_n={:.3} lost_samples={} garbage={} vessels={} faults={}",
-            tally.samples,
+            stats.samples,
             link.frames,
             link.lost_frames,
-            tally.punctures,
-            tally.peak_force_n,
+            stats.punctures,
+            stats.peak_force_n,
             link.lost_samples,
             link.garbage,
-            tally.vessels,
-            tally.faults
+            stats.vessels,
+            stats.faults
         );
     }
 }

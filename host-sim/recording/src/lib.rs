@@ -2,10 +2,10 @@
 //! module writes, one reads, [`stretches`] are its parts without a gap.
 
 mod foxglove;
-mod intact;
+mod mcap_repair;
 pub mod messages;
 pub mod read;
+pub mod run_stats;
 pub mod stretches;
-pub mod tally;
 pub mod version;
 pub mod write;

@@ -1,9 +1,9 @@
 //! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is said.
 
-use super::intact::intact;
+use super::mcap_repair::intact;
 use super::messages::{Message, Setup};
 use device_sim::failure::Failure;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::profile::Profile;
 use mcap::read::{MessageStream, Options};
 use std::borrow::Cow;

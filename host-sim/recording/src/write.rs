@@ -6,7 +6,7 @@ use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::failure::Failure;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::profile::Profile;
 use device_sim::session::{ProbeView, Source, TaskDone};
 use link::frames;

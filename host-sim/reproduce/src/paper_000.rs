@@ -12,7 +12,7 @@ use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet, decimal};
 use lab::force_fit::insertions::{self, Insertion};
 use lab::force_fit::{self, Judgement};
-use server::rehearsal;
+use server::virtual_run;
 use std::path::{Path, PathBuf};
 
 /// Speeds, mm/s, and angles, °, of the paper's experiment.
@@ -87,7 +87,7 @@ fn record(profile: &Profile, dir: &Path) -> Result<Vec<Cut>, Failure> {
     for (speed, angle) in SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a))) {
         let procedure = Procedure::find(&format!("insertion-{speed}mms-{angle}deg"), profile)?;
         let file = dir.join(format!("paper-000-{speed}mms-{angle}deg.mcap"));
-        let trace = Trace::of(&rehearsal::record(profile, procedure, &file)?)?;
+        let trace = Trace::of(&virtual_run::record(profile, procedure, &file)?)?;
         cuts.push(Cut { speed, angle, trace, file });
     }
     Ok(cuts)

@@ -4,9 +4,9 @@ use super::measure::{Trace, is_puncture_of};
 use super::{Row, Whose, numbers, row};
 use control_core::TICK_HZ;
 use control_core::config::Tissue;
-use device_sim::device::part::DevicePart;
+use device_sim::device::device_config::DeviceConfig;
 use device_sim::failure::Failure;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::plant::hand::Grip;
 use device_sim::plant::motor::Motor;
 use device_sim::plant::{Plant, PlantConfig};
@@ -14,7 +14,7 @@ use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use html_report::chart::{Chart, Curve};
 use html_report::{Sheet, decimal};
-use server::rehearsal;
+use server::virtual_run;
 use std::path::Path;
 
 /// Eq. 2 as printed, in the place of the cone.
@@ -30,7 +30,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     })?;
     let run = |profile: &Profile, procedure: &str, file: &str| -> Result<Trace, Failure> {
         let procedure = Procedure::find(procedure, profile)?;
-        Trace::of(&rehearsal::record(profile, procedure, &dir.join(file))?)
+        Trace::of(&virtual_run::record(profile, procedure, &dir.join(file))?)
     };
     let injection = run(&cone, "injection", "paper-001-injection.mcap")?;
     let with_cone = run(&cone, "hold", "paper-001-hold-cone.mcap")?;
@@ -128,7 +128,7 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
 /// device's.
 fn currents(profile: &Profile) -> Result<String, Failure> {
     let device = &profile.config.device;
-    let paper = DevicePart::read(Path::new("paper-001"))?;
+    let paper = DeviceConfig::read(Path::new("paper-001"))?;
     let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;
     let radius_m = device.roller_radius.0.to_num::<f64>() * 1e-3;
     let usual = PlantConfig::new(radius_m, device.counts_per_turn, full_scale);

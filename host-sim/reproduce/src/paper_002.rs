@@ -11,7 +11,7 @@ use device_sim::session::{Source, tissue_name};
 use html_report::chart::{Chart, Curve};
 use html_report::section::{Section, Way};
 use html_report::{Sheet, decimal};
-use server::rehearsal;
+use server::virtual_run;
 use std::path::Path;
 use training::debrief::anatomy;
 use training::score::target::Outcome;
@@ -38,7 +38,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
         .iter()
         .map(|(name, _)| {
             let procedure = Procedure::find(name, &profile)?;
-            Trace::of(&rehearsal::record(&profile, procedure, &dir.join(format!("paper-002-{name}.mcap")))?)
+            Trace::of(&virtual_run::record(&profile, procedure, &dir.join(format!("paper-002-{name}.mcap")))?)
         })
         .collect::<Result<Vec<_>, _>>()?;
     let mut sheet = Sheet::new(

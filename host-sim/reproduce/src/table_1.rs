@@ -8,7 +8,7 @@ use device_sim::profile::Profile;
 use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet, decimal};
 use serde_json::{Value, json};
-use server::rehearsal;
+use server::virtual_run;
 use std::path::Path;
 use std::time::Instant;
 use tissue::push::{BESIDE_MM, Division, Pushed, configurations, push};
@@ -132,8 +132,9 @@ fn cells(row: &Row, limb_s: f64) -> Vec<Cell> {
 pub(super) fn side_by_side(dir: &Path) -> Result<(String, String), Failure> {
     let profile = Profile::find("phantom")?;
     let procedure = || Procedure::find("insertion-5mms-60deg", &profile);
-    let rigid = rehearsal::record(&profile, procedure()?, &dir.join("paper-000-rigid.mcap"))?;
-    let deformed = rehearsal::record_deformed(&profile, procedure()?, &dir.join("paper-000-deformed.mcap"))?;
+    let rigid = virtual_run::record(&profile, procedure()?, &dir.join("paper-000-rigid.mcap"))?;
+    let deformed =
+        virtual_run::record_deformed(&profile, procedure()?, &dir.join("paper-000-deformed.mcap"))?;
     let traces = [Trace::of(&rigid)?, Trace::of(&deformed)?];
     let names = ["depth from the surface at rest", "depth from the deformed surface"];
     let curves = traces.iter().zip(names).zip(0..).map(|((trace, name), colour)| Curve {

@@ -1,15 +1,15 @@
 //! The outputs and inputs of a running session: the page, other programs' streams, a class, recordings.
 
-pub mod bedside;
 mod bounded_listener;
 pub mod class;
 pub mod guide;
 pub mod live_gains;
 pub mod outlets;
-pub mod pace;
-pub mod rehearsal;
+pub mod patient_manager;
+pub mod realtime_clock;
 pub mod replay;
+pub mod run_loop;
 pub mod saved_patients;
-pub mod station;
 pub mod streams;
+pub mod virtual_run;
 pub mod visualizer;

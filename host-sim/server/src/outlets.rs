@@ -6,7 +6,7 @@ use device_sim::failure::Failure;
 use device_sim::session::{LinkStatus, ProbeView, Publisher, RecordingStatus, TaskDone};
 use link::frames::{self, DeviceFrame};
 use recording::messages::{Hello, Setup};
-use recording::tally::Tally;
+use recording::run_stats::RunStats;
 use recording::write::Recorder;
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub struct Outlets {
     /// The recording.
     pub recorder: Option<Recorder>,
     /// The totals.
-    pub tally: Tally,
+    pub stats: RunStats,
     pub(crate) gains: LiveGains,
     pub(crate) failure: Option<Failure>,
     /// The device's last hello, for a recording that begins later.
@@ -35,11 +35,11 @@ pub struct Outlets {
 
 impl Outlets {
     /// Nothing has arrived yet.
-    pub fn new(publisher: Publisher, recorder: Option<Recorder>, tally: Tally) -> Self {
+    pub fn new(publisher: Publisher, recorder: Option<Recorder>, stats: RunStats) -> Self {
         Self {
             publisher,
             recorder,
-            tally,
+            stats,
             gains: LiveGains::default(),
             failure: None,
             hello: None,
@@ -50,7 +50,7 @@ impl Outlets {
     }
 
     pub(crate) fn frame(&mut self, frame: &DeviceFrame) {
-        if self.tally.is_full() {
+        if self.stats.is_full() {
             return;
         }
         if let Err(failure) = self.deliver(frame) {
@@ -63,13 +63,13 @@ impl Outlets {
     fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Failure> {
         match frame {
             DeviceFrame::Hello(hello) => {
-                self.tally.hello(Hello::from(hello));
+                self.stats.hello(Hello::from(hello));
                 self.hello = Some(hello.clone());
                 self.publisher.frame(frame);
                 self.recorder.as_mut().map_or(Ok(()), |r| r.hello(hello))
             }
             DeviceFrame::Samples(block) => {
-                let taken = self.tally.samples(&block.samples);
+                let taken = self.stats.samples(&block.samples);
                 self.tick = block.first_tick + taken.len() as u64;
                 self.publisher.samples(block.first_tick, taken);
                 self.recorder.as_mut().map_or(Ok(()), |r| r.samples(block.first_tick, taken))
@@ -79,7 +79,7 @@ impl Outlets {
                 self.recorder.as_mut().map_or(Ok(()), |r| r.pose(pose))
             }
             DeviceFrame::Event(event) => {
-                self.tally.event(event);
+                self.stats.event(event);
                 self.publisher.frame(frame);
                 self.recorder.as_mut().map_or(Ok(()), |r| r.event(event))
             }

@@ -1,7 +1,7 @@
 //! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen like those of the program.
 
 use device_sim::failure::Failure;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::page::messages::is_file_name;
 use device_sim::profile;
 use std::fs;

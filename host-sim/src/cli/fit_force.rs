@@ -2,7 +2,7 @@
 
 use clap::Args;
 use device_sim::failure::Failure;
-use lab::force_fit::{self, Fit, insertions, page, table::Origin, written};
+use lab::force_fit::{self, Fit, insertions, page, table::Origin, writer};
 use live::{examples, say};
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ impl FitForce {
         let (seen, unseen) = (read(&self.files)?, read(&self.holdout)?);
         let fit = force_fit::fit(seen, &unseen)
             .ok_or_else(|| Failure::input("the recordings hold no insertion to fit to; give others"))?;
-        save(&self.out, &written::toml(&fit))?;
+        save(&self.out, &writer::toml(&fit))?;
         let shown = self.out.with_extension("html");
         save(&shown, &page::html(&fit))?;
         say!("{}", self.out.display());

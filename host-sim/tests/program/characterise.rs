@@ -7,9 +7,9 @@ use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Millinewto
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::report::Verdict;
 use fixed::types::{I8F24, I16F16};
-use lab::characterise::conductor::Conductor;
 use lab::characterise::mechanism::BareDevice;
 use lab::characterise::programme::{Programme, Step};
+use lab::characterise::sequencer::Sequencer;
 use lab::characterise::{self, programme, written};
 use link::codec::{self, Decoder, MAX_FRAME};
 use link::frames::{Ack, DeviceFrame, HostFrame, Numbered, Rejection};
@@ -131,19 +131,19 @@ fn a_programme_is_parted_where_one_sequence_does_not_hold_it() {
 #[test]
 fn a_device_of_an_older_protocol_says_what_to_do() {
     let programme = Programme { file: "fit.csv", steps: three_steps() };
-    let mut conductor = Conductor::new(characterise::configuration(), &programme).expect("sound");
-    conductor.connected(Duration::ZERO);
+    let mut sequencer = Sequencer::new(characterise::configuration(), &programme).expect("sound");
+    sequencer.connected(Duration::ZERO);
     let mut decoder = Decoder::default();
-    let bytes = conductor.transmit(Duration::ZERO, |_| {}).to_vec();
+    let bytes = sequencer.transmit(Duration::ZERO, |_| {}).to_vec();
     let hello =
         bytes.iter().find_map(|byte| decoder.push::<HostFrame>(*byte)).expect("a hello").expect("whole");
     let ack = Ack { id: hello.id, result: Err(Rejection::Version) };
     let mut out = [0; MAX_FRAME];
     let length =
         codec::encode(&Numbered { sequence: 0, frame: DeviceFrame::Ack(ack) }, &mut out).expect("it fits");
-    conductor.receive(Duration::ZERO, &out[..length]);
-    conductor.transmit(Duration::from_millis(1), |_| {});
-    assert!(conductor.is_over());
-    let said = conductor.finish().expect_err("there is no recording").to_string();
+    sequencer.receive(Duration::ZERO, &out[..length]);
+    sequencer.transmit(Duration::from_millis(1), |_| {});
+    assert!(sequencer.is_over());
+    let said = sequencer.finish().expect_err("there is no recording").to_string();
     assert!(said.contains("flash the firmware"), "{said}");
 }

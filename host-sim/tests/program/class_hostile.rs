@@ -191,6 +191,6 @@ fn neither_the_page_nor_a_device_notices_hostile_programs() {
     assert!(memory < MOST_MEMORY_MIB, "{memory} MiB");
     assert!(run.median() < Duration::from_millis(20), "late by {:?} half of the time", run.median());
     assert!(run.worst() < crate::common::paced::HEARTBEAT_LIMIT, "late by {:?}", run.worst());
-    assert_eq!(run.outcome.tally.samples, ATTACK_S * 10_000, "no sample is lost");
+    assert_eq!(run.outcome.stats.samples, ATTACK_S * 10_000, "no sample is lost");
     assert_eq!(run.outcome.link.lost_samples, 0);
 }

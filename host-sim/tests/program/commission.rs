@@ -147,7 +147,7 @@ fn an_offset_above_the_friction_is_named() {
 fn a_written_record_is_read_back() {
     let found = commissioned(Wiring { leads_reversed: true, ..Wiring::default() });
     let text = found.to_toml("bench 3").expect("it can be written");
-    let source = device_sim::library::Text { origin: "device.toml".into(), text };
-    let part = device_sim::device::part::DevicePart::parse(source).expect("it is sound");
+    let source = device_sim::named_files::Text { origin: "device.toml".into(), text };
+    let part = device_sim::device::device_config::DeviceConfig::parse(source).expect("it is sound");
     assert_eq!(part.device, found.record.device);
 }

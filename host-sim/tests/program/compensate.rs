@@ -3,8 +3,8 @@
 
 use control_core::Device;
 use control_core::compensation::Gain;
-use device_sim::device::part::{self, DevicePart};
-use device_sim::library::Text;
+use device_sim::device::device_config::{self, DeviceConfig};
+use device_sim::named_files::Text;
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
 use lab::commission::mechanism::VirtualLine;
@@ -43,8 +43,8 @@ fn compensation_leaves_a_quarter_of_the_found_force() {
     }
     // The device has it, and a file keeps it to the last place.
     assert_eq!(line.device().plan().device(), &outcome.record.device);
-    let text = part::to_toml("mine", &outcome.record).expect("it can be written");
-    let read = DevicePart::parse(Text { origin: "device.toml".into(), text }).expect("sound");
+    let text = device_config::to_toml("mine", &outcome.record).expect("it can be written");
+    let read = DeviceConfig::parse(Text { origin: "device.toml".into(), text }).expect("sound");
     assert_eq!(read.device, outcome.record.device);
     let html = page::html(&outcome);
     assert!(html.contains("7 times a turn") && !html.contains("http"), "{html}");

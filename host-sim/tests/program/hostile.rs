@@ -134,9 +134,9 @@ fn the_control_path_does_not_notice_hostile_clients() {
     assert!(rounds.iter().all(|&connected| connected == CONNECTIONS), "a listener refused: {rounds:?}");
     assert!(run.median() < Duration::from_millis(20), "late by {:?} half of the time", run.median());
     assert!(run.worst() < crate::common::paced::HEARTBEAT_LIMIT, "late by {:?}", run.worst());
-    assert!(run.outcome.tally.samples >= 1_000 * run.late.len() as u64 - 100, "no sample is lost");
+    assert!(run.outcome.stats.samples >= 1_000 * run.late.len() as u64 - 100, "no sample is lost");
     assert_eq!(run.outcome.link.lost_samples, 0);
-    assert_eq!(run.outcome.tally.peak_force_n, 0.0, "nobody started the torque");
+    assert_eq!(run.outcome.stats.peak_force_n, 0.0, "nobody started the torque");
 
     assert!(is_served(openigtlink, b""), "3D Slicer is served again");
     assert!(is_served(websocket, &upgrade("/pose", websocket.port())), "Unity is served again");

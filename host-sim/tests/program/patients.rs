@@ -10,17 +10,17 @@ use device_sim::profile::Profile;
 use device_sim::session::{self, Control, PatientWish, Source, Subscription};
 use recording::messages::Setup;
 use recording::read::Recording;
+use recording::run_stats::RunStats;
 use recording::stretches::stretches;
-use recording::tally::Tally;
 use recording::write::Recorder;
-use server::bedside::Bedside;
 use server::outlets::Outlets;
-use server::pace::Pace;
-use server::station::Station;
+use server::patient_manager::PatientManager;
+use server::realtime_clock::RealtimeClock;
+use server::run_loop::RunLoop;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Runs an adult on `device` for `seconds`; at the first progress the wish is uttered. The bedside believes in the built-in device.
+/// Runs an adult on `device` for `seconds`; at the first progress the wish is uttered. The patients believes in the built-in device.
 fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscription {
     let profile = Profile::find_for("adult", device).expect("it is built in");
     let believed = Profile::find("adult").expect("it is built in");
@@ -38,9 +38,9 @@ fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscri
     };
     let recorder = Recorder::create(file, &setup).expect("the folder can be written");
     let stop = AtomicBool::new(false);
-    let outlets = Outlets::new(publisher, Some(recorder), Tally::new(Some(seconds * 10_000)));
-    let station = Station::new(Driver::new(profile.config.patient.clone()), outlets, &stop);
-    let bedside = Bedside::new(believed, Source::Virtual, Some("venepuncture".into()), setup);
+    let outlets = Outlets::new(publisher, Some(recorder), RunStats::new(Some(seconds * 10_000)));
+    let run_loop = RunLoop::new(Driver::new(profile.config.patient.clone()), outlets, &stop);
+    let patients = PatientManager::new(believed, Source::Virtual, Some("venepuncture".into()), setup);
     let device = VirtualDevice::new(&profile, procedure);
     let mut wish = Some(wish);
     let utter = |samples: u64| {
@@ -48,7 +48,7 @@ fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscri
             wish.take().into_iter().for_each(|wish| session.control(Control::Patient(wish)));
         }
     };
-    station.with_bedside(bedside).run_in_step(device, Pace::Free, utter).expect("it runs");
+    run_loop.with_patients(patients).run_in_step(device, RealtimeClock::Free, utter).expect("it runs");
     looker
 }
 

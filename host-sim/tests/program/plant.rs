@@ -1,6 +1,6 @@
 //! The plant against mechanics on paper: energy, terminal speed, slip above the grip, weight, sameness.
 
-use device_sim::device::part::DevicePart;
+use device_sim::device::device_config::DeviceConfig;
 use device_sim::plant::bearing::Bearing;
 use device_sim::plant::hand::Grip;
 use device_sim::plant::motor::Motor;
@@ -54,7 +54,7 @@ fn a_free_roller_settles_where_friction_balances_the_torque() {
 /// Paper 001: 24 V, 0.6 A, 28.8 mN·m. The hand holds the needle, and the amplifier gives all that it has.
 #[test]
 fn the_papers_motor_takes_its_current_for_its_torque() {
-    let part = DevicePart::read(Path::new("paper-001")).expect("it comes with the program");
+    let part = DeviceConfig::read(Path::new("paper-001")).expect("it comes with the program");
     let winding = part.winding.expect("it has one");
     let held = |motor: Motor| {
         let grip = Grip { stiffness_n_per_m: 4_000.0, damping_n_s_per_m: 20.0, ..NO_HAND };

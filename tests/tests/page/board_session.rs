@@ -2,8 +2,8 @@
 
 use board_wasm::session::Session;
 use board_wasm::work::Task;
-use device_sim::device::part::DevicePart;
-use device_sim::library::Text;
+use device_sim::device::device_config::DeviceConfig;
+use device_sim::named_files::Text;
 use device_sim::page::guide::GuideAnswer;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::Wiring;
@@ -158,7 +158,7 @@ fn commissioning_sends_torque_only_after_the_press_of_its_step() {
     assert!(end["lines"].to_string().contains("leads reversed"), "{end}");
     let file = cable.session.file().expect("it ended well").to_owned();
     let text = Text { origin: "device.toml".into(), text: file };
-    assert!(DevicePart::parse(text).expect("it is read again").device.commissioned);
+    assert!(DeviceConfig::parse(text).expect("it is read again").device.commissioned);
     cable.run(EXCHANGE * 5);
     assert!(matches!(cable.commands.last(), Some(Command::Stop)), "{:?}", cable.commands.last());
 }

@@ -2,13 +2,13 @@
 
 use super::ForceTable;
 use crate::anatomy::SMALLEST_ANGLE;
-use crate::law::Ground;
+use crate::law::ForceLimits;
 use crate::refusal::{Field, Refusal, count, milli, within};
 use fixed::types::I16F16;
 
 /// Refuses a table with the first reason there is.
-pub(super) fn check(table: &ForceTable, ground: &Ground) -> Result<(), Refusal> {
-    let (stiff, largest) = (ground.stiffest, ground.largest);
+pub(super) fn check(table: &ForceTable, limits: &ForceLimits) -> Result<(), Refusal> {
+    let (stiff, largest) = (limits.stiffest, limits.largest);
     within(Field::FrictionStiffness, table.stiffness.0, milli(50), stiff)?;
     within(Field::Withdrawal, table.withdrawal, I16F16::ZERO, I16F16::ONE)?;
     let knots = |field, low: I16F16, high: I16F16, knots: &mut dyn Iterator<Item = I16F16>| {

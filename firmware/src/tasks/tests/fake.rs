@@ -4,13 +4,13 @@ use super::super::queues::{Queues, SmallOrder, TelemetryEnds, TickEnds, UsbEnds}
 use super::super::shared::Shared;
 use super::super::tick::Tick;
 use crate::drive::{Drive, MotorDac, Two};
-use crate::lines::{Pull, PulledLines};
 use crate::monitor::Readings;
 use crate::port::{self, Board, WouldBlock};
 use crate::reset::LastWords;
 use crate::store::{ConfigFlash, Slot, StoreError};
 use crate::tilt::{Reading, TiltSource};
 use crate::timing;
+use crate::wire_check::{Pull, PulledLines};
 use control_core::config::DacWidth;
 use control_core::excitation::Segments;
 use control_core::units::{Counts, DacCode};

@@ -1,7 +1,7 @@
 //! `import`: recordings as people have them become the files that `diagnose` reads, and whatever was assumed, changed or left
 //! out on the way is said. It reads tables and writes the contract's files; it may not know what is done with them.
 
-mod counts;
+mod encoder_resolution;
 mod file;
 mod folder;
 mod json;
@@ -20,12 +20,12 @@ mod separate;
 mod table;
 mod text;
 mod units;
-mod written;
+mod writer;
 
 pub use roles::{Choice, choice};
 pub use rows::Known;
 pub use runs::Keep;
-pub use written::RigValues;
+pub use writer::RigValues;
 
 use device_sim::failure::Failure;
 use diagnosis::rig::{Kind, Rig};
@@ -118,17 +118,17 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         .counts_per_unit
         .or(request.counts_per_turn.map(|counts| counts / TAU))
         .or_else(|| rig.as_ref().map(|rig| rig.encoder.counts_per_unit));
-    let scale = counts::scale(&all, per_unit, &mut notes);
+    let scale = encoder_resolution::scale(&all, per_unit, &mut notes);
     rate(&all, &mut notes);
     let name = request
         .files
         .first()
         .and_then(|f| f.file_stem())
         .map_or_else(String::new, |s| s.to_string_lossy().into());
-    let text = rig.is_none().then(|| written::rig(&name, first, scale, &request.values));
+    let text = rig.is_none().then(|| writer::rig(&name, first, scale, &request.values));
     let to_fill_in = text.as_ref().is_some_and(|text| text.contains("= nan"));
     let named = named(all, request.split);
-    let paths = written::files(&request.out, text.as_deref(), &named, scale)?;
+    let paths = writer::files(&request.out, text.as_deref(), &named, scale)?;
     let recordings = paths
         .into_iter()
         .zip(&named)

@@ -10,7 +10,7 @@ use control_core::event::Fault;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
 use control_core::{Device, stiffest};
-use device_sim::device::part;
+use device_sim::device::device_config;
 use device_sim::failure::Failure;
 use findings::{Mechanism, Trouble};
 use fixed::types::I16F16;
@@ -145,7 +145,7 @@ impl Outcome {
     /// The device's part as a file, with what was found beside it.
     pub fn to_toml(&self, name: &str) -> Result<String, Failure> {
         let found: String = self.lines().iter().map(|line| format!("# {line}\n")).collect();
-        Ok(found + &part::to_toml(name, &self.record)?)
+        Ok(found + &device_config::to_toml(name, &self.record)?)
     }
 }
 

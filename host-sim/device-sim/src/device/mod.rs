@@ -2,8 +2,8 @@
 
 pub mod compensated;
 mod deformed;
+pub mod device_config;
 pub mod grip;
-pub mod part;
 pub mod virtual_device;
 pub mod winding;
 

@@ -2,8 +2,8 @@
 //! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
 
 use super::deformed::Deformed;
+use super::device_config::DeviceConfig;
 use super::grip::Grip;
-use super::part::DevicePart;
 use crate::failure::Failure;
 use crate::plant::{Plant, PlantConfig};
 use crate::procedure::{Procedure, Target};
@@ -76,7 +76,7 @@ impl VirtualDevice {
     }
 
     /// The same, with the rollers' grip and the motor's winding that a device's file gives.
-    pub fn built(profile: &Profile, procedure: Procedure, part: Option<&DevicePart>) -> Self {
+    pub fn built(profile: &Profile, procedure: Procedure, part: Option<&DeviceConfig>) -> Self {
         let device = &profile.config.device;
         // A device that is too weak for the default patient waits for the one that it is for.
         let plan = Plan::new(device, &Patient::default()).unwrap_or_else(|_| profile.plan.clone());

@@ -67,11 +67,11 @@ impl Winding {
 
 #[cfg(test)]
 mod tests {
-    use crate::device::part::DevicePart;
-    use crate::library::Text;
+    use crate::device::device_config::DeviceConfig;
+    use crate::named_files::Text;
 
-    fn parse(text: &str) -> Result<DevicePart, crate::failure::Failure> {
-        DevicePart::parse(Text { origin: "device.toml".into(), text: text.into() })
+    fn parse(text: &str) -> Result<DeviceConfig, crate::failure::Failure> {
+        DeviceConfig::parse(Text { origin: "device.toml".into(), text: text.into() })
     }
 
     #[test]

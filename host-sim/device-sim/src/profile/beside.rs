@@ -66,7 +66,7 @@ impl From<&Beside> for SceneBeside {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::library::Text;
+    use crate::named_files::Text;
     use crate::profile::{BUILT_IN, Profile};
 
     #[test]

@@ -3,7 +3,7 @@
 
 use super::{File, Layer, Profile, TissueName};
 use crate::failure::Failure;
-use crate::library::Text;
+use crate::named_files::Text;
 use crate::session::{SceneBody, SceneOutline};
 use anatomy::{Body, Line, Piece, Place, Site, Tissue};
 use control_core::config::MAX_LAYERS;

@@ -109,7 +109,7 @@ fn scaled_compliance(compliance_mm2_per_n: f64, factor: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::library::Text;
+    use crate::named_files::Text;
     use crate::profile::{BUILT_IN, Profile};
     use control_core::config::{Law, Tissue};
 

@@ -1,5 +1,5 @@
 //! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
-//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::part`. What the control law
+//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::device_config`. What the control law
 //! refuses is refused here too.
 
 mod beside;
@@ -13,7 +13,7 @@ mod rupture;
 mod tissues;
 
 use crate::failure::Failure;
-use crate::library::{self, Text};
+use crate::named_files::{self, Text};
 use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
@@ -79,7 +79,7 @@ impl Profile {
 
     /// A built-in profile by its name, or a file by its path, for `device`.
     pub fn find_for(wanted: &str, device: &Device) -> Result<Self, Failure> {
-        Self::parse_for(library::find("profile", wanted, &BUILT_IN)?, device)
+        Self::parse_for(named_files::find("profile", wanted, &BUILT_IN)?, device)
     }
 
     /// Checks the text of a profile for the built-in device.
@@ -89,7 +89,7 @@ impl Profile {
 
     /// Checks the text of a profile for `device`.
     pub fn parse_for(source: Text, device: &Device) -> Result<Self, Failure> {
-        let mut file: File = library::parse(&source)?;
+        let mut file: File = named_files::parse(&source)?;
         let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));

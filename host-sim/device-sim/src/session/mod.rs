@@ -1,18 +1,18 @@
 //! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what arrives, in batches, and
 //! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
 
+mod messages;
 mod scene;
 #[cfg(test)]
 mod tests;
-mod told;
 
+pub use messages::{
+    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
+    RecordingStatus, ReplayStatus, TaskDone,
+};
 pub use scene::{
     Scene, SceneBeside, SceneBody, SceneLayer, SceneNeedle, SceneOutline, SceneVessel, Source, state_name,
     tissue_name, vessel_name,
-};
-pub use told::{
-    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
-    RecordingStatus, ReplayStatus, TaskDone,
 };
 
 use control_core::controller::Sample;

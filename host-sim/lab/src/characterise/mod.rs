@@ -1,13 +1,12 @@
 //! `characterise`: makes a device run excitations that separate one physical effect from another, with no hand on the
 //! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
 
-pub mod conductor;
 mod following;
 pub mod mechanism;
 pub mod programme;
+pub mod sequencer;
 pub mod written;
 
-use conductor::Conductor;
 use control_core::Config;
 use device_sim::device::{Port, Wire};
 use device_sim::failure::Failure;
@@ -16,6 +15,7 @@ use link::device::{Endpoint, Identity};
 use mechanism::BareDevice;
 use programme::{Programme, Step};
 use recording::messages::Hello;
+use sequencer::Sequencer;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use written::Track;
@@ -55,21 +55,21 @@ pub fn on_virtual(
     let mut tracks = Vec::new();
     for programme in programmes {
         news(News::Recording(programme));
-        let mut conductor = Conductor::new(configuration(), programme)?;
-        conductor.connected(lockstep::time(device.ticks()));
-        while !conductor.is_over() {
+        let mut sequencer = Sequencer::new(configuration(), programme)?;
+        sequencer.connected(lockstep::time(device.ticks()));
+        while !sequencer.is_over() {
             let now = lockstep::time(device.ticks());
-            device.receive(conductor.transmit(now, |step: &Step| {
+            device.receive(sequencer.transmit(now, |step: &Step| {
                 device_tilt(step, &mut news);
             }));
             for _ in 0..lockstep::TICKS {
-                let tilt = conductor.playing().map_or(0.0, |(step, since)| step.tilt_at(now - since));
+                let tilt = sequencer.playing().map_or(0.0, |(step, since)| step.tilt_at(now - since));
                 device.tick(tilt);
             }
-            lockstep::empty(|frame| device.transmit(frame), |bytes| conductor.receive(now, bytes));
-            news(News::Played(conductor.played_s()));
+            lockstep::empty(|frame| device.transmit(frame), |bytes| sequencer.receive(now, bytes));
+            news(News::Played(sequencer.played_s()));
         }
-        tracks.push(conductor.finish()?);
+        tracks.push(sequencer.finish()?);
     }
     Ok(tracks)
 }
@@ -96,24 +96,24 @@ pub fn on_port(
     let mut tracks = Vec::new();
     for programme in programmes {
         news(News::Recording(programme));
-        let mut conductor = Conductor::new(configuration(), programme)?;
-        conductor.connected(begin.elapsed());
-        while !conductor.is_over() {
+        let mut sequencer = Sequencer::new(configuration(), programme)?;
+        sequencer.connected(begin.elapsed());
+        while !sequencer.is_over() {
             if stop.load(Ordering::Relaxed) {
-                let out = conductor.stop(begin.elapsed()).to_vec();
+                let out = sequencer.stop(begin.elapsed()).to_vec();
                 let _ = wire.write(&out);
                 return Err(Failure::failed("stopped before the end; nothing was written"));
             }
             let now = begin.elapsed();
-            let out = conductor.transmit(now, |step| device_tilt(step, &mut news)).to_vec();
+            let out = sequencer.transmit(now, |step| device_tilt(step, &mut news)).to_vec();
             if !out.is_empty() {
                 wire.write(&out).map_err(gone)?;
             }
             let count = wire.read(&mut bytes, PATIENCE).map_err(gone)?;
-            conductor.receive(begin.elapsed(), &bytes[..count]);
-            news(News::Played(conductor.played_s()));
+            sequencer.receive(begin.elapsed(), &bytes[..count]);
+            news(News::Played(sequencer.played_s()));
         }
-        tracks.push(conductor.finish()?);
+        tracks.push(sequencer.finish()?);
     }
     Ok(tracks)
 }

@@ -1,7 +1,7 @@
 //! The files that a compensation leaves: a page, and the device's part of the configuration.
 
 use super::{Outcome, page};
-use device_sim::device::part;
+use device_sim::device::device_config;
 use device_sim::failure::Failure;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub fn write(folder: &Path, device: &str, outcome: &Outcome) -> Result<Vec<PathB
         ))
     };
     std::fs::create_dir_all(folder).map_err(refuse)?;
-    let device = part::to_toml(device, &outcome.record)?;
+    let device = device_config::to_toml(device, &outcome.record)?;
     let mut written = Vec::new();
     for (file, text) in [("compensation.html", page::html(outcome)), ("device.toml", device)] {
         let path = folder.join(file);

@@ -8,7 +8,7 @@ pub mod falls;
 pub mod insertions;
 pub mod page;
 pub mod table;
-pub mod written;
+pub mod writer;
 
 use control_core::config::MAX_LAYERS;
 use curve::{Landmarks, Overlaid};

@@ -2,7 +2,7 @@
 
 use super::message::{About, ClassScore, Kind, Poses};
 use control_core::Device;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages::{self, Event};
 use device_sim::profile::Profile;
@@ -154,7 +154,7 @@ mod tests {
         let profile = Profile::find("adult").unwrap();
         let procedure = Procedure::find("venepuncture", &profile).unwrap();
         let file = std::env::temp_dir().join(format!("needle-publisher-{}.mcap", std::process::id()));
-        let recording = crate::rehearsal::record(&profile, procedure, &file).unwrap();
+        let recording = crate::virtual_run::record(&profile, procedure, &file).unwrap();
         std::fs::remove_file(&file).unwrap();
         (recording, profile)
     }

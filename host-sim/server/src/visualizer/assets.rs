@@ -62,7 +62,7 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/practice.js", "practice.js", SCRIPT),
     asset!("/tasks.js", "tasks.js", SCRIPT),
     asset!("/learning_curve.js", "learning_curve.js", SCRIPT),
-    asset!("/own_forces.js", "own_forces.js", SCRIPT),
+    asset!("/compensation_slider.js", "compensation_slider.js", SCRIPT),
     asset!("/scrub.js", "scrub.js", SCRIPT),
     asset!("/slider.js", "slider.js", SCRIPT),
     asset!("/body.js", "body.js", SCRIPT),

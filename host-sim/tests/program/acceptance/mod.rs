@@ -230,7 +230,7 @@ fn paper_000_vessel_intersection_is_detected() {
     assert!(bench.seen.iter().any(|s| s.state == State::Withdrawal));
 
     let beside = profile("phantom").source.text + "\n[vessel]\nwidth_mm = 3.0\noffset_mm = 4.0\n";
-    let beside = Profile::parse(device_sim::library::Text { origin: "beside.toml".into(), text: beside });
+    let beside = Profile::parse(device_sim::named_files::Text { origin: "beside.toml".into(), text: beside });
     let mut bench = Bench::new(&beside.expect("it is sound"), 60.0, 4.0);
     bench.go(10.0, 5.0);
     assert!(bench.seen.iter().all(|s| !matches!(s.vessel, InLumen | Through)), "it passes beside");

@@ -5,10 +5,10 @@ use device_sim::driver::Driver;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use device_sim::session::{self, Publisher, Session, Source};
-use recording::tally::Tally;
+use recording::run_stats::RunStats;
 use server::outlets::Outlets;
-use server::pace::Pace;
-use server::station::{Outcome, Station};
+use server::realtime_clock::RealtimeClock;
+use server::run_loop::{Outcome, RunLoop};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -61,9 +61,9 @@ pub(crate) fn run(publisher: Publisher, end: End, started: bool) -> Paced {
         End::After(seconds) => (Some(seconds * 10_000), &never),
         End::When(stop) => (None, stop),
     };
-    let outlets = Outlets::new(publisher, None, Tally::new(samples));
-    let station = Station::new(Driver::new(profile.config.patient.clone()), outlets, stop);
-    let station = if started { station } else { station.wait_for_a_person() };
+    let outlets = Outlets::new(publisher, None, RunStats::new(samples));
+    let run_loop = RunLoop::new(Driver::new(profile.config.patient.clone()), outlets, stop);
+    let run_loop = if started { run_loop } else { run_loop.wait_for_a_person() };
     let (begin, mut looks, mut late) = (Instant::now(), 0_u32, Vec::new());
     let look = |_| {
         // The first look comes with tick 1,000, whose exchange was due 1 ms before it.
@@ -71,7 +71,7 @@ pub(crate) fn run(publisher: Publisher, end: End, started: bool) -> Paced {
         let due = Duration::from_millis(100) * looks - Duration::from_millis(1);
         late.push(begin.elapsed().saturating_sub(due));
     };
-    let outcome = station.run_in_step(device, Pace::real_time(), look).expect("it runs");
+    let outcome = run_loop.run_in_step(device, RealtimeClock::real_time(), look).expect("it runs");
     late.sort();
     Paced { outcome, late }
 }

@@ -5,7 +5,7 @@ use super::pipe::{self, End};
 use device_sim::device::Wire;
 use device_sim::device::virtual_device::VirtualDevice;
 use link::codec::MAX_FRAME;
-use server::pace::Pace;
+use server::realtime_clock::RealtimeClock;
 use std::io;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -36,7 +36,7 @@ impl Board {
 
 fn run(mut device: VirtualDevice, cables: &mpsc::Receiver<End>) {
     let mut cable: Option<End> = None;
-    let mut pace = Pace::real_time();
+    let mut clock = RealtimeClock::real_time();
     loop {
         match cables.try_recv() {
             Ok(end) => cable = Some(end),
@@ -52,7 +52,7 @@ fn run(mut device: VirtualDevice, cables: &mpsc::Receiver<End>) {
         for _ in 0..BURST {
             device.tick();
         }
-        if pace.wait(Duration::from_micros(device.ticks() * 100)).is_err() {
+        if clock.wait(Duration::from_micros(device.ticks() * 100)).is_err() {
             device.note_late();
         }
     }

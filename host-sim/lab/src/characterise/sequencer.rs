@@ -33,7 +33,7 @@ enum Phase {
 }
 
 /// Plays one programme.
-pub struct Conductor<'a> {
+pub struct Sequencer<'a> {
     driver: Driver,
     file: &'static str,
     /// Steps that play without a rest, in order.
@@ -49,7 +49,7 @@ pub struct Conductor<'a> {
     failure: Option<Failure>,
 }
 
-impl<'a> Conductor<'a> {
+impl<'a> Sequencer<'a> {
     /// Nothing is connected yet.
     ///
     /// # Errors

@@ -4,7 +4,7 @@
 use crate::saved_patients::SavedPatients;
 use control_core::{Device, Patient};
 use device_sim::failure::Failure;
-use device_sim::library::Text;
+use device_sim::named_files::Text;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{self, Profile};
 use device_sim::session::{PatientAnswer, PatientStatus, PatientWish, Scene, Source};
@@ -12,7 +12,7 @@ use recording::messages::Setup;
 
 /// The patient of a run.
 #[derive(Clone, Debug)]
-pub struct Bedside {
+pub struct PatientManager {
     profile: Profile,
     device: Device,
     source: Source,
@@ -33,7 +33,7 @@ struct Asked {
     save_as: Option<String>,
 }
 
-impl Bedside {
+impl PatientManager {
     /// `profile` on `device`; `procedure` is what the scripted hand was asked to do.
     pub fn new(profile: Profile, source: Source, procedure: Option<String>, setup: Setup) -> Self {
         let device = profile.config.device;
@@ -171,7 +171,7 @@ fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Failure> {
 mod tests {
     use super::*;
 
-    fn bedside() -> Bedside {
+    fn patients() -> PatientManager {
         let profile = Profile::find("adult").expect("it is built in");
         let setup = Setup {
             program: String::new(),
@@ -182,31 +182,31 @@ mod tests {
             device_toml: None,
             tasks: Vec::new(),
         };
-        Bedside::new(profile, Source::Virtual, Some("venepuncture".into()), setup)
+        PatientManager::new(profile, Source::Virtual, Some("venepuncture".into()), setup)
     }
 
     #[test]
     fn an_edited_patient_counts_once_the_device_has_taken_it() {
-        let mut bedside = bedside();
-        let mut json = bedside.status(None).profile;
-        let force_before = bedside.scene().layers[0].friction_n_per_mm;
+        let mut patients = patients();
+        let mut json = patients.status(None).profile;
+        let force_before = patients.scene().layers[0].friction_n_per_mm;
         json["layer"][0]["friction_n_per_mm"] = serde_json::json!(0.03);
-        let patient = bedside.ask(&PatientWish::Edited(json)).expect("it may run");
+        let patient = patients.ask(&PatientWish::Edited(json)).expect("it may run");
         assert!((patient.layers[0].friction.0.to_num::<f64>() - 0.03).abs() < 1e-4);
-        assert_eq!(bedside.scene().layers[0].friction_n_per_mm, force_before, "not yet");
-        assert!(bedside.taken().is_some() && bedside.taken().is_none(), "once");
-        assert!((bedside.scene().layers[0].friction_n_per_mm - 0.03).abs() < 1e-4);
-        assert!(bedside.setup().profile_toml.contains("0.03"), "the recording is told");
-        bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
-        bedside.refused();
-        assert!(bedside.taken().is_none(), "what was refused never counts");
-        bedside.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
-        assert!(bedside.taken().is_some());
-        assert_eq!(bedside.scene().profile, "firm-skin");
-        bedside.ask(&PatientWish::Named("shoulder".into())).expect("built in");
-        assert!(bedside.taken().is_some());
+        assert_eq!(patients.scene().layers[0].friction_n_per_mm, force_before, "not yet");
+        assert!(patients.taken().is_some() && patients.taken().is_none(), "once");
+        assert!((patients.scene().layers[0].friction_n_per_mm - 0.03).abs() < 1e-4);
+        assert!(patients.setup().profile_toml.contains("0.03"), "the recording is told");
+        patients.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        patients.refused();
+        assert!(patients.taken().is_none(), "what was refused never counts");
+        patients.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        assert!(patients.taken().is_some());
+        assert_eq!(patients.scene().profile, "firm-skin");
+        patients.ask(&PatientWish::Named("shoulder".into())).expect("built in");
+        assert!(patients.taken().is_some());
         assert_eq!(
-            bedside.setup().procedure.as_deref(),
+            patients.setup().procedure.as_deref(),
             Some("shoulder-straight"),
             "it brings its procedure"
         );
@@ -214,15 +214,15 @@ mod tests {
 
     #[test]
     fn a_saved_patient_can_be_chosen_in_another_run() {
-        let folder = std::env::temp_dir().join(format!("bedside-{}", std::process::id()));
+        let folder = std::env::temp_dir().join(format!("patients-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&folder);
-        let mut first = bedside();
+        let mut first = patients();
         let mut json = first.status(None).profile;
         json["layer"][2]["depth_mm"] = serde_json::json!(6.0);
         let wish = PatientWish::Saved { name: "anna".into(), profile: json };
         let said = first.ask(&wish).expect_err("there is no folder").to_string();
         assert!(said.contains("keeps no patients"), "{said}");
-        let mut first = bedside().saving_in(SavedPatients::new(&folder));
+        let mut first = patients().saving_in(SavedPatients::new(&folder));
         assert!(first.status(None).can_save);
         first.ask(&wish).expect("it may run");
         assert!(!first.status(None).names.contains(&"anna".into()), "the device has not taken it");
@@ -231,7 +231,7 @@ mod tests {
         first.ask(&wish).expect("it may run");
         let second = first.taken().expect("asked").saved.expect("saved");
         assert!(second.ends_with("anna-2.toml"), "{second}");
-        let mut later = bedside().saving_in(SavedPatients::new(&folder));
+        let mut later = patients().saving_in(SavedPatients::new(&folder));
         assert!(later.status(None).names.ends_with(&["anna".into(), "anna-2".into()]));
         later.ask(&PatientWish::Named("anna-2".into())).expect("in the list");
         assert!(later.taken().is_some_and(|answer| answer.saved.is_none()));
@@ -242,8 +242,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_refused_in_one_sentence() {
-        let mut bedside = bedside();
-        let good = bedside.status(None).profile;
+        let mut patients = patients();
+        let good = patients.status(None).profile;
         let with = |pointer: &str, value: serde_json::Value| {
             let mut json = good.clone();
             *json.pointer_mut(pointer).expect("it is there") = value;
@@ -257,9 +257,9 @@ mod tests {
             (PatientWish::Edited(serde_json::json!(null)), "patient"),
             (PatientWish::Named("giant".into()), "giant"),
         ] {
-            let said = bedside.ask(&wish).expect_err(hint).to_string();
+            let said = patients.ask(&wish).expect_err(hint).to_string();
             assert!(said.contains(hint) && !said.contains('\n'), "{hint}: {said}");
-            assert!(bedside.taken().is_none());
+            assert!(patients.taken().is_none());
         }
     }
 }

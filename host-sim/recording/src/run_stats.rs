@@ -6,7 +6,7 @@ use link::frames::{Event, EventKind};
 
 /// Totals of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct RunStats {
     /// Samples taken.
     pub samples: u64,
     /// Walls that gave way.
@@ -21,7 +21,7 @@ pub struct Tally {
     limit: Option<u64>,
 }
 
-impl Tally {
+impl RunStats {
     /// Takes at most `limit` samples.
     pub fn new(limit: Option<u64>) -> Self {
         Self { limit, ..Self::default() }

@@ -6,7 +6,7 @@ use super::compensated::Compensated;
 use super::grip::Grip;
 use super::winding::Winding;
 use crate::failure::Failure;
-use crate::library::{self, Text};
+use crate::named_files::{self, Text};
 use crate::profile::fix;
 use control_core::config::{DacWidth, Mechanism, SafetyConfig, SpeedMethod};
 use control_core::units::{Damping, Grams, Millimetres, MillinewtonMetres, Milliradians, Newtons, Stiffness};
@@ -22,7 +22,7 @@ const BUILT_IN: [(&str, &str); 1] = [("paper-001", include_str!("../../../device
 
 /// A device's part from a file.
 #[derive(Clone, Debug)]
-pub struct DevicePart {
+pub struct DeviceConfig {
     /// Its name.
     pub name: String,
     /// As the control law takes it, checked.
@@ -37,15 +37,15 @@ pub struct DevicePart {
     pub source: Text,
 }
 
-impl DevicePart {
+impl DeviceConfig {
     /// Reads a file, or one that comes with the program by its name.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        Self::parse(library::find("device", &path.display().to_string(), &BUILT_IN)?)
+        Self::parse(named_files::find("device", &path.display().to_string(), &BUILT_IN)?)
     }
 
     /// Checks the text of one.
     pub fn parse(source: Text) -> Result<Self, Failure> {
-        let file: File = library::parse(&source)?;
+        let file: File = named_files::parse(&source)?;
         let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
@@ -63,7 +63,7 @@ impl DevicePart {
     }
 }
 
-/// The text of a device's part as the device told it, which [`DevicePart::parse`] reads again to the last place.
+/// The text of a device's part as the device told it, which [`DeviceConfig::parse`] reads again to the last place.
 pub fn to_toml(name: &str, record: &Record) -> Result<String, Failure> {
     toml::to_string(&File::new(name, record)).map_err(Failure::failed)
 }
@@ -295,8 +295,8 @@ mod tests {
     use control_core::units::MillimetresPerSecond;
     use fixed::types::I16F16;
 
-    fn parse(text: &str) -> Result<DevicePart, Failure> {
-        DevicePart::parse(Text { origin: "device.toml".into(), text: text.into() })
+    fn parse(text: &str) -> Result<DeviceConfig, Failure> {
+        DeviceConfig::parse(Text { origin: "device.toml".into(), text: text.into() })
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives (pages, the recording, the
 //! totals). In step with a simulated device, or in real time over a wire that may be pulled and come back.
 
-use crate::bedside::Bedside;
 use crate::outlets::Outlets;
-use crate::pace::Pace;
+use crate::patient_manager::PatientManager;
+use crate::realtime_clock::RealtimeClock;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::device::{Port, Wire};
 use device_sim::driver::{Driver, Request};
 use device_sim::failure::Failure;
 use device_sim::lockstep;
 use device_sim::session::{Control, PatientAnswer, PatientWish, Subscription};
-use recording::tally::Tally;
+use recording::run_stats::RunStats;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use training::practice::Practice;
@@ -25,7 +25,7 @@ const FIRST_ANSWER: Duration = Duration::from_secs(5);
 const GRACE: Duration = Duration::from_secs(3);
 
 /// A run in progress.
-pub struct Station<'a> {
+pub struct RunLoop<'a> {
     driver: Driver,
     outlets: Outlets,
     /// Set from outside (Ctrl-C) to end the run in good order.
@@ -38,7 +38,7 @@ pub struct Station<'a> {
     /// The tip is at depth 0 when it is started for the first time.
     zeroes_first: bool,
     /// The patient, if it may be changed.
-    bedside: Option<Bedside>,
+    patients: Option<PatientManager>,
     /// The practice that judges insertions while somebody looks.
     practice: Option<Practice>,
 }
@@ -48,12 +48,12 @@ pub struct Outcome {
     /// Totals of the link.
     pub link: link::host::Counts,
     /// Totals of what happened.
-    pub tally: Tally,
+    pub stats: RunStats,
     /// Size of the recording, where there was one.
     pub recorded_bytes: Option<u64>,
 }
 
-impl<'a> Station<'a> {
+impl<'a> RunLoop<'a> {
     /// Not connected yet.
     pub fn new(driver: Driver, outlets: Outlets, stop: &'a AtomicBool) -> Self {
         Self {
@@ -64,7 +64,7 @@ impl<'a> Station<'a> {
             has_asked: false,
             person_starts: false,
             zeroes_first: false,
-            bedside: None,
+            patients: None,
             practice: None,
         }
     }
@@ -82,27 +82,27 @@ impl<'a> Station<'a> {
     }
 
     /// A person may change the patient in the page.
-    pub fn with_bedside(mut self, bedside: Bedside) -> Self {
-        self.outlets.publisher.patient(&bedside.status(None));
-        self.bedside = Some(bedside);
+    pub fn with_patients(mut self, patients: PatientManager) -> Self {
+        self.outlets.publisher.patient(&patients.status(None));
+        self.patients = Some(patients);
         self
     }
 
     /// Insertions are judged while somebody looks.
     pub fn with_practice(mut self, subscription: Subscription) -> Self {
-        self.practice = self.bedside.as_ref().map(|bedside| {
-            let tasks = &bedside.setup().tasks;
-            Practice::new(subscription, bedside.profile(), tasks, &self.outlets.publisher)
+        self.practice = self.patients.as_ref().map(|patients| {
+            let tasks = &patients.setup().tasks;
+            Practice::new(subscription, patients.profile(), tasks, &self.outlets.publisher)
         });
         self
     }
 
-    /// Runs a simulated device in step with it, `pace` saying how fast: the clock of both ends is the device's, so that a
+    /// Runs a simulated device in step with it, `clock` saying how fast: the clock of both ends is the device's, so that a
     /// busy computer slows both and neither finds the other silent. `progress` sees the samples so far, now and then.
     pub fn run_in_step(
         mut self,
         mut device: VirtualDevice,
-        mut pace: Pace,
+        mut clock: RealtimeClock,
         mut progress: impl FnMut(u64),
     ) -> Result<Outcome, Failure> {
         self.driver.connected(Duration::ZERO);
@@ -122,13 +122,13 @@ impl<'a> Station<'a> {
             );
             device.take_done().into_iter().for_each(|name| self.outlets.task(name));
             if let Some(taken) = self.patient_answer() {
-                let procedure = self.bedside.as_ref().filter(|_| taken).and_then(Bedside::procedure);
+                let procedure = self.patients.as_ref().filter(|_| taken).and_then(PatientManager::procedure);
                 procedure.into_iter().for_each(|procedure| device.follow(procedure));
                 // The layers of a body are those of a line: the needle points along it.
                 let on_line =
-                    self.bedside.as_ref().filter(|bedside| taken && bedside.profile().body.is_some());
-                on_line.into_iter().for_each(|bedside| {
-                    device.control(Control::Tilt { rad: bedside.profile().tilt_rad() });
+                    self.patients.as_ref().filter(|patients| taken && patients.profile().body.is_some());
+                on_line.into_iter().for_each(|patients| {
+                    device.control(Control::Tilt { rad: patients.profile().tilt_rad() });
                 });
                 // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
                 if !self.person_starts {
@@ -137,9 +137,9 @@ impl<'a> Station<'a> {
             }
             if device.ticks().is_multiple_of(1_000) {
                 self.report(now);
-                progress(self.outlets.tally.samples);
+                progress(self.outlets.stats.samples);
             }
-            if pace.wait(lockstep::time(device.ticks())).is_err() {
+            if clock.wait(lockstep::time(device.ticks())).is_err() {
                 device.note_late();
             }
         }
@@ -192,7 +192,7 @@ impl<'a> Station<'a> {
                 return Err(Failure::failed(why));
             }
             self.report(now);
-            progress(self.outlets.tally.samples);
+            progress(self.outlets.stats.samples);
         }
         if let Some(mut open) = wire {
             self.leave(open.as_mut(), begin);
@@ -264,7 +264,7 @@ impl<'a> Station<'a> {
         }
         match control {
             Control::Record { name } => {
-                let setup = self.bedside.as_ref().map(Bedside::setup);
+                let setup = self.patients.as_ref().map(PatientManager::setup);
                 self.outlets.record(&name, setup);
             }
             Control::EndRecording => self.outlets.end_recording(&self.driver),
@@ -288,19 +288,19 @@ impl<'a> Station<'a> {
 
     /// A person has done a task; one that the procedure does not ask for is not noted.
     fn task(&mut self, name: String) {
-        let tasks = self.bedside.as_ref().map_or(&[][..], |bedside| &bedside.setup().tasks);
+        let tasks = self.patients.as_ref().map_or(&[][..], |patients| &patients.setup().tasks);
         if tasks.iter().any(|task| task.name == name) {
             self.outlets.task(name);
         }
     }
 
     fn wish_patient(&mut self, wish: &PatientWish) {
-        let Some(bedside) = &mut self.bedside else { return };
-        match bedside.ask(wish) {
+        let Some(patients) = &mut self.patients else { return };
+        match patients.ask(wish) {
             Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
             Err(why) => {
                 let answer = PatientAnswer { reason: why.to_string(), ..PatientAnswer::default() };
-                self.outlets.publisher.patient(&bedside.status(Some(answer)));
+                self.outlets.publisher.patient(&patients.status(Some(answer)));
             }
         }
     }
@@ -308,32 +308,32 @@ impl<'a> Station<'a> {
     /// Tells everybody what the device has said to another patient, where it has: whether it has taken it.
     fn patient_answer(&mut self) -> Option<bool> {
         let answer = self.driver.take_change()?;
-        let bedside = self.bedside.as_mut()?;
-        let taken = answer.is_ok().then(|| bedside.taken()).flatten();
+        let patients = self.patients.as_mut()?;
+        let taken = answer.is_ok().then(|| patients.taken()).flatten();
         if taken.is_some() {
-            self.outlets.publisher.scene(&bedside.scene());
+            self.outlets.publisher.scene(&patients.scene());
             if let Some(practice) = &mut self.practice {
-                practice.patient(bedside.profile(), &bedside.setup().tasks, &self.outlets.publisher);
+                practice.patient(patients.profile(), &patients.setup().tasks, &self.outlets.publisher);
             }
-            let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(bedside.setup()));
+            let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(patients.setup()));
             if let Err(failure) = written {
                 self.outlets.recorder = None;
                 self.outlets.failure = Some(failure);
             }
         } else {
-            bedside.refused();
+            patients.refused();
         }
         let is_taken = taken.is_some();
         let answer = taken.unwrap_or_else(|| PatientAnswer {
             reason: answer.err().unwrap_or_default(),
             ..PatientAnswer::default()
         });
-        self.outlets.publisher.patient(&bedside.status(Some(answer)));
+        self.outlets.publisher.patient(&patients.status(Some(answer)));
         Some(is_taken)
     }
 
     fn is_over(&self) -> bool {
-        self.outlets.tally.is_full()
+        self.outlets.stats.is_full()
             || self.outlets.failure.is_some()
             || self.driver.refused().is_some()
             || self.stop.load(Ordering::Relaxed)
@@ -356,6 +356,6 @@ impl<'a> Station<'a> {
         if let Some(refused) = self.driver.refused() {
             return Err(Failure::failed(refused));
         }
-        Ok(Outcome { link, tally: self.outlets.tally, recorded_bytes: recorded_bytes? })
+        Ok(Outcome { link, stats: self.outlets.stats, recorded_bytes: recorded_bytes? })
     }
 }

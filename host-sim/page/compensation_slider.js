@@ -3,7 +3,7 @@
 import { t } from "./language.js";
 import { Slider } from "./slider.js";
 
-export class OwnForces {
+export class CompensationSlider {
   /** @param {import("./link.js").Link} link where wishes go */
   constructor(link) {
     this.box = document.getElementById("own-forces");

@@ -2,8 +2,8 @@
 //! read. The control core, the link and the recording are those of any other run.
 
 use crate::outlets::Outlets;
-use crate::pace::Pace;
-use crate::station::Station;
+use crate::realtime_clock::RealtimeClock;
+use crate::run_loop::RunLoop;
 use control_core::TICK_HZ;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
@@ -13,7 +13,7 @@ use device_sim::profile::Profile;
 use device_sim::session::{self, Source};
 use recording::messages::Setup;
 use recording::read::Recording;
-use recording::tally::Tally;
+use recording::run_stats::RunStats;
 use recording::write::Recorder;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -46,11 +46,11 @@ fn record_with(
     };
     let recorder = Recorder::create(file, &setup)?;
     let ticks = (procedure.round_s * f64::from(TICK_HZ)).ceil() as u64;
-    let outlets = Outlets::new(publisher, Some(recorder), Tally::new(Some(ticks)));
+    let outlets = Outlets::new(publisher, Some(recorder), RunStats::new(Some(ticks)));
     let stop = AtomicBool::new(false);
     let driver = Driver::new(profile.config.patient.clone());
     let device = VirtualDevice::new(profile, procedure);
     let device = if is_deformed { device.with_deformed(profile)? } else { device };
-    Station::new(driver, outlets, &stop).run_in_step(device, Pace::Free, |_| {})?;
+    RunLoop::new(driver, outlets, &stop).run_in_step(device, RealtimeClock::Free, |_| {})?;
     Recording::read(file)
 }

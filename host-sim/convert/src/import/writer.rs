@@ -1,6 +1,6 @@
 //! The contract's files: a rig of which the values are still to be filled in, and a CSV for every run.
 
-use super::counts::Scale;
+use super::encoder_resolution::Scale;
 use super::roles::Role;
 use super::rows::Rows;
 use super::units::Quantity;

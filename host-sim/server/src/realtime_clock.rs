@@ -7,7 +7,7 @@ const LARGEST_LAG: Duration = Duration::from_millis(200);
 
 /// The speed of a simulated device.
 #[derive(Clone, Copy, Debug)]
-pub enum Pace {
+pub enum RealtimeClock {
     /// As fast as it goes.
     Free,
     /// With the clock on the wall.
@@ -21,7 +21,7 @@ pub enum Pace {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Late;
 
-impl Pace {
+impl RealtimeClock {
     /// With the clock on the wall, from now on.
     pub fn real_time() -> Self {
         Self::RealTime { zero: Instant::now() }
@@ -48,12 +48,12 @@ mod tests {
     #[test]
     fn a_computer_that_slept_is_late_once_and_goes_on_from_there() {
         let begin = Instant::now();
-        let mut pace = Pace::real_time();
-        assert_eq!(pace.wait(Duration::from_millis(20)), Ok(()));
+        let mut clock = RealtimeClock::real_time();
+        assert_eq!(clock.wait(Duration::from_millis(20)), Ok(()));
         assert!(begin.elapsed() >= Duration::from_millis(20));
         std::thread::sleep(Duration::from_millis(250));
-        assert_eq!(pace.wait(Duration::from_millis(21)), Err(Late));
-        assert_eq!(pace.wait(Duration::from_millis(22)), Ok(()));
-        assert!(Pace::Free.wait(Duration::from_secs(1_000)).is_ok());
+        assert_eq!(clock.wait(Duration::from_millis(21)), Err(Late));
+        assert_eq!(clock.wait(Duration::from_millis(22)), Ok(()));
+        assert!(RealtimeClock::Free.wait(Duration::from_secs(1_000)).is_ok());
     }
 }
