@@ -419,14 +419,14 @@ impl Insertion {
         anatomy.layers.get(wall.layer).map_or(0, |layer| 1 << layer.number)
     }
 
-    /// Whether the needle passes beside the vessel.
+    /// Notes that the needle passes beside the vessel, or has left it.
     fn pass_beside(&mut self, anatomy: &Anatomy, depth: Millimetres) {
         if let Some(Vessel::Beside { .. }) = anatomy.vessel {
             self.vessel = if depth.0 >= self.beside { VesselState::Beside } else { VesselState::Outside };
         }
     }
 
-    /// Where the tip is as seen from a vessel that it does not pass beside: in the tick after a layer was touched, gave way or was left.
+    /// The tip's place as seen from a vessel that it does not pass beside: in the tick after a layer was touched, gave way or was left.
     #[inline(never)]
     fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
         let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };

@@ -1,4 +1,4 @@
-//! What no command raises: the ceilings that a board's firmware was built with, and those of a device that has been
+//! Ceilings that no command raises: those that a board's firmware was built with, and those of a device that has been
 //! commissioned. It compares configurations; who may send which one is `link`'s business.
 
 use crate::config::{DacWidth, Device, Mechanism};
@@ -11,11 +11,11 @@ use fixed::types::I16F16;
 /// The most that a board may ever be configured for. They are constants of its firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ceilings {
-    /// Of [`crate::config::SafetyConfig::torque`].
+    /// The ceiling of [`crate::config::SafetyConfig::torque`].
     pub torque: MillinewtonMetres,
-    /// Of the speed past which [`crate::event::Fault::Overspeed`] trips.
+    /// The ceiling of the speed past which [`crate::event::Fault::Overspeed`] trips.
     pub speed: MillimetresPerSecond,
-    /// Of what a record may claim of the mechanism, which decides how stiff a wall may be (`stability.rs`): the most mass and dry
+    /// The most that a record may claim of the mechanism, which decides how stiff a wall may be (`stability.rs`): the most mass and dry
     /// friction, and the least delay.
     pub mechanism: Mechanism,
     /// The board's converters, the narrower one first; one that is alone is there twice.
@@ -23,7 +23,7 @@ pub struct Ceilings {
 }
 
 impl Ceilings {
-    /// Of a device without a motor that could hurt anybody: what [`crate::Plan`] takes.
+    /// The ceilings of a device without a motor that could hurt anybody: all that [`crate::Plan`] takes.
     pub const VIRTUAL: Self = Self {
         torque: MillinewtonMetres(I16F16::MAX),
         speed: MillimetresPerSecond(I16F16::MAX),
@@ -31,7 +31,7 @@ impl Ceilings {
         converters: [DacWidth::BITS_8, DacWidth::BITS_12],
     };
 
-    /// Of so many whole mN·m and mm/s, and a mechanism like those that the stiffness of walls was tested with: at most 200 g and 1 N
+    /// Ceilings of so many whole mN·m and mm/s, and a mechanism like those that the stiffness of walls was tested with: at most 200 g and 1 N
     /// along the needle, at least 30 µs from the reading of the encoder to the torque, of which 20 are the wait for the converter's
     /// instant.
     pub const fn new(torque_mnm: i16, speed_mm_per_s: i16) -> Self {
@@ -52,7 +52,7 @@ impl Ceilings {
         Self { converters, ..self }
     }
 
-    /// Whether `device` stays below them.
+    /// Checks that `device` stays below them.
     pub fn check(&self, device: &Device) -> Result<(), Refusal> {
         let per_count = mm_per_count(device.roller_radius, device.counts_per_turn);
         let speed = fastest(per_count, device.limits.max_counts_per_tick);
@@ -71,7 +71,7 @@ impl Ceilings {
     }
 }
 
-/// What keeps a device that was commissioned as `before` from becoming `after` without being commissioned again: the first
+/// Returns why a device that was commissioned as `before` may not become `after` without being commissioned again: the first
 /// value that commissioning found and that is another one, or a ceiling that is higher. What only makes the device gentler,
 /// or shows in nothing but the feel, may change. Less mass and dry friction and more delay are gentler: with them a wall may be
 /// less stiff (`stability.rs`).
@@ -164,7 +164,7 @@ mod tests {
 
     /// Each value that is raised or exchanged alone.
     #[test]
-    fn a_commissioned_device_is_lowered_and_never_raised_or_wired_anew() {
+    fn a_commissioned_device_may_be_lowered_but_not_raised() {
         type Change = (Field, fn(&mut Device));
         let changes: [Change; 18] = [
             (Field::RollerRadius, |d| d.roller_radius.0 -= I16F16::ONE),

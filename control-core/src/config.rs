@@ -1,4 +1,4 @@
-//! What a person configures, in physical units. It travels over the link and is kept in flash; it says nothing about
+//! The configuration that a person writes, in physical units. It travels over the link and is kept in flash; it says nothing about
 //! whether it is safe: only [`crate::plan::Plan::new`] does.
 
 use crate::compensation::Compensation;
@@ -19,7 +19,7 @@ pub use crate::tissue::{Layer, MAX_LAYERS, Parabola, SPRING_BACK, Tissue, Vessel
 /// All that the control law needs to know: the two parts, which are sent and stored apart. Neither holds the other's keys.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Config {
-    /// What was found when the device was commissioned; it changes rarely.
+    /// The device, as found when it was commissioned; it changes rarely.
     pub device: Device,
     /// Whom the needle goes into; every session sends it.
     pub patient: Patient,
@@ -46,33 +46,33 @@ pub struct Device {
     pub full_scale_torque: MillinewtonMetres,
     /// The converter.
     pub dac: DacWidth,
-    /// Where the amplifier stands still, in codes past mid-scale: at most a sixteenth of the converter's span.
+    /// The code at which the amplifier gives no torque, in codes past mid-scale: at most a sixteenth of the converter's span.
     pub dac_zero: i16,
     /// A code above zero drives the needle outwards.
     pub motor_reversed: bool,
-    /// What the needle's tilt reads when it is laid on the skin: −1,571 to 1,571 mrad. Measured tilt less this is the angle
+    /// The reading of the needle's tilt when the needle is laid on the skin: −1,571 to 1,571 mrad. Measured tilt less this is the angle
     /// to the skin.
     pub skin_tilt: Milliradians,
-    /// What the device never exceeds.
+    /// The limits that the device never exceeds.
     pub limits: SafetyConfig,
-    /// How speed is estimated.
+    /// The estimator of speed.
     pub speed: SpeedMethod,
     /// Damping added everywhere, for stability.
     pub damping: Damping,
     /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
     pub passivity_damping: Damping,
-    /// What moves, which decides how stiff a wall may be.
+    /// The moving mechanism, which decides how stiff a wall may be.
     pub mechanism: Mechanism,
-    /// What of its own forces the device takes away from the hand.
+    /// The compensation of the device's own forces.
     pub compensation: Compensation,
-    /// What stands above was found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
+    /// True if the values above were found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
     pub commissioned: bool,
 }
 
-/// What moves with the roller, and how late the motor follows.
+/// The mass and friction that move with the roller, and the delay of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mechanism {
-    /// Of rotor, roller and needle, as felt along the needle, 1–1,000 g.
+    /// The mass of rotor, roller and needle, as felt along the needle, 1–1,000 g.
     pub mass: Grams,
     /// Dry friction along the needle, 0–10 N.
     pub dry_friction: Newtons,
@@ -81,7 +81,7 @@ pub struct Mechanism {
 }
 
 impl Default for Mechanism {
-    /// What the design notes reckon with: 30 g, 0.06 N, and a tick for converter and amplifier.
+    /// The mechanism that the design notes assume: 30 g, 0.06 N, and a tick for converter and amplifier.
     fn default() -> Self {
         Self {
             mass: Grams(I16F16::from_bits(30 << 16)),
@@ -104,7 +104,7 @@ pub struct Patient {
     pub law: Law,
     /// The tissue, outermost layer first.
     pub layers: Vec<Layer, MAX_LAYERS>,
-    /// What is to be known of the vessel beyond its layers; without it, the needle goes through its axis.
+    /// The vessel's properties beyond its layers; without it, the needle goes through its axis.
     pub vessel: Option<Vessel>,
 }
 
@@ -189,7 +189,7 @@ impl DacWidth {
     }
 }
 
-/// What the device never exceeds.
+/// The limits that the device never exceeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SafetyConfig {
     /// Largest torque: the ceiling that no patient raises.

@@ -24,7 +24,7 @@ pub use exchange::{Order, Sample, TickInput, TickOutput};
 use fixed::types::I16F16;
 pub use whole::Controller;
 
-/// Of eight ticks, the one in which the watch takes the count.
+/// The one of eight ticks in which the watch takes the count.
 const LOOK_TURN: u32 = 4;
 
 /// The control law with its memory, but for the segments that play.
@@ -260,7 +260,7 @@ impl Core {
         }
     }
 
-    /// What the tip at `depth` meets and feels. During an excitation nobody's hand is on the needle, and nobody feels tissue.
+    /// Returns the tissue and the force of the tip at `depth`. During an excitation nobody's hand is on the needle, and nobody feels tissue.
     fn meet(
         &mut self,
         tilt: Milliradians,

@@ -1,9 +1,9 @@
-//! What a person or a program wants to know of a run: tissue events, faults, limits in force.
+//! The events and states of a run, for people and programs: tissue events, faults, limits in force.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// What the needle and the device are doing, once a sample.
+/// The state of needle and device, once a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum State {
@@ -35,7 +35,7 @@ impl State {
             .copied()
     }
 
-    /// Whether the amplifier may be on.
+    /// True if the amplifier may be on.
     pub fn is_powered(self) -> bool {
         !matches!(self, State::Idle | State::Fault)
     }
@@ -165,13 +165,13 @@ impl Limits {
         Self(self.0 | other.0)
     }
 
-    /// Whether all of `other` are in force.
+    /// True if all of `other` are in force.
     pub fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 }
 
-/// Where the tip is as seen from a vessel.
+/// The tip's place as seen from a vessel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum VesselState {
@@ -196,7 +196,7 @@ impl VesselState {
     }
 }
 
-/// What changed in the tissue in one tick: a bit a layer, bit 0 the outermost.
+/// The changes in the tissue in one tick: a bit a layer, bit 0 the outermost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transitions {
     /// The tip has touched the layer.
@@ -209,12 +209,12 @@ pub struct Transitions {
     pub flashback: bool,
     /// The needle has just been turned further than the tissue around it lets it.
     pub barrier: bool,
-    /// Of the layers in `contact`, those that had given way before: the tip is in its own track.
+    /// Those of the layers in `contact` that had given way before: the tip is in its own track.
     pub in_track: u8,
 }
 
 impl Transitions {
-    /// Whether nothing changed.
+    /// True if nothing changed.
     pub fn is_empty(self) -> bool {
         // As one number: compared field by field it takes three times as long.
         (self.contact | self.puncture | self.exit | u8::from(self.flashback) | u8::from(self.barrier)) == 0

@@ -25,12 +25,12 @@ pub const MAX_LINES: usize = 12;
 /// The largest torque that a device gives before it has been commissioned: 2 mN·m.
 pub const GENTLE_TORQUE: MillinewtonMetres = MillinewtonMetres(I16F16::from_bits(2 << 16));
 
-/// What to play.
+/// The signal to play.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Excitation {
     /// The signal.
     pub signal: Signal,
-    /// How long, 10–600,000 ms; torque goes off at the end.
+    /// The duration, 10–600,000 ms; torque goes off at the end.
     pub duration_ms: u32,
     /// Gains of the servo that follows the reference.
     pub servo: Servo,
@@ -102,7 +102,7 @@ pub enum Signal {
 }
 
 impl Excitation {
-    /// Whether a device may play it of which nobody knows yet how it is wired: no servo, which would drive the wrong way, and
+    /// True if a device may play it whose wiring is not yet known: no servo, which would drive the wrong way, and
     /// no more than [`GENTLE_TORQUE`].
     pub fn is_gentle(&self) -> bool {
         let torque = match &self.signal {
@@ -132,7 +132,7 @@ impl Excitation {
         }
     }
 
-    /// Whether the device may play it under `plan`.
+    /// Checks that the device may play it under `plan`.
     pub fn check(&self, plan: &Plan) -> Result<(), Refusal> {
         let limits = &plan.device().limits;
         // A sequence of weeks has more milliseconds than the number holds.

@@ -1,4 +1,4 @@
-//! Where the needle is between two counts of the encoder, and how fast it goes without the steps of a window of counts.
+//! Interpolates between two counts of the encoder: the needle's place, and its speed without the steps of a window of counts.
 //!
 //! At an edge the place is known: the border of two counts. From there on it moves with the steady speed and never leaves its count. So the
 //! law sees a way without steps, late by nothing, and off by half a count at most.
@@ -16,7 +16,7 @@ const PER_TICK_Q24: i32 = 27_487_791;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Interpolator {
     depth: Millimetres,
-    /// How far past the lower border of its count, mm in Q30.
+    /// The distance past the lower border of its count, mm in Q30.
     part: i32,
     /// mm/s in Q16 and nine bits more.
     steady: i64,

@@ -15,7 +15,7 @@ const EDGE_SPACING_TICKS: u32 = WINDOW_TICKS / EDGES as u32;
 /// No edge for this long is rest: 0.1 s.
 const REST_TICKS: u32 = TICK_HZ / 10;
 
-/// How speed is estimated. One count a tick is 157 mm/s at a 10 mm roller: counts are never differenced tick by tick.
+/// The estimator of speed. One count a tick is 157 mm/s at a 10 mm roller: counts are never differenced tick by tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SpeedMethod {
     /// Counts over the last [`WINDOW_TICKS`] ticks.
@@ -79,7 +79,7 @@ const STOPPED_LOOKS: u32 = 200 / LOOK_TICKS;
 /// … unless it has come back this far by then, in Q16: 0.1 mm.
 const TURNING: u32 = 6_554;
 
-/// Where the needle goes, for the state that is reported.
+/// The needle's direction, for the state that is reported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Direction {
     #[default]
@@ -111,12 +111,12 @@ impl Default for Movement {
 }
 
 impl Movement {
-    /// Where the needle went at the last look.
+    /// The needle's direction at the last look.
     pub(crate) fn direction(&self) -> Direction {
         self.direction
     }
 
-    /// Whether the needle had stopped by the last look: earlier than it rests, and not while it turns round.
+    /// True if the needle had stopped by the last look: earlier than it rests, and not while it turns round.
     pub(crate) fn has_stopped(&self) -> bool {
         self.has_stopped
     }
@@ -294,7 +294,7 @@ mod tests {
     use heapless::Vec;
 
     #[test]
-    fn a_quotient_is_precise_to_twenty_bits_and_the_nearest_there_is() {
+    fn a_quotient_is_the_nearest_of_twenty_bits() {
         let dividends = (0..44).flat_map(|shift| [1_u64 << shift, (3 << shift) + 1, (1 << (shift + 1)) - 1]);
         for (dividend, divisor) in dividends.flat_map(|dividend| [1, 2, 3, 999, 1_000].map(|n| (dividend, n)))
         {
@@ -370,7 +370,7 @@ mod tests {
 
     /// A needle that stops at once: what has not moved by a count in a time is slower than a count in that time.
     #[test]
-    fn after_an_abrupt_stop_speed_is_less_than_a_count_in_the_time_since() {
+    fn after_an_abrupt_stop_speed_is_below_one_count_in_that_time() {
         // Three counts in four ticks are 117 mm/s; a count a tick is 156.25.
         let speeds: Vec<f64, 1_400> =
             speeds((1..=400).map(|tick| 3 * tick / 4).chain(core::iter::repeat_n(300, 900))).collect();

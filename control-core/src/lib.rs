@@ -1,4 +1,4 @@
-//! What the device computes ten thousand times a second: encoder count in, DAC code out.
+//! The computation that the device repeats ten thousand times a second: encoder count in, DAC code out.
 //!
 //! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → `law` (the
 //! force law) → torque, with what [`compensation`] feeds forward beside it → [`safety`] (limit, fade-in, slew) → DAC code.

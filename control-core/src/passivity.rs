@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compensation_gives_no_more_than_its_store_and_what_friction_takes() {
+    fn a_compensation_gives_at_most_its_store_and_friction() {
         let (store, torque, friction) = (10 << 16, I16F16::from_num(1), I16F16::from_num(0.5));
         let pushed = |friction, wanted: i32| {
             let mut account = Account::default();
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compensation_that_swings_in_its_store_is_left_alone_and_one_that_pumps_is_not() {
+    fn only_a_compensation_that_pumps_energy_is_cut() {
         // To and fro over a spring that is late by a count: each turn gives more than it took.
         let run = |late: i32| {
             let mut account = Account::default();

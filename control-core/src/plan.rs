@@ -140,7 +140,7 @@ impl Plan {
         Newtons(largest_force(&self.config))
     }
 
-    /// What layer `index` is made of.
+    /// Returns the tissue of layer `index`.
     pub fn tissue(&self, index: u8) -> Option<Tissue> {
         self.config.patient.layers.get(usize::from(index)).map(|layer| layer.tissue)
     }
@@ -151,7 +151,7 @@ impl Plan {
     }
 }
 
-/// Whether a device may be as `device` says, whoever the patient.
+/// Checks a device on its own, whoever the patient.
 pub(crate) fn check_device(device: &Device) -> Result<(), Refusal> {
     let limits = &device.limits;
     within(Field::RollerRadius, device.roller_radius.0, milli(4_000), milli(25_000))?;
@@ -236,7 +236,7 @@ fn check_ceiling(config: &Config) -> Result<(), Refusal> {
     within(Field::LargestForce, force, milli(10), ceiling)
 }
 
-/// What the torque limit gives at the roller, mN·m over mm being N, or less where the patient wants less.
+/// Returns the force of the torque limit at the roller, mN·m over mm being N, or less where the patient wants less.
 fn largest_force(config: &Config) -> I16F16 {
     let ceiling = config.device.limits.torque.0.saturating_div(config.device.roller_radius.0);
     config.patient.largest_force.map_or(ceiling, |force| force.0.min(ceiling))

@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_needle_that_its_motor_drives_the_wrong_way_is_found_within_5_ms() {
+    fn a_needle_driven_the_wrong_way_is_found_within_5_ms() {
         for (newtons, mass) in [(0.5, 0.03), (0.7, 0.03), (1.0, 0.03), (2.8, 0.03), (1.0, 0.05), (0.5, 0.02)]
         {
             for sign in [-1.0, 1.0] {

@@ -28,7 +28,7 @@ impl Limiter {
         *self = Self::default();
     }
 
-    /// What was given last.
+    /// The torque that was given last.
     pub(crate) fn given(&self) -> MillinewtonMetres {
         MillinewtonMetres(self.given)
     }
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zero_beside_mid_scale_and_a_reversed_motor_are_for_the_converter_alone() {
+    fn zero_and_motor_direction_change_only_the_converters_code() {
         let beside = Device { dac_zero: 5, motor_reversed: true, ..device(DacWidth::BITS_8, 127.0) };
         let scale = DacScale::new(&beside);
         let torques = [0.0, 10.0, -10.0, 200.0, -200.0].map(|torque| scale.codes(mnm(torque)));

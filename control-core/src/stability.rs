@@ -1,4 +1,4 @@
-//! How stiff a wall may be on a device, from what moves there and how late its motor follows. It knows no tissue.
+//! The stiffness that a wall may have on a device, from its moving mass and friction and the delay of its motor. It knows no tissue.
 //!
 //! With the roller at rest between two counts a wall pushes with either of two forces, `K·Δ` apart: dry friction `f` holds both
 //! where `K ≤ 2f/Δ` (Abbott and Okamura, IEEE Trans. Robotics 21, 2005; Diolaiti et al., the same 22, 2006).

@@ -178,7 +178,7 @@ impl<C: Converters, E: OutputPin> Drive<C, E> {
         self.converters.put_zero_torque();
     }
 
-    /// Whether the amplifier is on.
+    /// True if the amplifier is on.
     pub fn is_enabled(&self) -> bool {
         self.is_enabled
     }

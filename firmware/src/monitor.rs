@@ -1,4 +1,4 @@
-//! What the amplifier and the emergency stop say of themselves, once a millisecond: the loop of the stop, the amplifier's
+//! The watch on amplifier and emergency stop, once a millisecond: the loop of the stop, the amplifier's
 //! ready output, the enable line as it is and not as it was set, and the motor's current where it is measured. Which of it
 //! keeps the device from being started, and which ends a run.
 
@@ -6,7 +6,7 @@ use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use control_core::units::DacCode;
 
-/// What the lines say.
+/// The levels of the lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readings {
     /// The emergency stop's loop is open: pressed, or its wire is off.
@@ -19,10 +19,10 @@ pub struct Readings {
     pub current: Option<DacCode>,
 }
 
-/// What was asked of the amplifier in the last tick.
+/// The request to the amplifier in the last tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asked {
-    /// Whether it is to be on.
+    /// True if it is to be on.
     pub powered: bool,
     /// The code, of 12 bits.
     pub code: DacCode,
@@ -60,7 +60,7 @@ pub struct DriveMonitor {
     is_stuck: bool,
 }
 
-/// What a look gives.
+/// The result of a look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
     /// [`Interlock::EmergencyStop`].
@@ -117,7 +117,7 @@ impl DriveMonitor {
         }
     }
 
-    /// Whether the current is that of no command of the last looks, between the least and the largest of which it may be on
+    /// True if the current is that of no command of the last looks, between the least and the largest of which it may be on
     /// its way.
     fn current_is_wrong(&mut self, current: Option<DacCode>, asked: Asked) -> bool {
         self.asked.rotate_right(1);

@@ -1,4 +1,4 @@
-//! What a board has to offer: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
+//! The interface of a board: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
 //! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
 
 use crate::drive::Converters;
@@ -21,7 +21,7 @@ pub trait Board: 'static {
     type Enable: OutputPin;
     /// The encoder's lines.
     type EncoderLines: PulledLines;
-    /// What amplifier and emergency stop say back.
+    /// The signals from amplifier and emergency stop.
     type DriveLines: ReadDrive;
     /// The supply.
     type Supply: SupplyLevel;
@@ -44,7 +44,7 @@ pub trait Board: 'static {
     fn wake_telemetry();
     /// Sets the tilt task off.
     fn wake_tilt();
-    /// Whether the port's own interrupt may set the USB task off.
+    /// True if the port's own interrupt may set the USB task off.
     fn allow_usb(allowed: bool);
 }
 
@@ -52,7 +52,7 @@ pub trait Board: 'static {
 pub trait TickTimer {
     /// Clears the edge that brought us here.
     fn acknowledge(&self);
-    /// Whether the next edge has come already.
+    /// True if the next edge has come already.
     fn edge_waits(&self) -> bool;
     /// Core cycles since the edge.
     fn cycles_since_edge(&self) -> u32;
@@ -66,13 +66,13 @@ pub trait Encoder {
 
 /// The lines on which the drive speaks back.
 pub trait ReadDrive {
-    /// What they say now.
+    /// Returns their signals now.
     fn read(&self) -> Readings;
 }
 
 /// The supply's detector.
 pub trait SupplyLevel {
-    /// Whether the supply is below the level at which the core surely runs, or nothing would end a core that it no longer carries.
+    /// True if the supply is below the level at which the core surely runs, or nothing would end a core that it no longer carries.
     fn is_low(&self) -> bool;
 }
 
@@ -80,7 +80,7 @@ pub trait SupplyLevel {
 pub trait Watchdog {
     /// Puts the end off.
     fn feed(&mut self);
-    /// Whether it stands still while a debugger halts the core.
+    /// True if it stands still while a debugger halts the core.
     fn stop_on_debug(&mut self, stop: bool);
 }
 
@@ -90,7 +90,7 @@ pub trait Lamps {
     fn show(&mut self, powered: bool, fault: bool);
 }
 
-/// What a serial port does not do now: there is nothing to read, or no room to write.
+/// The error of a serial port that would have to wait: there is nothing to read, or no room to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WouldBlock;
 

@@ -1,4 +1,4 @@
-//! What a reset means: from the microcontroller's flags and the words that survive in RAM to the fault that is reported
+//! The meaning of a reset: from the microcontroller's flags and the words that survive in RAM to the fault that is reported
 //! when the PC comes back. Torque is off after any reset until a person starts the device.
 
 use control_core::event::Fault;
@@ -28,12 +28,12 @@ pub struct LastWords {
     heat: [AtomicU32; 2],
 }
 
-/// What was said before a reset.
+/// The last words before a reset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Said {
     /// Why the program gave up, if it did.
     pub crash: Option<Crash>,
-    /// Whether torque was on.
+    /// True if torque was on.
     pub torque: bool,
     /// The winding's heat as `Controller::heat` gave it; 0 where nobody knows.
     pub heat: u32,
@@ -123,7 +123,7 @@ impl LastWords {
         crash_of(&self.crash_words()?)
     }
 
-    /// Whether torque is on, from now on.
+    /// Notes if torque is on, from now on.
     pub fn torque(&self, on: bool) {
         let mark = if on { TORQUE_MARK } else { 0 };
         let [word, inverse] = &self.torque;
@@ -136,7 +136,7 @@ impl LastWords {
         word.load(Relaxed) == TORQUE_MARK && inverse.load(Relaxed) == !TORQUE_MARK
     }
 
-    /// How warm the motor's winding is, from now on. A motor does not cool in a reset.
+    /// Sets the heat of the motor's winding from now on. A motor does not cool in a reset.
     pub fn heat(&self, heat: u32) {
         let [word, inverse] = &self.heat;
         word.store(heat, Relaxed);
@@ -148,7 +148,7 @@ impl LastWords {
         if inverse == !word { word } else { 0 }
     }
 
-    /// What was said before the reset; forgets it, but for the heat.
+    /// Returns the last words before the reset and forgets them, but for the heat.
     pub fn take(&self) -> Said {
         let said = Said { crash: self.crashed(), torque: self.torque_was_on(), heat: self.heat_was() };
         self.crash[0].store(0, Relaxed);

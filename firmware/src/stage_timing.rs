@@ -31,7 +31,7 @@ impl Stages {
         }
     }
 
-    /// What is reported.
+    /// Returns the times to report.
     pub fn read(&self) -> [StageTime; STAGES] {
         core::array::from_fn(|place| StageTime {
             last: self.last[place].load(Relaxed),

@@ -25,7 +25,7 @@ pub const CELL_WORDS: usize = 256;
 /// Erased flash.
 const BLANK: u32 = u32::MAX;
 const MAGIC: u32 = 0xC0F1 << 16;
-/// What the last word of a cell becomes when the cell is whole.
+/// The last word of a cell once the cell is whole.
 const COMMITTED: u32 = 0x600D_600D;
 const HEADER_WORDS: usize = 3;
 const PAYLOAD_BYTES: usize = (CELL_WORDS - HEADER_WORDS - 1) * 4;
@@ -95,7 +95,7 @@ pub enum StoreError {
     TooLong,
 }
 
-/// What start-up finds of a record.
+/// The finding of start-up about a record.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stored<T> {
     /// The version saved last.
@@ -107,7 +107,7 @@ pub enum Stored<T> {
 }
 
 impl<T> Stored<T> {
-    /// What to use, `otherwise` where there is none, and whether a version was lost.
+    /// Returns the record to use, `otherwise` if there is none, and true if a version was lost.
     pub fn or(self, otherwise: T) -> (T, bool) {
         match self {
             Stored::Found(record) => (record, false),
@@ -127,7 +127,7 @@ pub struct Store<F> {
     next_sequence: u32,
 }
 
-/// Where a version of a record is.
+/// The place of a version of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Version {
     slot: Slot,
@@ -157,7 +157,7 @@ impl Cell {
     }
 }
 
-/// Whether number `a` was given out after `b`.
+/// True if number `a` was given out after `b`.
 fn is_later(a: u32, b: u32) -> bool {
     a.wrapping_sub(b).cast_signed() > 0
 }
@@ -285,7 +285,7 @@ impl<F: ConfigFlash> Store<F> {
         self.read_payload(version.slot, version.cell, header, header & LENGTH, bytes)
     }
 
-    /// What the newest version of a record says.
+    /// Returns the content of the newest version of a record.
     fn stored<T: DeserializeOwned>(&mut self, kind: Kind, is_damaged: bool) -> Stored<T> {
         let mut bytes = [0; PAYLOAD_BYTES];
         match self.newest[kind as usize] {
@@ -327,7 +327,7 @@ impl<F: ConfigFlash> Store<F> {
         Kind::ALL.map(|kind| self.is_damaged(kind))
     }
 
-    /// Whether a version of the record that was committed after its newest whole one cannot be read. The other slot does not
+    /// True if a version of the record that was committed after its newest whole one cannot be read. The other slot does not
     /// count: it may be half erased.
     fn is_damaged(&mut self, kind: Kind) -> bool {
         let from = match self.newest[kind as usize] {

@@ -24,7 +24,7 @@ impl Task {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Tick, Self::Usb, Self::Telemetry, Self::Tilt];
 
-    /// How many milliseconds it may be silent.
+    /// Returns the milliseconds for which it may be silent.
     pub const fn allowance_ms(self) -> u32 {
         match self {
             Task::Tick => timing::TICK_SILENCE_MS,
@@ -34,7 +34,7 @@ impl Task {
     }
 }
 
-/// Where tasks report: a bit each, set by the task, taken by the supervisor.
+/// The reports of the tasks: a bit each, set by the task, taken by the supervisor.
 #[derive(Default)]
 pub struct Reports(AtomicU32);
 
@@ -102,7 +102,7 @@ impl Trips {
         self.0.fetch_or(1 << fault as u16, Relaxed);
     }
 
-    /// Whether any waits; cheap, for the tick.
+    /// True if any waits; cheap, for the tick.
     pub fn is_empty(&self) -> bool {
         self.0.load(Relaxed) == 0
     }

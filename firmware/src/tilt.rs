@@ -20,7 +20,7 @@ pub trait TiltSource {
     fn read(&mut self) -> Reading;
 }
 
-/// What one reading says is wrong.
+/// The trouble that one reading shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TiltTrouble {
     /// Nothing answers, or something else does.

@@ -3,7 +3,7 @@
 
 use control_core::TICK_HZ;
 
-/// What a board brings from outside: a crystal, or the clock of its debugger.
+/// The frequency of the board's external clock: a crystal, or the clock of its debugger.
 pub const EXTERNAL_CLOCK_HZ: u32 = 8_000_000;
 
 /// The most that an STM32F407 runs at, and an STM32F429 without over-drive; the cycle counter counts it.
@@ -40,15 +40,15 @@ pub const SUPERVISOR_HZ: u32 = 1_000;
 /// The tilt sensor is read at twice the 100 Hz at which it measures: no measurement is missed, whatever its clock does.
 pub const TILT_PERIOD_MS: u32 = 5;
 
-/// How long the tick may be silent before the supervisor calls it hung: it runs ten times in that time. A tick that never
+/// The time for which the tick may be silent before the supervisor calls it hung: it runs ten times in that time. A tick that never
 /// returns starves the supervisor too, and is left to the watchdog.
 pub const TICK_SILENCE_MS: u32 = 2;
 
-/// How long the USB and telemetry tasks may be silent: both run every millisecond, and five of them are more than the
+/// The time for which the USB and telemetry tasks may be silent: both run every millisecond, and five of them are more than the
 /// longest of either ever measured, yet leave time to act within 20 ms.
 pub const TASK_SILENCE_MS: u32 = 5;
 
-/// How long the tilt task may be silent: two of its periods and a millisecond.
+/// The time for which the tilt task may be silent: two of its periods and a millisecond.
 pub const TILT_SILENCE_MS: u32 = 2 * TILT_PERIOD_MS + 1;
 
 /// Ticks without a sign of the supervisor after which the tick takes torque away by itself: 5 ms. It is what catches a task
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(TICK_CYCLES * TICK_HZ, CORE_HZ);
     }
 
-    /// What the comments above say, in numbers.
+    /// Tests of the figures in the comments above.
     #[test]
     fn the_derived_constants_are_what_their_reasons_say() {
         assert_eq!((TICK_TIMER_HZ, TICK_CYCLES, TICK_TIMER_COUNTS), (84_000_000, 16_800, 8_400));

@@ -1,4 +1,4 @@
-//! Whether a wire is there: a line that somebody drives stays where it is whichever way it is pulled, one without a wire
+//! Finds a wire that is off: a line that somebody drives stays where it is whichever way it is pulled, one without a wire
 //! goes along. And whether the encoder has power.
 
 /// Which way the inputs are pulled, by some 40 kΩ.
@@ -13,7 +13,7 @@ pub enum Pull {
 pub trait PulledLines {
     /// All of them, a bit each.
     const ALL: u8;
-    /// Whether the encoder's supply is there, as far as it is wired to be sensed: without that wire it is not.
+    /// True if the encoder's supply is there, as far as it is wired to be sensed: without that wire it is not.
     fn has_supply(&self) -> bool;
     /// Those that are high, a bit each.
     fn high(&mut self) -> u8;
@@ -29,7 +29,7 @@ const LOOKS: u8 = 2;
 /// Looks in a row for which the supply must have been there before its absence means anything: 0.1 s.
 const SUPPLY_LOOKS: u8 = 100;
 
-/// What a look finds.
+/// The finding of a look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wires {
     /// A wire is off, or the encoder has lost its supply.
@@ -62,7 +62,7 @@ impl WireWatch {
         Wires { off, agree: driven_high == 0 || driven_high == L::ALL }
     }
 
-    /// Whether a supply that has been there is gone. It may come back.
+    /// True if a supply that has been there is gone. It may come back.
     fn has_lost_supply(&mut self, has_supply: bool) -> bool {
         let is_sensed = self.supplied == SUPPLY_LOOKS;
         if has_supply {
@@ -98,7 +98,7 @@ fn pulled(lines: &mut impl PulledLines) -> (u8, u8) {
 mod tests {
     use super::*;
 
-    /// What drives a line, if anything, reading by reading.
+    /// The driver of a line, if any, reading by reading.
     type Driver = Option<fn(usize) -> bool>;
 
     /// Two lines.

@@ -3,7 +3,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
-/// Where the internal flash begins.
+/// The first address of the internal flash.
 pub const FLASH: u32 = 0x0800_0000;
 /// The name of the interface of the flash, as an F407 says it.
 pub const MEMORY: &str = "@Internal Flash  /0x08000000/04*016Kg,01*064Kg,07*128Kg";

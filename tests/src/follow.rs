@@ -37,7 +37,7 @@ fn pin_ticks(log: &Log) -> Vec<PinTick> {
         .collect()
 }
 
-/// What the control core is given, tick by tick, to do what a board has done.
+/// The control core's inputs, tick by tick, with which it does what a board has done.
 struct Replay<'a> {
     plan: Plan,
     /// The tick in which the board started.
@@ -68,7 +68,7 @@ impl Replay<'_> {
         controller.tick(TickInput { count: Counts(count.cast_signed()), tilt: self.tilt(tick) })
     }
 
-    /// Whether a controller that takes the patient in tick `taken` computes every code.
+    /// True if a controller that takes the patient in tick `taken` computes every code.
     fn agrees(&self, ticks: &[PinTick], taken: Option<u64>) -> bool {
         let mut controller = Controller::new(self.plan.clone());
         (0_u64..)

@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_needle_let_go_is_driven_out_by_its_motor_and_a_reversed_one_in() {
+    fn a_released_needle_is_driven_out_and_a_reversed_one_in() {
         for (reversed, sign) in [(false, -1.0), (true, 1.0)] {
             let needle = Needle::held_at(0.0025);
             needle.change(|state| (state.hand, state.reversed) = (None, reversed));

@@ -1,4 +1,4 @@
-//! What goes into and comes out of a tick, and the orders between ticks.
+//! The inputs and outputs of a tick, and the orders between ticks.
 
 use crate::compensation::Gains;
 use crate::event::{Fault, Limits, Transitions, VesselState};
@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::units::{Counts, DacCode, Millimetres, MillimetresPerSecond, Milliradians, Newtons};
 use serde::{Deserialize, Serialize};
 
-/// What the tick reads.
+/// The inputs of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickInput {
     /// The encoder's absolute count; it may wrap.
@@ -16,18 +16,18 @@ pub struct TickInput {
     pub tilt: Milliradians,
 }
 
-/// What the tick gives.
+/// The outputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct TickOutput {
-    /// What to write to the converter.
+    /// The code to write to the converter.
     pub dac: DacCode,
-    /// Whether the amplifier may be on.
+    /// True if the amplifier may be on.
     pub enable: bool,
-    /// What is streamed.
+    /// The sample to stream.
     pub sample: Sample,
-    /// What changed in the tissue.
+    /// The changes in the tissue.
     pub transitions: Transitions,
-    /// What holds torque back.
+    /// The limits in force, which hold torque back.
     pub limits: Limits,
     /// The fault that latched in this tick.
     pub tripped: Option<Fault>,
@@ -39,7 +39,7 @@ pub struct TickOutput {
     pub force: Newtons,
     /// The angle to the skin that the layers were met at.
     pub angle: Milliradians,
-    /// Where the tip is as seen from the vessel.
+    /// The tip's place as seen from the vessel.
     pub vessel: VesselState,
     /// The force across the needle that would hold its direction; this device cannot give it.
     pub lateral: Newtons,
@@ -59,7 +59,7 @@ pub struct Sample {
     pub tilt_mrad: i16,
 }
 
-/// What a person or the supervisor asks of the control law, between ticks.
+/// An order of a person or the supervisor to the control law, between ticks.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
 pub enum Order {

@@ -62,7 +62,7 @@ impl Core {
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 
-    /// What is given of the torque `held` while the encoder is asked whether it counts.
+    /// Returns the part of the torque `held` that is given while the encoder is asked whether it counts.
     #[cold]
     #[inline(never)]
     fn left_while_asking(&mut self, held: I16F16) -> I16F16 {

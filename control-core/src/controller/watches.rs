@@ -1,4 +1,4 @@
-//! What a tick watches beside the force: the host, the way the needle moves, an encoder that no longer counts, and the winding.
+//! The watches of a tick, apart from the force: the host, the way the needle moves, an encoder that no longer counts, and the winding.
 
 use super::{Core, LOOK_TURN, Mode};
 use crate::anatomy;
@@ -11,7 +11,7 @@ use crate::units::{Millimetres, Milliradians};
 use fixed::types::I16F16;
 
 impl Core {
-    /// What is slow enough to be done in one tick of eight or sixteen, each in another one.
+    /// The work that is slow enough for one tick of eight or sixteen, each part in another tick.
     #[inline(never)]
     pub(super) fn take_turn(&mut self, tilt: Milliradians, depth: Millimetres) {
         const { assert!(WARM_TICKS == 8 && LOOK_TICKS == 8 && LOOK_TURN == 4, "the turns below") };

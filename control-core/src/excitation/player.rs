@@ -1,4 +1,4 @@
-//! What plays against the motor: one excitation, or the segments of a sequence one after the other.
+//! The player of excitations: one excitation, or the segments of a sequence one after the other.
 
 use super::{Excitation, Reference, Servo, Signal};
 use crate::TICK_HZ;
@@ -91,9 +91,9 @@ impl Prepared {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Player {
     current: usize,
-    /// Where all of it began: the travel counts from there.
+    /// The position at which all of it began: the travel counts from there.
     origin: Millimetres,
-    /// Where the reference of this segment began.
+    /// The position at which the reference of this segment began.
     begin: Millimetres,
     travel: Millimetres,
     too_fast: MillimetresPerSecond,

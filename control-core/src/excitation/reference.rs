@@ -7,7 +7,7 @@ use crate::sine::sine;
 use crate::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use fixed::types::{I16F16, I32F32};
 
-/// What the servo follows at one tick.
+/// The servo's reference at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Target {
     /// Position along the needle, from where the excitation began.
@@ -99,7 +99,7 @@ impl Reference {
         target
     }
 
-    /// Where the reference is now, from where it began.
+    /// Returns the reference's position now, from where it began.
     pub fn position(&self) -> Millimetres {
         Millimetres(self.position.saturating_to_num())
     }
@@ -134,7 +134,7 @@ impl Reference {
     }
 }
 
-/// How far a reference gets, from where it began; it never goes the other way.
+/// Returns the largest distance of a reference from where it began; it never goes the other way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reach {
     /// Its position at the end.
@@ -144,7 +144,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Of a signal that plays for so many ticks: what as many calls of [`Reference::tick`] give, leg by leg and without the cycles
+    /// The state of a signal after so many ticks, as many calls of [`Reference::tick`] give, leg by leg and without the cycles
     /// that begin again.
     pub fn after(signal: &Signal, ticks: u32) -> Self {
         let legs = 2 * u32::from(steps_and_ratio(signal).0);
@@ -198,7 +198,7 @@ fn steps_and_ratio(signal: &Signal) -> (u8, I16F16) {
     }
 }
 
-/// What grows from step to step, at the first one.
+/// The quantity that grows from step to step, at the first one.
 fn first_stage(signal: &Signal) -> I16F16 {
     match signal {
         Signal::SpeedStaircase { slowest, .. } => slowest.0,

@@ -58,7 +58,7 @@ pub enum SequenceRefusal {
         /// The number to play.
         wanted: u8,
     },
-    /// What waits is not what was sent.
+    /// The sequence that waits is not the one that was sent.
     Damaged,
     /// The upload began too long ago.
     Late,

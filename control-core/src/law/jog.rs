@@ -60,9 +60,9 @@ struct Rub {
 /// made with them.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// Of each wall.
+    /// One entry for each wall.
     walls: Vec<wall::Wall, MAX_LAYERS>,
-    /// Of each layer.
+    /// One entry for each layer.
     rubs: Vec<Rub, MAX_LAYERS>,
     /// The needle is held by friction once the outermost wall has given way: 1, or 0 where there is none.
     walls_that_close: usize,
@@ -101,12 +101,12 @@ impl Plan {
     }
 }
 
-/// What the needle has done to the tissue so far, beyond where it is.
+/// The needle's effect on the tissue so far, beyond its present place.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory {
-    /// Of each wall that has given way.
+    /// One entry for each wall that has given way.
     cuts: [Cut; MAX_LAYERS],
-    /// How many of them count.
+    /// The number of them that are used.
     given: usize,
     hold: Hold,
 }
@@ -117,7 +117,7 @@ impl Default for Memory {
     }
 }
 
-/// What the walls do, all together.
+/// The force of all walls together.
 #[derive(Clone, Copy, Debug, Default)]
 struct Walls {
     force: I16F16,
@@ -199,7 +199,7 @@ fn limit(forces: &Plan, met: &Insertion, depth: Millimetres) -> Newtons {
     Newtons(saturating_times(inside, rub.per_mm).saturating_add(stretched(rub.above, met.path_per_depth())))
 }
 
-/// What layers that are passed at an angle add up to, in N.
+/// Returns the sum of the friction of layers that are passed at an angle, in N.
 fn stretched(straight: I8F24, path_per_depth: I8F24) -> I16F16 {
     I16F16::from_bits(saturating_product(straight.to_bits(), path_per_depth.to_bits(), 32))
 }

@@ -13,10 +13,10 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I2F30, I16F16};
 use serde::{Deserialize, Serialize};
 
-/// How the needle moves.
+/// The needle's motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion<'a> {
-    /// Of the tip along the needle.
+    /// The depth of the tip along the needle.
     pub(crate) depth: Millimetres,
     pub(crate) speed: MillimetresPerSecond,
     pub(crate) movement: &'a Movement,
@@ -30,12 +30,12 @@ pub(crate) struct LayerHit {
     pub(crate) layer: Layer,
 }
 
-/// Where a law is to act, and how much it may ask for.
+/// The layers in which a law acts, and the limits of its force.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForceLimits<'a> {
     /// Outermost first; without those of a vessel that the needle passes beside.
     pub(crate) layers: &'a [LayerHit],
-    /// How many layers are configured.
+    /// The number of layers that are configured.
     pub(crate) configured: usize,
     /// Largest depth along the needle, mm.
     pub(crate) travel: I16F16,
@@ -47,7 +47,7 @@ pub(crate) struct ForceLimits<'a> {
     pub(crate) count: I16F16,
 }
 
-/// What a law makes of where the tip is and how it moves.
+/// A law's response to the tip's place and motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Response {
     /// Along the needle, positive against insertion.
@@ -66,7 +66,7 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// Of no tissue.
+    /// The response of no tissue.
     pub(crate) const NONE: Self = Self {
         force: Elements::NONE,
         state: State::Approach,
@@ -105,7 +105,7 @@ macro_rules! laws {
         #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one plan")]
         pub(crate) enum Plan { $($name($module::Plan)),+ }
 
-        /// What it remembers.
+        /// Its memory.
         #[derive(Clone, Debug)]
         pub(crate) enum Memory { $($name($module::Memory)),+ }
 
@@ -130,7 +130,7 @@ macro_rules! laws {
                 }
             }
 
-            /// Of a needle that has never been in this tissue.
+            /// The memory of a needle that has never been in this tissue.
             pub(crate) fn memory(&self) -> Memory {
                 match self { $(Plan::$name(_) => Memory::$name($module::Memory::default())),+ }
             }

@@ -34,7 +34,7 @@ const LARGEST_SPEED: i32 = 1_000 << 16;
 /// The barrier is told again once the needle was turned back to this share of the largest angle, in 256ths.
 const REARMED_256: i32 = 230;
 
-/// What the law of seed 002 adds to the layers: their walls' rising parabolas are its polynomials of second order.
+/// The additions of Paper 002's law to the layers: their walls' rising parabolas are its polynomials of second order.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sparte {
     /// K of the tracking wall.
@@ -43,15 +43,15 @@ pub struct Sparte {
     pub relax_ms: u16,
     /// Share of the cutting force with which the tip goes on where a wall has just given way, 0–1.
     pub after_puncture: I16F16,
-    /// What cutting takes in each layer, outermost first.
+    /// The force of cutting in each layer, outermost first.
     pub cutting: Vec<Cutting, MAX_LAYERS>,
     /// Friction along the shaft.
     pub friction: Lugre,
-    /// What holds the direction of entry.
+    /// The fixture that holds the direction of entry.
     pub fixture: Fixture,
 }
 
-/// What cutting in one layer takes.
+/// The force of cutting in one layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Cutting {
     /// On the way in.
@@ -91,7 +91,7 @@ pub struct Fixture {
 pub(crate) struct Plan {
     walls: Vec<wall::Wall, MAX_LAYERS>,
     walls_that_close: usize,
-    /// Of each layer.
+    /// One entry for each layer.
     cuts: Vec<Cutting, MAX_LAYERS>,
     /// 1/K of the tracking wall.
     inverse_tracking: I16F16,
@@ -149,7 +149,7 @@ impl Plan {
     }
 }
 
-/// What the needle has done so far.
+/// The needle's history so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     /// w.

@@ -49,7 +49,7 @@ const ANOTHER_ENTRY: I16F16 = I16F16::from_bits(3 << 16);
 /// The force of an insertion over depth, speed along the needle and angle to the skin.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ForceTable {
-    /// Of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or below the skin. Depth is perpendicular to it, as the layers' are. In
+    /// The depth of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or below the skin. Depth is perpendicular to it, as the layers' are. In
     /// the order of `forces`, or one for each knot where it lies at the same depth in all cells.
     pub depths: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     /// Rising.
@@ -69,13 +69,13 @@ pub struct ForceTable {
     pub withdrawal: I16F16,
 }
 
-/// What the tick needs beside the table.
+/// The values that the tick needs in addition to the table.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// Of each knot and cell, the least force from there on: what the needle feels in its track.
+    /// The least force from each knot and cell on: the force on the needle in its track.
     hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     knots: usize,
-    /// How many depths a knot has, and how many further the next cell's is.
+    /// The number of depths of a knot, and the distance to the next cell's.
     depth_row: usize,
     depth_cell: usize,
     cells: usize,
@@ -97,7 +97,7 @@ struct Rupture {
     layer: u8,
 }
 
-/// Where the tip is among the knots of its cells.
+/// The tip's place among the knots of its cells.
 #[derive(Clone, Copy, Debug)]
 struct Position {
     knot: usize,
@@ -168,7 +168,7 @@ impl Plan {
         table.depths.get(index).copied().map_or(0, i32::from)
     }
 
-    /// Where among the knots of these cells a depth lies. It is looked for from `near` on, a knot a tick: a needle that goes faster
+    /// Returns the place of a depth among the knots of these cells. It is looked for from `near` on, a knot a tick: a needle that goes faster
     /// than a knot a tick trips the device.
     fn position(&self, table: &ForceTable, cells: &Cells, near: usize, depth: I16F16) -> Position {
         // 0.01 mm in Q16: beyond the table's deepest knot, nothing changes.
@@ -206,7 +206,7 @@ fn between(from: i32, to: i32, share_q16: i32) -> i32 {
 struct Track {
     /// Up to where it reaches, in knots, Q16.
     front: u32,
-    /// How many layers have given way on it.
+    /// The number of layers that have given way on it.
     given: usize,
     /// A bit for each of them.
     open: u8,
@@ -250,7 +250,7 @@ impl Track {
     }
 }
 
-/// What the needle has done so far.
+/// The needle's history so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     /// w.
@@ -321,19 +321,19 @@ impl Memory {
         Response { force, state, estimated, ruptured, open: self.track.open, ..Response::NONE }
     }
 
-    /// Whether the tip is where the layer that gave way last falls.
+    /// True if the tip is where the layer that gave way last falls.
     fn falls(&self, plan: &Plan, position: Position) -> bool {
         let last = self.track.given.checked_sub(1).and_then(|last| plan.ruptures.get(last));
         last.is_some_and(|last| last.knot == position.knot)
     }
 
-    /// Whether the tip pushes in the layer that gives way next.
+    /// True if the tip pushes in the layer that gives way next.
     fn presses(&self, plan: &Plan, met: &Insertion, depth: Millimetres) -> bool {
         plan.ruptures.get(self.track.given).is_some_and(|next| depth.0 >= met.top(next.met))
     }
 }
 
-/// Of each knot and cell, the least of its force and those of the knots below it.
+/// Returns, for each knot and cell, the least of its force and those of the knots below it.
 fn hull(forces: &[u16], cells: usize) -> Vec<u16, { MAX_DEPTHS * MAX_CELLS }> {
     let mut hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }> = forces.iter().copied().collect();
     for index in (0..hull.len().saturating_sub(cells)).rev() {

@@ -50,7 +50,7 @@ impl Needle {
         }
     }
 
-    /// Where each layer is touched and where it gives way on the way to `mm`.
+    /// Returns the depths at which each layer is touched and gives way on the way to `mm`.
     fn met(&mut self, mm: f64) -> (Vec<Met>, Vec<Met>) {
         let (mut contacts, mut punctures) = (Vec::new(), Vec::new());
         self.go(mm, |out| {
@@ -103,7 +103,7 @@ fn a_wall_that_holds_carries_the_next_one_along() {
 }
 
 #[test]
-fn what_is_left_of_the_skins_indentation_delays_the_next_layer_until_the_relief_is_over() {
+fn skin_indentation_delays_the_next_layer_until_relieved() {
     // Given way at 3 mm, 0.3 of it left, gone at 4 mm: a layer 3.5 mm deep is met where x = 3.5 + 0.9·(4 − x).
     let mut config = Config::commissioned_virtual();
     config.patient.layers[1].depth = Millimetres(q(3.5));
@@ -159,7 +159,7 @@ fn through(needle: &mut Needle, mm: f64) -> (Vec<VesselState>, usize) {
 }
 
 #[test]
-fn a_vessel_is_touched_entered_and_left_through_its_far_wall_and_blood_shows_from_either_side() {
+fn blood_shows_in_a_vessel_entered_from_either_side() {
     use VesselState::{InLumen, Outside, Through, Touching};
     let mut needle = Needle::new(&Config::commissioned_virtual(), 30.0);
     assert_eq!(through(&mut needle, 13.0), (vec![Outside, Touching, InLumen], 1));
@@ -171,7 +171,7 @@ fn a_vessel_is_touched_entered_and_left_through_its_far_wall_and_blood_shows_fro
 }
 
 #[test]
-fn a_needle_off_the_axis_meets_less_of_the_vessel_and_far_off_none_of_it() {
+fn a_needle_off_the_axis_crosses_less_of_the_vessel() {
     let beside = |offset: f64| {
         let mut config = Config::commissioned_virtual();
         config.patient.vessel = Some(Vessel { width: Millimetres(q(4.0)), offset: Millimetres(q(offset)) });
@@ -214,7 +214,7 @@ fn a_tilt_that_trembles_makes_no_layer_come_and_go() {
 }
 
 #[test]
-fn a_needle_that_is_flattened_leaves_the_layers_it_no_longer_reaches() {
+fn a_flattened_needle_leaves_layers_that_it_no_longer_reaches() {
     let mut needle = Needle::new(&Config::commissioned_virtual(), 30.0);
     needle.go(12.0, |_| ());
     assert_eq!(needle.tick().vessel, VesselState::InLumen);

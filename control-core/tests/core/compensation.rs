@@ -1,4 +1,4 @@
-//! What is fed forward: fixed point against its floating-point twin, when it is on, and what is refused.
+//! Tests of the feedforward: fixed point against its floating-point twin, when it is on, and what is refused.
 
 use control_core::compensation::{Compensation, Friction, Gain, Gains, Wave};
 use control_core::config::Device;
@@ -294,7 +294,7 @@ fn weight_needs_no_angle_and_waves_wait_for_it() {
 }
 
 #[test]
-fn gains_change_while_it_runs_without_a_step_and_a_fault_ends_all_of_it() {
+fn gains_change_without_a_step_and_a_fault_ends_feedforward() {
     let weight = Compensation { weight: MillinewtonMetres(q(3.0)), gains: gains(0.9), ..Compensation::NONE };
     let mut controller = running(weight);
     let all = code_after(&mut controller, 4_000, 0, 1_571);
@@ -323,7 +323,7 @@ fn gains_change_while_it_runs_without_a_step_and_a_fault_ends_all_of_it() {
 }
 
 #[test]
-fn an_excitation_shows_the_mechanism_as_it_is_unless_it_asks_otherwise() {
+fn an_excitation_plays_without_compensation_unless_asked() {
     let weight = Compensation { weight: MillinewtonMetres(q(1.5)), gains: gains(0.8), ..Compensation::NONE };
     for compensated in [false, true] {
         let servo = Servo { stiffness: Stiffness::default(), damping: Damping::default() };

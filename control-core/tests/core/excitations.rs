@@ -42,7 +42,7 @@ fn ladder(steps: u8, ratio: f64) -> Signal {
 }
 
 #[test]
-fn a_staircase_dwells_at_each_speed_there_and_back_and_begins_again() {
+fn a_staircase_dwells_at_each_speed_and_repeats() {
     let seen = targets(&staircase(3, 2.0), 8_000);
     for (tick, target) in seen.iter().enumerate() {
         let (leg, step) = (tick / 1_000, tick / 2_000 % 3);
@@ -82,7 +82,7 @@ fn a_ladder_reverses_at_growing_amplitudes_and_begins_again() {
 }
 
 #[test]
-fn ramps_rise_evenly_from_zero_to_the_torque_one_way_and_then_the_other() {
+fn ramps_rise_evenly_in_one_direction_then_in_the_other() {
     let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(q(6.0)), ramp_ms: 100 };
     for (tick, target) in targets(&ramps, 5_000).into_iter().enumerate() {
         let rising = 6.0 * (tick % 1_000 + 1) as f64 / 1_000.0;
@@ -183,7 +183,7 @@ fn the_last_step_of_a_series_is_what_has_to_fit() {
 }
 
 #[test]
-fn the_servo_pulls_with_its_stiffness_and_damps_with_its_damping() {
+fn the_servo_has_its_stiffness_and_damping() {
     let servo = Servo { stiffness: Stiffness(q(0.2)), damping: Damping(I8F24::from_num(0.002)) };
     let plan = Config::commissioned_virtual().plan().expect("sound");
     let mnm_per_step = 28.8 / 2047.0;

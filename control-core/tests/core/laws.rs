@@ -1,4 +1,4 @@
-//! What the laws do where a person would notice: at rest, on the way in, on the way out, at a fault.
+//! Tests of the laws where a person would notice: at rest, on the way in, on the way out, at a fault.
 
 use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall};
 use control_core::event::{Fault, State};
@@ -121,7 +121,7 @@ fn a_tip_drawn_back_a_little_rubs_in_the_layer_above() {
 }
 
 #[test]
-fn a_resting_needle_keeps_its_force_with_the_cone_and_loses_it_as_printed() {
+fn a_resting_needle_keeps_its_force_only_with_the_cone() {
     for (law, held) in [(cone(), true), (paper(), false)] {
         let mut c = started(&Config {
             patient: Patient { law: Law::Jog(law), ..Patient::default() },
@@ -332,7 +332,7 @@ fn orders_that_do_not_fit_the_mode_change_nothing() {
 }
 
 #[test]
-fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
+fn an_excitation_stays_within_its_travel_and_ends_torque_off() {
     use control_core::excitation::{Excitation, Servo, Signal};
     use control_core::units::{Damping, MillinewtonMetres};
     let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(5)), ramp_ms: 200 };
@@ -360,7 +360,7 @@ fn an_excitation_ends_with_torque_off_and_stays_within_its_travel() {
 }
 
 #[test]
-fn an_encoder_without_a_count_under_torque_is_dead_and_a_resting_needle_is_not() {
+fn no_count_under_torque_is_a_dead_encoder_but_rest_is_not() {
     let mut c = started(&Config::commissioned_virtual());
     let mut at = 0.0;
     travel(&mut c, &mut at, 2.5, 10.0, |_| {});
@@ -414,7 +414,7 @@ fn six_walls() -> Config {
 }
 
 #[test]
-fn a_needle_that_jumps_crosses_every_layer_and_wall_on_its_way_and_no_other() {
+fn a_needle_that_jumps_crosses_each_layer_on_its_way() {
     let mut c = started(&six_walls());
     let per_count = c.plan().mm_per_count().to_num::<f64>();
     // One layer a tick: all that is crossed until the tip has come to rest, and in which order.

@@ -101,7 +101,7 @@ fn the_first_of_two_faults_is_told() {
 }
 
 #[test]
-fn the_zero_is_where_the_needle_is_and_moves_only_while_torque_is_off() {
+fn the_zero_moves_to_the_needle_only_while_torque_is_off() {
     let mut c = controller();
     tick(&mut c, 500);
     c.order(Order::Zero);
@@ -134,7 +134,7 @@ fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
 }
 
 #[test]
-fn an_excitation_begins_where_the_motor_is_and_only_while_torque_is_off() {
+fn an_excitation_begins_at_the_motor_only_while_torque_is_off() {
     let mut c = controller();
     tick(&mut c, 1_000);
     c.order(Order::Excite(ramps(2)));
@@ -154,7 +154,7 @@ fn an_excitation_begins_where_the_motor_is_and_only_while_torque_is_off() {
 }
 
 #[test]
-fn an_encoder_may_move_as_far_in_a_tick_as_the_limit_and_no_further() {
+fn an_encoder_jump_beyond_the_limit_of_a_tick_trips() {
     let most = i32::from(Config::commissioned_virtual().device.limits.max_counts_per_tick);
     for direction in [-1, 1] {
         assert_eq!(tick(&mut started_at(0), direction * most).tripped, None);
@@ -178,7 +178,7 @@ fn a_needle_may_go_to_the_end_of_its_travel_and_no_further() {
 }
 
 #[test]
-fn a_pc_may_be_silent_as_long_as_the_heartbeat_time_and_no_longer() {
+fn a_pc_silent_for_longer_than_the_heartbeat_time_trips() {
     let silence = i32::from(Config::commissioned_virtual().device.limits.heartbeat_ms) * 10;
     let mut c = started_at(0);
     c.order(Order::Heartbeat);

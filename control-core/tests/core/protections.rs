@@ -179,7 +179,7 @@ fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &Ti
 }
 
 #[test]
-fn torque_falls_to_the_continuous_one_before_the_winding_is_as_hot_as_it_may_be() {
+fn torque_falls_before_the_winding_reaches_its_limit() {
     // The winding by itself, in floating point: the mean square over its time constant.
     let (mut heat, mut hottest, mut last, mut told, mut faults) = (0.0, 0.0_f64, 0.0, false, 0);
     hold_strong(28.8, 20, |torque, output| {

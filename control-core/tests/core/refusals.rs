@@ -1,4 +1,4 @@
-//! What may not run is refused with the reason; the last value that may run is not.
+//! Tests that a configuration which may not run is refused with the reason; the last value that may run is not.
 
 use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 use control_core::plan::Field;
@@ -256,7 +256,7 @@ fn each_refusal_says_what_to_do() {
 }
 
 #[test]
-fn no_patient_raises_the_devices_ceiling_and_one_may_ask_for_less() {
+fn a_patient_may_lower_the_devices_ceiling_but_not_raise_it() {
     let wants = |force: f64| {
         refusal(|config| {
             config.patient.largest_force = Some(Newtons(q(force)));
@@ -287,9 +287,9 @@ fn any_device_that_may_be_bears_nobody() {
     assert!(Plan::new(&device, &nobody).is_err());
 }
 
-/// What a plan says of itself.
+/// Tests of a plan's own figures.
 #[test]
-fn a_plan_knows_its_force_its_layers_and_its_torque_of_a_dead_encoder() {
+fn a_plan_has_force_layers_and_torque_of_a_dead_encoder() {
     let plan = Config::commissioned_virtual().plan().expect("sound");
     assert_eq!(plan.largest_force().0, q(28.8).saturating_div(q(10.0)));
     assert_eq!(plan.tissue(0), Some(Tissue::Skin));

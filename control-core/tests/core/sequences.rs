@@ -256,7 +256,7 @@ fn nothing_is_left_of_a_sequence_that_was_cut_short() {
 }
 
 #[test]
-fn a_sequence_plays_on_a_commissioned_device_whose_torque_is_off() {
+fn a_sequence_needs_a_commissioned_device_with_torque_off() {
     let prepared = || uploaded(&[segment(ramps(1.0), 500)]).expect("sound").prepared(&plan()).expect("sound");
     let mut unknown = Controller::new(Config::default().plan().expect("the default is sound"));
     unknown.order(Order::Play(prepared()));

@@ -289,7 +289,7 @@ fn a_trembling_hand_that_rests_reads_as_friction() {
 }
 
 #[test]
-fn a_needle_that_stops_keeps_the_friction_that_holds_it_and_stays_there() {
+fn a_needle_that_stops_is_held_by_friction() {
     let mut needle = Needle::new(&shoulder(), STRAIGHT);
     needle.go(15.0, 10.0, |_| ());
     let moving = force(&needle.tick());
@@ -314,7 +314,7 @@ fn on_the_way_out_forces_have_magnitudes_of_their_own() {
 }
 
 #[test]
-fn the_fixture_holds_the_direction_of_entry_up_to_its_largest_angle() {
+fn the_fixture_holds_the_direction_up_to_its_largest_angle() {
     let mut needle = Needle::new(&shoulder(), STRAIGHT);
     needle.go(10.0, 10.0, |_| ());
     assert_eq!(needle.tick().lateral, Newtons::default());
@@ -336,7 +336,7 @@ fn the_fixture_holds_the_direction_of_entry_up_to_its_largest_angle() {
 }
 
 #[test]
-fn more_than_the_motor_gives_is_refused_unless_a_scale_is_declared() {
+fn more_than_the_motors_force_needs_a_declared_scale() {
     let mut config = shoulder();
     config.patient.scale = I16F16::ONE;
     let refused = config.plan().err();

@@ -78,7 +78,7 @@ fn depth_may_count_from_a_displaced_surface() {
 }
 
 #[test]
-fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
+fn a_steady_insertion_feels_the_tables_force() {
     let config = config(table(rising));
     for (speed, angle, measured) in [
         (1.0, 1_047, true),
@@ -113,7 +113,7 @@ fn an_insertion_at_constant_speed_and_angle_feels_the_tables_force() {
 }
 
 #[test]
-fn a_resting_needle_keeps_its_force_and_a_withdrawn_one_is_held_by_a_share_of_it() {
+fn a_resting_needle_keeps_its_force_a_withdrawn_one_a_share() {
     let config = config(table(rising));
     let mut needle = Needle::new(&config, Milliradians(1_047));
     needle.go(12.0, 5.0, |_| ());

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn bristles_take_the_place_of_dry_friction_where_its_sign_is_unknown() {
+    fn bristles_replace_dry_friction_where_its_sign_is_unknown() {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
         assert!(near(after_a_slide(0.1, false)[0], 0.0), "sliding on, dry friction is whole");
         assert!(near(after_a_slide(-0.1, false)[0], -2.0), "turned round, the bristles still push back");
@@ -149,8 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn an_inertia_along_the_travel_takes_its_part_of_the_acceleration_and_half_its_slope_of_the_square_of_speed()
-     {
+    fn an_inertia_along_the_travel_has_its_slopes_force_too() {
         let shape = [("low", 0.0), ("high", 4.0), ("degree", 2.0), ("of_inertia", 1.0)];
         let mut law = Law::new(&Effect::shaped(EffectName::PositionDependentDamping, &shape)).unwrap();
         let mut out = [0.0; 2];
@@ -162,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_passed_within_a_step_averages_out_alike_by_series_and_by_sine() {
+    fn a_waves_mean_over_a_step_is_equal_by_series_and_by_sine() {
         for x in [1e-9_f64, 1e-3, 0.1, 0.299_999, 0.300_001, 2.0, -0.2] {
             assert!((sinc(x) - x.sin() / x).abs() < 4e-16, "{x}");
         }

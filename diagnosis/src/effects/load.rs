@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn one_step_of_the_grip_ends_where_it_carries_what_it_was_pushed_by() {
+    fn one_step_of_the_grip_ends_at_equilibrium() {
         for most in [0.0, 0.3, 4.0, 200.0] {
             for pushed in [-300.0, -1.0, 0.0, 0.7, 2.0 + 0.9 * most, 2.0 + most, 3.0 + 2.0 * most] {
                 let x = after_grip(pushed, most);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grip_below_its_ceiling_drives_the_load_and_above_it_the_motor() {
+    fn a_grip_below_its_ceiling_drives_load_above_it_motor() {
         // At its ceiling the grip carries half a unit of command as acceleration of both together.
         assert!(settled(0.2, 0.0).abs() < 1e-3, "it holds");
         assert!((settled(2.0, 0.0) - 1.5).abs() < 0.05, "what is beyond the ceiling drives the motor alone");

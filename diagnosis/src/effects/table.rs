@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_is_straight_between_its_places_level_beyond_and_may_jump() {
+    fn a_table_is_linear_between_places_and_constant_beyond() {
         let table = Table {
             over: vec![Variable::Speed],
             grid: vec![vec![-2.0, 0.0, 0.0, 2.0]],

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_misspelt_key_is_named_with_the_nearest_and_a_misplaced_one_with_its_place() {
+    fn a_misspelt_or_misplaced_key_is_named_with_the_right_one() {
         let said = |text: &str| unknown(&text.parse().expect("it is TOML"));
         assert_eq!(said("format = 1\n[model]\ninertia = 1.0\nviscous = 2.0"), None);
         assert_eq!(

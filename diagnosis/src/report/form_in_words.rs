@@ -263,7 +263,7 @@ fn along(variable: Variable, places: &[f64], values: &[(f64, f64)], length: &str
     }
 }
 
-/// Where a sequence turns by more than a threshold, the end of each run and whether that was upward; the last is its end.
+/// Returns the end of each run between turns by more than a threshold, and true if the run was upward; the last is the sequence's end.
 fn turns(values: &[f64], threshold: f64) -> Vec<(usize, bool)> {
     let mut out = Vec::new();
     let (mut highest, mut lowest) = (0, 0);
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn forms_over_two_variables_are_told_by_the_one_or_both_that_matter() {
+    fn forms_over_two_variables_are_described_by_those_that_matter() {
         let of =
             |force: &dyn Fn(f64, f64, f64) -> f64| told(Some((Variable::Travel, line(0.0, 5.0, 11))), force);
         assert_eq!(

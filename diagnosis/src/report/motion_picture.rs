@@ -1,4 +1,4 @@
-//! What a person means by "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
+//! The picture of "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
 
 use crate::numerics::digits::short;
 use crate::report::axes::{HIGH, close, frame, safe};

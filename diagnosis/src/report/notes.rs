@@ -1,4 +1,4 @@
-//! What a refit did that a reader has to know: commands that act early or late, an inertia far from the rig's.
+//! Notes on a refit that a reader has to know: commands that act early or late, an inertia far from the rig's.
 
 use crate::pipeline::diagnosis::Moved;
 

@@ -34,7 +34,7 @@ pub struct Evidence {
     pub rate_hz: Option<f64>,
 }
 
-/// What a report was made from and by: for its footer.
+/// The sources and the program of a report, for its footer.
 #[derive(Debug, Clone)]
 pub struct Made {
     /// The program with its version.
@@ -48,7 +48,7 @@ pub struct Made {
 /// The outcome of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// What it was made from, where the caller says it.
+    /// Its sources, if the caller gives them.
     pub made: Option<Made>,
     /// `diagnosis.json`.
     pub report: Report,

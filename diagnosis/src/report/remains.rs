@@ -2,11 +2,11 @@
 
 use crate::io::schema::{Report, Verdict};
 
-/// What remains over the sensor's noise from which there is more to be found, and below which there is nothing.
+/// The residual over the sensor's noise from which there is more to be found, and below which there is nothing.
 pub(crate) const MORE: f64 = 3.0;
 const NOTHING: f64 = 1.5;
 
-/// What the patched model leaves on held-out recordings, over the residual that the sensor's noise alone causes; none where
+/// The patched model's residual on held-out recordings, over the residual that the sensor's noise alone causes; none where
 /// nothing was fitted, or the sensor has no noise to speak of.
 pub(crate) fn of_noise(report: &Report) -> Option<f64> {
     let ratio = report.fit.patched.holdout / report.noise_floor;

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_opens_with_the_sentence_then_motion_then_force_then_what_to_do() {
+    fn the_page_has_sentence_motion_force_and_advice_in_order() {
         let (truth, viscous) = (Rig::of_values(2e-3, 4e-3, 1e-2), Rig::of_values(2e-3, 4e-3, 0.0));
         let recording = recorded(&truth);
         let models = vec![("nominal".to_owned(), viscous), ("patched".to_owned(), truth)];

@@ -10,7 +10,7 @@ use diagnosis::simulation::{Plant, Surroundings};
 use std::f64::consts::TAU;
 
 #[test]
-fn a_start_in_motion_leaves_no_force_whatever_the_unit_of_length() {
+fn a_start_in_motion_leaves_no_force_in_any_unit() {
     let taken = Taken { start: (0.0, 2.5), ..BENCH };
     let take = |seed| record(AXIS, taken, seed, mixed(14.0, seed as f64));
     let (fit, holdout) = (take(1), take(2));
@@ -81,7 +81,7 @@ fn a_minute_of_rest_costs_no_answer() {
 }
 
 #[test]
-fn ten_recordings_of_a_second_tell_together_what_none_tells_alone() {
+fn ten_recordings_show_together_what_none_shows_alone() {
     let taken = Taken { seconds: 1.0, ..BENCH };
     let take = |seed| record(AXIS, taken, seed, mixed(20.0, 2.0 * seed as f64));
     let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
@@ -94,7 +94,7 @@ fn ten_recordings_of_a_second_tell_together_what_none_tells_alone() {
 }
 
 #[test]
-fn dry_friction_that_differs_with_direction_is_found_where_neither_part_is_in_the_rig() {
+fn asymmetric_friction_is_found_with_no_friction_in_the_rig() {
     let machine = Machine { forward: 2.0, backward: 4.5, ..AXIS };
     let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));
     let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", BENCH.counts);
@@ -105,7 +105,7 @@ fn dry_friction_that_differs_with_direction_is_found_where_neither_part_is_in_th
 }
 
 #[test]
-fn a_machine_without_inertia_to_speak_of_has_friction_and_no_dead_drive() {
+fn a_machine_of_little_inertia_has_friction_and_a_live_drive() {
     let machine = Machine { inertia: 1e-4, viscous: 2.0, ..AXIS };
     let taken = Taken { seconds: 12.0, counts: 5000.0, ..BENCH };
     let slow = |phase: f64| {
@@ -121,7 +121,7 @@ fn a_machine_without_inertia_to_speak_of_has_friction_and_no_dead_drive() {
 }
 
 #[test]
-fn a_refit_is_not_kept_where_the_rigs_own_values_explain_held_out_recordings_better() {
+fn a_refit_that_is_worse_on_held_out_recordings_is_dropped() {
     let other = Machine { inertia: 2.6, viscous: 11.0, ..AXIS };
     let fit = record(other, BENCH, 1, mixed(14.0, 1.0));
     let holdout = record(AXIS, BENCH, 2, mixed(14.0, 2.0));
@@ -142,7 +142,7 @@ fn a_delay_that_the_rig_knows_is_not_missing() {
 }
 
 #[test]
-fn a_lag_an_offset_and_a_filter_that_the_rig_knows_are_not_missing() {
+fn a_declared_lag_offset_and_filter_are_not_missing() {
     let model = format!("{WHOLE}\noffset = 1.5");
     let machine = Machine { lag_s: 0.02, offset: 1.5, filter_s: 0.004, ..AXIS };
     let take = |seed| record(machine, BENCH, seed, mixed(16.0, seed as f64));

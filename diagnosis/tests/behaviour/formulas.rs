@@ -39,7 +39,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_formula_that_is_hidden_in_the_machine_is_found_under_its_own_name_and_simulated() {
+fn a_hidden_formula_is_found_by_its_name_and_simulated() {
     let dir = folder("formulas");
     let write = |name: &str, text: &str| std::fs::write(dir.join(name), text).expect("written");
     let hidden = format!(

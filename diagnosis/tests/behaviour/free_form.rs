@@ -40,7 +40,7 @@ fn under_feedback_no_form_takes_what_a_null_leaves() {
 }
 
 #[test]
-fn the_force_without_a_name_runs_in_the_simulator_as_it_was_fitted() {
+fn the_free_form_force_runs_in_the_simulator_as_fitted() {
     let outcome = diagnosed("sine_of_speed", true);
     let told = outcome.report.free_form.expect("the form is told");
     assert!(told.holdout_gain.is_some_and(|gain| gain > 0.0), "{told:?}");

@@ -76,7 +76,7 @@ fn each_folder_uses_only_those_before_it() {
 const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
 
 #[test]
-fn the_sources_hold_no_file_beside_the_folders_but_the_numbers_that_decide() {
+fn only_thresholds_stands_beside_the_folders() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for entry in fs::read_dir(&root).expect("the folder is there") {
         let name = entry.expect("its entries can be read").file_name();

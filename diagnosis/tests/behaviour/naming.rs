@@ -118,7 +118,7 @@ fn no_effect_gains_on_a_null(seeds: &[u64]) {
 }
 
 #[test]
-fn the_held_out_gain_of_a_hypothesis_is_the_likelihood_that_its_reason_tells() {
+fn a_hypothesis_and_its_reason_have_one_held_out_gain() {
     let mut told = 0;
     for effect in ["stribeck_friction", "gain_drift", "cogging"] {
         let outcome = on_bench(&bench(effect), &bench(effect));
@@ -172,7 +172,7 @@ fn small_effects_are_found(effects: &[(&'static str, f64, N)]) {
 
 #[test]
 #[ignore = "nightly: 60,000 rows, 15 s"]
-fn a_gain_that_falls_with_the_copper_loss_is_found_with_its_size_and_time() {
+fn a_gain_that_falls_with_copper_loss_is_found_with_its_size() {
     let setup = Setup { seconds: 20.0, ..bench("gain_drift_by_loss") };
     let outcome = on_bench(&setup, &setup);
     let found = outcome

@@ -25,7 +25,7 @@ fn a_push_that_has_no_name_alone_is_not_named() {
 }
 
 #[test]
-fn friction_that_only_a_cold_axis_has_needs_no_dry_friction_in_the_rig() {
+fn friction_of_a_cold_axis_is_found_without_it_in_the_rig() {
     let machine = Machine { push: 2.0, forward: 0.2, backward: 0.2, cold: 60.0, disturbance: 0.0, ..AXIS };
     let outcome = pushed(machine, "inertia = 2.0\nviscous = 8.0");
     let named = outcome.report.effects.iter().find(|effect| effect.class.contains(&N::FrictionDrift));

@@ -42,7 +42,7 @@ fn a_pure_disturbance_is_called_one() {
 }
 
 #[test]
-fn a_force_that_swings_by_itself_is_told_with_its_frequency_and_not_named() {
+fn a_swinging_force_is_reported_by_frequency_and_not_named() {
     for closed in [false, true] {
         let outcome = run(&rig(OFF, OFFSET), &Setup { closed, ..setup("hum") });
         assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
@@ -91,7 +91,7 @@ fn an_effect_as_large_as_the_force_is_named_alone() {
 }
 
 #[test]
-fn bristles_of_one_length_and_of_many_are_told_apart_and_named_with_their_stiffness() {
+fn bristles_of_one_length_and_of_many_are_distinguished() {
     // Nine lengths over a decade are stiffer from straight than all of the middle one.
     let stiffer = (0..9).map(|i| 10_f64.powf(0.5 - f64::from(i) / 8.0)).sum::<f64>() / 9.0;
     let cases = [
@@ -112,7 +112,7 @@ fn bristles_of_one_length_and_of_many_are_told_apart_and_named_with_their_stiffn
 }
 
 #[test]
-fn a_grip_that_lets_go_is_found_although_the_rig_has_the_machine_wrong() {
+fn roller_slip_is_found_although_the_rig_is_wrong() {
     // Its law stands on the machine and on a force that is there all the time, another one in each recording.
     let outcome = run(&rig(OFF, OFFSET), &setup("grip"));
     let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
@@ -124,7 +124,7 @@ fn a_grip_that_lets_go_is_found_although_the_rig_has_the_machine_wrong() {
 }
 
 #[test]
-fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
+fn dry_and_asymmetric_friction_are_named_together() {
     // Neither carries to the held-out recording without the other, and a preloaded spring is no friction.
     let mut rig = rig(OFF, "");
     rig.model.coulomb = None;
@@ -137,7 +137,7 @@ fn dry_friction_and_how_it_differs_by_direction_are_named_together() {
 }
 
 #[test]
-fn a_drift_is_a_part_of_the_friction_as_it_is_and_not_as_the_rig_has_it() {
+fn a_drift_is_relative_to_the_actual_friction() {
     let rig = rig([0.06, -0.3, -0.7, -0.03], OFFSET);
     let outcome = run(&rig, &Setup { size: 1.7, ..setup("friction_drift") });
     let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
@@ -170,7 +170,7 @@ fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
 }
 
 #[test]
-fn a_load_that_changes_at_once_is_no_drift_and_the_report_says_what_it_resembles() {
+fn a_load_step_is_no_drift_and_the_report_names_its_likeness() {
     for closed in [false, true] {
         let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size: 0.2, ..setup("heavier_load") });
         assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
@@ -185,7 +185,7 @@ fn a_load_that_changes_at_once_is_no_drift_and_the_report_says_what_it_resembles
 }
 
 #[test]
-fn a_gear_that_loses_a_part_of_what_it_carries_is_no_effect_of_the_library() {
+fn a_lossy_gear_is_no_effect_of_the_library() {
     let mut as_gear = 0;
     for (closed, size, why) in
         [(false, 2.0, "it resembles"), (false, 0.6, "would explain 99 %"), (true, 1.2, "would explain 100 %")]
@@ -217,7 +217,7 @@ fn what_has_no_name_is_told_where_it_alone_explains_most() {
 }
 
 #[test]
-fn counts_that_only_one_of_the_fitted_recordings_loses_are_counts_lost() {
+fn counts_lost_in_only_one_recording_are_missed_counts() {
     let missed = setup("missed_counts");
     let fit = [record(&setup("none"), 1), record(&missed, 3)];
     let outcome = diagnose_recordings(&rig(OFF, OFFSET), &fit, &[record(&missed, 2)], &|_, _| ());

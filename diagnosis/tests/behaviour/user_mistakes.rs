@@ -102,7 +102,7 @@ fn a_recording_without_a_mistake_is_diagnosed() {
 }
 
 #[test]
-fn units_signs_and_columns_that_are_mistaken_get_the_sentence_that_helps() {
+fn wrong_units_signs_and_columns_get_a_sentence_that_helps() {
     let counts = 636.62;
     helps(
         "radians as counts",
@@ -217,7 +217,7 @@ const MISTAKES: [(&str, &str, &str, &str); 10] = [
 ];
 
 #[test]
-fn files_and_keys_that_are_mistaken_are_refused_with_their_place() {
+fn wrong_files_and_keys_are_refused_with_their_place() {
     let dir = folder("mistakes");
     let path = |name: &str| dir.join(name);
     let write = |name: &str, text: &str| std::fs::write(path(name), text).expect("written");

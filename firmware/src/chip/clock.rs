@@ -7,7 +7,7 @@ use stm32f4xx_hal::pac::{DBGMCU, FLASH, RCC};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 
-/// What the board has on OSC_IN (RM0090 7.2.1).
+/// The source on the board's OSC_IN (RM0090 7.2.1).
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[allow(dead_code, reason = "a board has one of them")]
 pub(crate) enum Source {

@@ -37,14 +37,14 @@ use firmware::store::Nor;
 use firmware::tilt::TiltSource;
 use stm32f4xx_hal::pac::{Interrupt, Peripherals};
 
-/// What a board with this microcontroller says of itself. The rest of [`Board`] is the microcontroller's.
+/// The properties of a board with this microcontroller. The rest of [`Board`] is the microcontroller's.
 pub(crate) trait Wiring: 'static {
     /// The amplifier's enable line: its pin.
     type Enable: OutputPin + Placed;
     /// The tilt sensors that may be there.
     type Tilt: TiltSource;
 
-    /// What nobody configures this board for.
+    /// A peripheral that this board does not use.
     const CEILINGS: Ceilings;
     /// The enable line past its owner.
     const ENABLE: Pin = <Self::Enable as Placed>::PIN;

@@ -19,7 +19,7 @@ impl Line {
         Self(pin.into_pull_down_input().erase())
     }
 
-    /// Whether the contact is closed.
+    /// True if the contact is closed.
     pub(crate) fn is_closed(&self) -> bool {
         self.0.is_high()
     }

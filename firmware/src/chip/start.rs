@@ -67,7 +67,7 @@ pub(crate) struct Own {
     pub(crate) debug: pac::DBGMCU,
 }
 
-/// What the board has made of its pins.
+/// The pins as the board has set them up.
 pub(crate) struct Wired<W: Wiring> {
     pub(crate) encoder: (Encoder, EncoderLines),
     pub(crate) drive: BoardDrive<Stm32F4<W>>,
@@ -76,7 +76,7 @@ pub(crate) struct Wired<W: Wiring> {
     pub(crate) lamps: Lamps,
 }
 
-/// What the tasks get.
+/// The parts that the tasks get.
 pub(crate) struct Parts<W: Wiring> {
     pub(crate) tick_timer: TickTimer,
     pub(crate) encoder: Encoder,

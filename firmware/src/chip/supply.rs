@@ -36,7 +36,7 @@ impl Supply {
 pub(crate) struct SupplyLevel(PWR);
 
 impl SupplyLevel {
-    /// Whether the supply is below the detector's level.
+    /// True if the supply is below the detector's level.
     pub(super) fn is_falling(&self) -> bool {
         self.0.csr().read().pvdo().bit()
     }

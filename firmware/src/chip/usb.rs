@@ -64,7 +64,7 @@ pub(crate) fn init(core: USB, serial: [u8; 12], statics: &'static mut Statics) -
     Port { device: builder.device_class(USB_CLASS_CDC).build(), class }
 }
 
-/// Whether the core's interrupt may come: not while there is no room for what it brings.
+/// True if the core's interrupt may come: not while there is no room for what it brings.
 pub(crate) fn allow_interrupt(allowed: bool) {
     if allowed {
         // SAFETY: no critical section is built on masking this interrupt.

@@ -32,7 +32,7 @@ impl Flash {
         self.noise as u32
     }
 
-    /// Whether the next operation is carried out whole.
+    /// True if the next operation is carried out whole.
     fn spend(&mut self) -> Result<bool, StoreError> {
         match self.operations_left {
             usize::MAX => Ok(true),
@@ -207,7 +207,7 @@ fn a_damaged_configuration_is_replaced_by_the_next_one() {
     assert_eq!(load(&mut flash), Stored::Found(device(40)));
 }
 
-/// What is in a device's flash must still be read by the next firmware: the layout is a promise.
+/// Tests that the next firmware reads the content of a device's flash: the layout is a promise.
 #[test]
 fn a_cell_is_laid_out_as_it_always_was() {
     assert_eq!(PAYLOAD_BYTES, 1024 - 4 * (HEADER_WORDS + 1), "all but header and the word that commits it");
@@ -279,7 +279,7 @@ fn saved_with_patient(fill: i16) -> Flash {
 }
 
 #[test]
-fn the_records_are_saved_apart_and_both_move_when_a_slot_is_full() {
+fn records_are_saved_apart_and_move_when_a_slot_is_full() {
     for fill in 1..4 * CELLS as i16 {
         let mut flash = saved_with_patient(fill);
         let both = (Stored::Found(device(9 + fill)), Stored::Found(patient(1)));
@@ -290,7 +290,7 @@ fn the_records_are_saved_apart_and_both_move_when_a_slot_is_full() {
 }
 
 #[test]
-fn losing_power_while_one_record_is_saved_or_moved_leaves_the_other_as_it_was() {
+fn losing_power_during_a_save_leaves_the_other_record_intact() {
     for fill in 1..2 * CELLS as i16 {
         let before = saved_with_patient(fill);
         for operations in 0.. {
@@ -338,7 +338,7 @@ fn a_flipped_bit_costs_the_record_that_it_is_in_and_no_other() {
 
 /// A firmware of the time when both parts were one record left this.
 #[test]
-fn a_cell_of_an_earlier_layout_is_neither_read_nor_called_damage() {
+fn a_cell_of_an_earlier_layout_is_not_read_and_not_damage() {
     let payload = [7_u8; 200];
     let header = MAGIC | 1 << 12 | payload.len() as u32;
     let mut flash = Flash::new();

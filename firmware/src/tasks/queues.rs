@@ -31,11 +31,11 @@ pub enum SmallOrder {
     Large(u8),
 }
 
-/// What a tick gave, with its number.
+/// The outputs of a tick, with its number.
 pub struct Ticked {
     /// Counts from power-on, the lower half of the number; a gap is what the queue had no room for.
     pub tick: u32,
-    /// What it gave.
+    /// Its outputs.
     pub output: TickOutput,
 }
 
@@ -57,7 +57,7 @@ pub struct Queues {
 pub struct TickEnds {
     /// From telemetry.
     pub orders: Consumer<'static, SmallOrder>,
-    /// What [`SmallOrder::Large`] stands for.
+    /// The order behind [`SmallOrder::Large`].
     pub large_orders: Consumer<'static, Order>,
     /// To telemetry.
     pub outputs: Producer<'static, Ticked>,
@@ -75,7 +75,7 @@ pub struct UsbEnds {
 pub struct TelemetryEnds {
     /// To the tick.
     pub orders: Producer<'static, SmallOrder>,
-    /// What [`SmallOrder::Large`] stands for.
+    /// The order behind [`SmallOrder::Large`].
     pub large_orders: Producer<'static, Order>,
     /// From the tick.
     pub outputs: Consumer<'static, Ticked>,

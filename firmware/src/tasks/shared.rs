@@ -18,7 +18,7 @@ pub struct Shared {
     pub reports: Reports,
     /// Faults on their way to the tick.
     pub trips: Trips,
-    /// What keeps the device from being started.
+    /// The causes that keep the device from being started.
     pub conditions: Conditions,
     /// Which session's orders the tick carries out: those of a PC that went are none of the next one's. Written by
     /// telemetry.
@@ -27,19 +27,19 @@ pub struct Shared {
     pub stages: Stages,
     /// Milliseconds that the supervisor has run; the tick watches it.
     pub supervised_ms: AtomicU32,
-    /// Whether the amplifier is on. Written by the tick.
+    /// True if the amplifier is on. Written by the tick.
     pub powered: AtomicBool,
-    /// Whether the encoder's lines are at one level. Written by the supervisor.
+    /// True if the encoder's lines are at one level. Written by the supervisor.
     pub lines_agree: AtomicBool,
     /// Ticks that came late or not at all. Written by the tick.
     pub missed_ticks: AtomicU32,
     /// Codes that were written after the converter's instant. Written by the tick.
     pub late_codes: AtomicU32,
-    /// What the USB host has done to us: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
+    /// The state that the USB host has set: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
     pub link: AtomicU8,
     /// Asks the USB task to throw away what waits for a PC that is gone. Set by telemetry.
     pub discard: AtomicBool,
-    /// What survives a reset.
+    /// The words that survive a reset.
     pub last_words: &'static LastWords,
     given: AtomicU16,
     tilt_mrad: AtomicI32,
@@ -67,7 +67,7 @@ impl Shared {
         }
     }
 
-    /// Whether torque is on.
+    /// True if torque is on.
     pub fn is_powered(&self) -> bool {
         self.powered.load(Relaxed)
     }

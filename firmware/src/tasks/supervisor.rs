@@ -41,7 +41,7 @@ impl<B: Board> Watch<B> {
         Self { shared, watchdog, supply, encoder, drive, supervisor: Supervisor::new(), ms: 0, said: false }
     }
 
-    /// What keeps the device from being started ends a run too.
+    /// A cause that keeps the device from being started ends a run too.
     fn look_at_conditions(&mut self) {
         self.shared.conditions.set(Interlock::Supply, self.supply.is_low());
         let (lines, watch) = &mut self.encoder;

@@ -33,7 +33,7 @@ impl Model {
         }
     }
 
-    /// What makes it measure at 100 Hz on three axes, ±2 g.
+    /// The settings that make it measure at 100 Hz on three axes, ±2 g.
     fn control(self) -> u8 {
         match self {
             // Power on, X, Y, Z.
@@ -60,7 +60,7 @@ impl Model {
         }
     }
 
-    /// Whether it resolves its own noise, so that the same values over and over mean that it hangs.
+    /// True if it resolves its own noise, so that the same values over and over mean that it hangs.
     fn shows_noise(self) -> bool {
         self == Self::Lis3dsh
     }
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_g_to_one_and_a_half_is_plausible_whichever_way_it_points() {
+    fn half_a_g_to_one_and_a_half_is_plausible_in_any_direction() {
         for axis in 0..3 {
             for (mg, plausible) in [(499, false), (500, true), (1_500, true), (1_501, false)] {
                 let along = |other: i32| if other == axis { -mg } else { 0 };

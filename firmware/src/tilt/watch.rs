@@ -4,7 +4,7 @@ use super::TiltTrouble;
 use crate::timing;
 use control_core::units::Milliradians;
 
-/// What a look at the sensor gave.
+/// The result of a look at the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// A new measurement.

@@ -25,17 +25,17 @@ pub const BUILT_IN: [(&str, &str); 7] = [
 
 /// An insertion at an even speed; [`insertion`] writes others like it.
 const INSERTION: &str = include_str!("../../procedures/insertion.toml");
-/// How deep such an insertion goes, perpendicular to the skin, mm.
+/// The depth of such an insertion, perpendicular to the skin, mm.
 const INSERTION_DEPTH_MM: f64 = 10.0;
 
 /// A procedure, resolved against a profile: depths are in mm past the zero.
 #[derive(Clone, Debug)]
 pub struct Procedure {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// How the hand holds the needle.
+    /// The grip of the hand on the needle.
     pub grip: Grip,
-    /// Where it begins and where every round ends, in mm.
+    /// The depth at which it begins and every round ends, in mm.
     pub start_mm: f64,
     /// The angle that it begins with, rad; without it, the profile's.
     pub entry_rad: Option<f64>,
@@ -46,14 +46,14 @@ pub struct Procedure {
     moves: Vec<Move>,
 }
 
-/// Where the hand wants the needle.
+/// The place where the hand wants the needle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Target {
     /// Past the zero, along the needle, mm.
     pub depth_mm: f64,
     /// mm/s.
     pub speed_mm_s: f64,
-    /// How much steeper than at the beginning, rad.
+    /// The angle by which it is steeper than at the beginning, rad.
     pub turned_rad: f64,
 }
 
@@ -137,7 +137,7 @@ impl Procedure {
         Some(self.tasks.get(task)?.name.as_str())
     }
 
-    /// Where the hand wants the needle `seconds` into the procedure. Rounds repeat.
+    /// Returns the place where the hand wants the needle `seconds` into the procedure. Rounds repeat.
     pub fn target(&self, seconds: f64) -> Target {
         let in_round = seconds.max(0.0) % self.round_s;
         let m = &self.moves[self.step_at(seconds)];
@@ -231,7 +231,7 @@ impl File {
 }
 
 impl Step {
-    /// How long it takes to go `way_mm`, s, and whether at an even speed.
+    /// Returns the time to go `way_mm`, s, and true if at an even speed.
     fn time(&self, way_mm: f64) -> Result<(f64, bool), String> {
         match (self.seconds, self.speed_mm_s) {
             (Some(seconds), None) => Ok((seconds, false)),
@@ -243,7 +243,7 @@ impl Step {
         }
     }
 
-    /// Where it ends, with the needle at `angle_rad` to the skin.
+    /// Returns the place where it ends, with the needle at `angle_rad` to the skin.
     fn target(&self, profile: &Profile, at_mm: f64, angle_rad: f64) -> Result<f64, String> {
         match (self.to_mm, self.past) {
             (Some(_), Some(_)) => {

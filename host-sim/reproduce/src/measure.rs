@@ -1,4 +1,4 @@
-//! What is read off a recording of a procedure: force over time and depth, what it was before and after a wall gave way.
+//! The measurements on a recording of a procedure: force over time and depth, what it was before and after a wall gave way.
 
 use control_core::TICK_HZ;
 use device_sim::failure::Failure;
@@ -90,7 +90,7 @@ impl Trace {
         from + still.unwrap_or(0)
     }
 
-    /// What became of the patient's target in the first insertion.
+    /// Returns the result for the patient's target in the first insertion.
     pub(super) fn target(&self, profile: &Profile) -> Option<Reached> {
         let judge = Judge::new(profile, &[], self.stretch.first_tick);
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
@@ -161,7 +161,7 @@ impl Trace {
         self.depth_at(index)
     }
 
-    /// What the force was just before a wall gave way at `index`, and the least of the fifth of a second after, N.
+    /// Returns the force just before a wall gave way at `index`, and the least of the fifth of a second after, N.
     pub(super) fn fall_n(&self, index: usize) -> (f64, f64) {
         let fifth = TICK_HZ as usize / 5;
         let before = self.largest_n(index.saturating_sub(fifth / 4)..index + 1);
@@ -169,17 +169,17 @@ impl Trace {
     }
 }
 
-/// Whether it is the puncture of this layer.
+/// True if it is the puncture of this layer.
 pub(super) fn is_puncture_of(layer: u8) -> impl Fn(&EventKind) -> bool {
     move |kind| matches!(kind, EventKind::Puncture { layer: which } if *which == layer)
 }
 
-/// Whether it is the contact with this layer.
+/// True if it is the contact with this layer.
 pub(super) fn is_contact_with(layer: u8) -> impl Fn(&EventKind) -> bool {
     move |kind| matches!(kind, EventKind::Contact { layer: which } if *which == layer)
 }
 
-/// Whether it is the exit from this layer.
+/// True if it is the exit from this layer.
 pub(super) fn is_exit_from(layer: u8) -> impl Fn(&EventKind) -> bool {
     move |kind| matches!(kind, EventKind::Exit { layer: which } if *which == layer)
 }

@@ -28,7 +28,7 @@ struct Cut {
 }
 
 impl Cut {
-    /// Whether the paper measured this cell of its design.
+    /// True if the paper measured this cell of its design.
     fn is_the_papers(&self) -> bool {
         self.angle == 60 || self.speed == 5
     }
@@ -154,7 +154,7 @@ fn put_table_1(sheet: &mut Sheet) {
     );
 }
 
-/// Where the layers are met and where they give way on one of the curves, mm along the needle.
+/// Returns the depths at which the layers are met and give way on one of the curves, mm along the needle.
 fn marks(profile: &Profile, cut: &Cut) -> Vec<(f64, String)> {
     let of = |number: u8, tissue: Tissue| {
         let named = |index: Option<usize>, what: &str| {
@@ -180,7 +180,7 @@ fn largest(cuts: &[Cut], measured: bool) -> Vec<Row> {
     cuts.iter().filter(|cut| cut.is_the_papers() == measured).map(of).collect()
 }
 
-/// What fit-force makes of the paper's five cells, beside the insertions that it was made from, and in a sentence how it tells the other four.
+/// Compares fit-force's table of the paper's five cells with the insertions that it was made from, and in a sentence how it tells the other four.
 fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Failure> {
     let read = |wanted: bool| -> Result<Vec<_>, Failure> {
         let files = cuts.iter().filter(|c| c.is_the_papers() == wanted).map(|c| insertions::read(&c.file));

@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// Eq. 2 as printed, in the place of the cone.
 const AS_PRINTED: &str = "[friction]\nlaw = \"paper\"\nlevel_length_mm = 23.0\nlevel_cap = 3.5\nanchor_ms = 50\nstiffness_n_per_mm = 0.25\nlimit_n = 0.3\n\n[[layer]]";
-/// How long the needle is held still, s: as the procedure says.
+/// The time for which the procedure holds the needle still, s.
 const HELD_S: f64 = 2.0;
 
 pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 use tissue::push::{BESIDE_MM, Division, Pushed, configurations, push};
 
-/// How far the needle pushes, mm.
+/// The distance that the needle pushes, mm.
 const DEPTH_MM: f32 = 5.0;
 /// Substeps of a step with which the energy is within a percent of the least.
 const FINE: u32 = 16;
@@ -27,7 +27,7 @@ struct Row {
     name: &'static str,
     particles: usize,
     pushed: Pushed,
-    /// Of Table 1 alone: the limb has too many particles to wait for.
+    /// The bodies of Table 1 alone: the limb has too many particles to wait for.
     fine: Option<Pushed>,
     /// Time that the picture's way took, s.
     seconds: f64,

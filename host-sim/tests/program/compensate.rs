@@ -130,7 +130,7 @@ fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
 }
 
 #[test]
-fn what_is_unstable_or_of_another_machine_is_refused_before_anything_moves() {
+fn an_unstable_or_foreign_compensation_is_refused_at_rest() {
     let asked = |rig: &Rig, share: f64| {
         let mut asked = false;
         let why = compensate::compensate(&mut line(rig_hidden()), rig, share, |_| {

@@ -125,7 +125,7 @@ fn peak(felt: &[(f64, f64)], from: f64, to: f64) -> f64 {
 }
 
 #[test]
-fn a_table_fitted_to_a_phantom_gives_its_forces_back_on_the_device() {
+fn a_table_fitted_to_a_phantom_reproduces_its_forces() {
     let dir = folder("fit-force-phantom");
     let record = |profile: &str, speed: u32, angle: u32, name: &str| {
         let file = dir.join(format!("{name}.mcap"));
@@ -190,7 +190,7 @@ fn written_force(depths: &[f64], forces: &[f64], depth: f64) -> f64 {
 const FIVE_CELLS: [(f64, f64); 5] = [(1.0, 60.0), (3.0, 60.0), (5.0, 60.0), (5.0, 30.0), (5.0, 45.0)];
 
 #[test]
-fn the_written_table_meets_a_strange_phantoms_peaks_within_3_percent() {
+fn a_written_table_meets_a_phantoms_peaks_within_3_percent() {
     let dir = folder("fit-force-strange");
     let takes = |from: u64| {
         FIVE_CELLS.iter().flat_map(move |(v, a)| (from..from + 3).map(move |take| (*v, *a, take)))
@@ -245,7 +245,7 @@ fn the_written_table_meets_a_strange_phantoms_peaks_within_3_percent() {
 }
 
 #[test]
-fn the_papers_five_cells_become_a_table_that_tells_the_other_four() {
+fn the_papers_five_cells_predict_the_other_four() {
     let dir = folder("fit-force");
     let cell = |(speed, angle): (f64, f64)| insertion(&dir, speed, angle, 0);
     let seen = FIVE_CELLS.map(cell);

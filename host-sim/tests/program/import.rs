@@ -63,7 +63,7 @@ fn holds_the_motion(recording: &Recording, per_unit: f64, begin: f64, gain: f64,
 }
 
 #[test]
-fn tables_of_pandas_numpy_and_matlab_and_json_give_the_same_motion() {
+fn pandas_numpy_matlab_and_json_give_the_same_motion() {
     let cases: [(&str, &[&str], f64, &[&str]); 12] = [
         ("pandas.csv", &[], 1.0, &["position is theta_deg, in rad", "command is tau [Nm], in N·m"]),
         (
@@ -113,7 +113,7 @@ fn tables_of_pandas_numpy_and_matlab_and_json_give_the_same_motion() {
 }
 
 #[test]
-fn an_mcap_of_the_python_package_gives_the_motion_in_either_compression() {
+fn an_mcap_of_python_gives_the_motion_in_either_compression() {
     for file in ["zstd.mcap", "lz4.mcap"] {
         let (said, recordings, per_unit) = import(&[file], &[]);
         assert!(said.contains("topics /joint, /drive") && said.contains("on the clock of /joint"), "{said}");
@@ -236,7 +236,7 @@ fn wraps_and_speeds_alone_become_positions() {
 }
 
 #[test]
-fn a_coarse_clock_a_gap_rest_and_files_that_go_on_are_mended_and_said() {
+fn a_coarse_clock_gaps_and_continued_files_are_mended_and_noted() {
     const PER_UNIT: f64 = 4096.0 / TAU;
     const COUNT: f64 = 1.01 / PER_UNIT;
     let (said, recordings, per_unit) = import(&["coarse.csv"], &["--column", "time=t:ms"]);
@@ -268,7 +268,7 @@ fn a_coarse_clock_a_gap_rest_and_files_that_go_on_are_mended_and_said() {
 }
 
 #[test]
-fn a_turned_sign_values_for_the_rig_and_a_cut_for_holding_out_are_taken_as_given() {
+fn sign_rig_values_and_hold_out_cut_are_taken_as_given() {
     let options = ["--column", "command=-tau [Nm]", "--split", "0.5", "--inertia", "0.02", "--gain", "1.5"];
     let (said, recordings, rig) = import_with_rig(&["pandas.csv"], &options);
     assert!(said.contains("its sign turned") && said.contains("next: host-sim diagnose --rig"), "{said}");
@@ -281,7 +281,7 @@ fn a_turned_sign_values_for_the_rig_and_a_cut_for_holding_out_are_taken_as_given
 }
 
 #[test]
-fn files_of_which_nothing_says_that_they_are_runs_are_asked_about() {
+fn files_that_may_or_may_not_be_runs_are_asked_about() {
     let out = folder("import-runs");
     let rows: String =
         (0..400).map(|i| format!("{},{},{}\n", i as f64 * 0.005, angle(i as f64 * 0.005), i % 7)).collect();

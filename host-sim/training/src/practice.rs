@@ -18,7 +18,7 @@ const ANGLE_WITHIN_DEG: f64 = 5.0;
 /// Places a second of the way that a page draws.
 const PATH_HZ: f64 = 25.0;
 
-/// What an insertion into a patient is for.
+/// The goal of an insertion into a patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Goal {
     /// Into the vein and not through it.
@@ -109,7 +109,7 @@ pub struct Attempt {
     pub by_person: bool,
     /// True if it has reached the goal.
     pub reached: bool,
-    /// What it lacks, each in words.
+    /// The criteria that it does not meet, each in words.
     pub missing: Vec<String>,
     /// The figures of `score`.
     pub figures: Insertion,

@@ -49,7 +49,7 @@ pub(super) struct Rerouted<'a> {
     pub(super) code_written: bool,
     /// True if the core is inspected after every instruction.
     pub(super) stepping: bool,
-    /// What the run asked of the core in this stretch.
+    /// The run's request to the core in this stretch.
     pub(super) asked: Vec<Queued>,
 }
 

@@ -45,7 +45,7 @@ struct Core {
 pub(super) struct WarmCore {
     core: Option<Core>,
     image: ImageKey,
-    /// What the board asked of it that outlives its state.
+    /// The board's requests that outlive its state.
     routed: Vec<u64>,
     breakpoints: Vec<u64>,
     mapped: Vec<(u64, u64)>,

@@ -144,7 +144,7 @@ fn felt_on_board(found: Option<&Found>) -> Felt {
 }
 
 #[test]
-fn a_hand_feels_a_quarter_of_the_mechanism_and_nowhere_more_than_before() {
+fn a_hand_feels_a_quarter_of_the_mechanism() {
     let found = what_was_found();
     let (before, after) = (felt_on_board(None), felt_on_board(Some(&found)));
     for ((name, ..), (before, after)) in PHASES.iter().zip(before.phases.iter().zip(&after.phases)) {

@@ -1,4 +1,4 @@
-//! What a PC may have a device play by itself: within its bounds, in a session, and no longer.
+//! Tests of what a PC may have a device play by itself: within its bounds, in a session, and no longer.
 
 use control_core::event::State;
 use control_core::excitation::{Excitation, SequenceRefusal, Servo, Signal};
@@ -46,7 +46,7 @@ fn switched(board: &mut Board, since: Nanos) -> Vec<(Nanos, bool)> {
 
 /// Every command that is refused here would move a roller if it were not.
 #[test]
-fn a_sequence_beyond_its_bounds_moves_nothing_and_one_that_plays_ends_with_its_session() {
+fn a_sequence_stays_in_bounds_and_ends_with_its_session() {
     let mut board = board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);
@@ -107,7 +107,7 @@ fn three_segments() -> Vec<Excitation> {
 }
 
 #[test]
-fn a_sequence_is_uploaded_without_torque_and_plays_without_a_rest() {
+fn a_sequence_is_uploaded_torque_off_and_plays_without_a_rest() {
     let mut board = board(plant::held());
     let mut pc = Pc::new();
     pc.connect(&mut board);

@@ -150,7 +150,7 @@ fn a_heartbeat_that_stops_while_the_port_stays_open() {
 }
 
 #[test]
-fn a_program_that_stops_reading_and_stays_alive_keeps_its_device() {
+fn a_program_that_stops_reading_keeps_its_device() {
     let mut rig = Rig::pressed();
     rig.board.at_stop(|stopped| stopped.usb().host.set_reading(false));
     rig.pc.run_ms(&mut rig.board, 1_000);

@@ -25,7 +25,7 @@ fn changes(codes: impl Iterator<Item = u16>) -> Vec<u16> {
 }
 
 #[test]
-fn eight_lines_carry_the_codes_of_an_eight_bit_configuration_and_never_another() {
+fn eight_lines_carry_only_the_codes_of_their_configuration() {
     let wiring = Wiring { set_value: SetValue::Lines, ..Wiring::default() };
     let mut board = board_wired(wiring, venepuncture(1_000 * MILLISECOND));
     let mut pc = Pc::new();

@@ -243,7 +243,7 @@ fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
 }
 
 #[test]
-fn a_tick_that_feeds_all_of_it_forward_takes_at_most_1260_instructions() {
+fn a_tick_with_all_feedforward_takes_at_most_1260_instructions() {
     let mut config = Config::commissioned_virtual();
     config.device.compensation = all_fed_forward();
     let mut profile = Profile::default();

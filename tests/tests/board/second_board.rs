@@ -116,7 +116,7 @@ fn a_supply_that_falls_takes_torque_away_at_its_pins() {
 }
 
 #[test]
-fn the_loss_of_the_inclinometers_wire_and_of_current_take_torque_away() {
+fn losing_the_inclinometer_or_current_takes_torque_away() {
     let mut rig = Rig::pressed_on(Wiring::nucleo_f429zi());
     rig.board.at_stop(|stopped| stopped.set_analogue(NUCLEO_F429ZI.inclinometer, 0));
     rig.time_to_safe(60 * MILLISECOND);

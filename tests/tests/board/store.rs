@@ -103,7 +103,7 @@ fn power_lost_before_each(step: usize) {
 }
 
 #[test]
-fn a_flipped_bit_in_flash_is_reported_and_costs_the_record_that_it_is_in() {
+fn a_flipped_bit_in_flash_is_reported_and_costs_its_record() {
     let (default, other) = (Config::commissioned_virtual(), changed());
     // A word of the record that was written first, and one of the last.
     for is_patients in [false, true] {

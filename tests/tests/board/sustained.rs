@@ -108,7 +108,7 @@ fn hottest(torques: &[f64]) -> f64 {
 }
 
 #[test]
-fn torque_falls_before_the_continuous_one_is_exceeded_and_the_limit_is_told() {
+fn torque_falls_before_the_continuous_limit_is_exceeded() {
     let (torques, told) = hold_strong(CONTINUOUS_MNM);
     let (peak, last) = (torques.iter().fold(0.0_f64, |a, b| a.max(*b)), torques[torques.len() - 1]);
     println!(

@@ -177,7 +177,7 @@ fn felt(lines: &Value, when: &str) -> f64 {
 }
 
 #[test]
-fn compensation_leaves_a_quarter_of_the_mechanism_and_waits_for_each_press() {
+fn compensation_leaves_a_quarter_and_waits_for_each_press() {
     let hidden = Rig::parse(&fixture("hidden.toml"), "hidden.toml").expect("a rig");
     let mut cable = Cable::to(VirtualLine::commissioned(&hidden, "hidden.toml", 10.0).expect("a device"));
     cable.run(Duration::from_millis(200));

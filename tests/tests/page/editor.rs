@@ -128,7 +128,7 @@ fn driven(page: &mut Page) -> Result<(), Failure> {
     page.wait("the vein", A_FEW_INSERTIONS, &pierced("Vessel", "\\d\\.\\d\\d"))
 }
 
-/// What the device cannot render is refused at the slider, in its words.
+/// Tests that the slider refuses what the device cannot render, in its words.
 fn too_firm(page: &mut Page) -> Result<(), Failure> {
     page.evaluate(
         "(() => { const f = document.querySelector('#patient-fields [data-key=compliance_mm2_per_n]'); f.value = '0.5'; \

@@ -72,7 +72,7 @@ fn visit() -> Result<(), Failure> {
     page.wait("the page's own pictures", SOME_TIME, "__body.frames > before + 5")
 }
 
-/// Where the browser has no headset nothing is offered.
+/// Tests that nothing is offered if the browser has no headset.
 fn without_one(page: &mut Page) -> Result<(), Failure> {
     page.wait("the limb", SOME_TIME, "__body.frames > 5")?;
     let hidden = page.evaluate(&format!("{BUTTON}.hidden"))?;

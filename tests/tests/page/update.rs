@@ -113,7 +113,7 @@ fn an_update_goes_on_from_what_another_left() {
 }
 
 #[test]
-fn what_is_no_image_of_this_board_is_refused_before_anything_is_erased() {
+fn a_foreign_image_is_refused_before_anything_is_erased() {
     let good = dfuse(FLASH, &image());
     let mut damaged = good.clone();
     damaged[400] ^= 1;

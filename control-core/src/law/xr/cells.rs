@@ -6,7 +6,7 @@ use crate::units::{MillimetresPerSecond, Milliradians};
 /// All of a weight, Q16.
 const WHOLE: u32 = 1 << 16;
 
-/// What finding a place among speeds and angles takes: one over the gap from each knot to the next, Q24.
+/// The values for finding a place among speeds and angles: one over the gap from each knot to the next, Q24.
 #[derive(Clone, Debug)]
 pub(super) struct Gaps {
     speed: [i32; MAX_SPEEDS],
@@ -14,7 +14,7 @@ pub(super) struct Gaps {
 }
 
 impl Gaps {
-    /// Of a table that has been checked.
+    /// Returns those of a table that has been checked.
     pub(super) fn new(table: &ForceTable) -> Self {
         Self { speed: per_gap(speed_knots(table)), angle: per_gap(angle_knots(table)) }
     }
@@ -144,7 +144,7 @@ fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N]
     gaps
 }
 
-/// Where `at` lies among `knots` in Q16.
+/// Returns the place of `at` among `knots` in Q16.
 fn place(knots: impl Iterator<Item = i32>, per_gap: &[i32], at: i32) -> Place {
     let mut place = Place::default();
     let mut count = 0;

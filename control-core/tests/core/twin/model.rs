@@ -28,7 +28,7 @@ pub(crate) struct Twin {
     squared: f64,
     /// The largest torque that the heat allowed when it was last asked.
     allowed: f64,
-    /// What the torque that is allowed last changed by, where the core may not have asked for it yet; zero elsewhere.
+    /// The last change of the torque that is allowed, where the core may not have asked for it yet; zero elsewhere.
     unasked: f64,
     /// Tick of the last contact, puncture or exit.
     transition: u32,

@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_formula_is_linear_in_becomes_terms_and_the_rest_is_searched() {
+    fn linear_parameters_of_a_formula_become_terms() {
         let formula =
             read("-a*tanh(v/b) - c*q^3", &[("a", [0.0, 1.0]), ("b", [0.1, 10.0]), ("c", [0.0, 5.0])])
                 .unwrap();

@@ -110,7 +110,7 @@ fn what_was_under_way_when_the_pc_went_is_thrown_away() {
 }
 
 #[test]
-fn a_configuration_is_saved_without_torque_and_a_failure_is_told() {
+fn a_configuration_is_saved_without_torque_or_reported_failed() {
     let mut config = Device::commissioned_virtual();
     config.limits.fade_in_ms = 444;
     let mut desk = Desk::in_session();

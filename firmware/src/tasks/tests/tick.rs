@@ -11,7 +11,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use std::vec::Vec;
 
 #[test]
-fn the_tick_starts_for_the_session_that_is_there_and_for_no_other() {
+fn the_tick_starts_only_for_the_current_session() {
     let (mut tick, shared, mut telemetry) = tick();
     shared.session.store(7, Relaxed);
     order(&mut telemetry, SmallOrder::Start(6));

@@ -51,7 +51,7 @@ fn the_supervisor_feeds_while_all_report_and_wakes_everybody() {
 }
 
 #[test]
-fn what_the_supervisor_sees_is_an_interlock_and_under_torque_a_fault() {
+fn a_cause_is_an_interlock_and_under_torque_a_fault() {
     type Break = fn();
     let all: [(Break, Interlock); 4] = [
         (|| world().supply_low.set(true), Interlock::Supply),
@@ -83,7 +83,7 @@ fn what_the_supervisor_sees_is_an_interlock_and_under_torque_a_fault() {
 }
 
 #[test]
-fn an_enable_line_that_does_not_rise_is_a_fault_under_torque_only() {
+fn a_low_enable_line_is_a_fault_only_under_torque() {
     let (mut watch, shared) = supervisor();
     supervise(&mut watch, shared, 5);
     assert!(shared.trips.is_empty());

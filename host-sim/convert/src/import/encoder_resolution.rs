@@ -11,12 +11,12 @@ const FINE: f64 = 1e6;
 const SHARE: f64 = 0.995;
 const NEAR: f64 = 0.05;
 
-/// How positions become counts.
+/// The conversion of positions to counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     /// Counts per rad or m; none where positions are counts already and nobody said of how many.
     pub counts_per_unit: Option<f64>,
-    /// Whether readings were seen to come in whole counts.
+    /// True if readings were seen to come in whole counts.
     pub whole: bool,
 }
 

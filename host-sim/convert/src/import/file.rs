@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path) -> Result<Log, Failure> {
 
 const ZIP: &[u8] = b"PK\x03\x04";
 
-/// What a file of a known format that is not read is, and how to make one that is.
+/// The name of a known format that is not read, and how to convert it.
 fn unread(bytes: &[u8]) -> Option<&'static str> {
     const WORKBOOK: &str = "an Excel workbook; save its sheet as CSV (File, Save As, CSV UTF-8), with one row of names above the numbers";
     let holds = |name: &[u8]| bytes.windows(name.len()).any(|window| window == name);

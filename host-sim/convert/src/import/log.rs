@@ -10,7 +10,7 @@ use mcap::records::Record;
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// What a chunk may become: a file of recordings is not larger in memory.
+/// The largest size of a decompressed chunk: a file of recordings is not larger in memory.
 const LARGEST_CHUNK: u64 = 1 << 31;
 
 #[derive(Default)]
@@ -113,7 +113,7 @@ fn table(topic: Topic) -> Table {
     Table { name: topic.name, columns }
 }
 
-/// What was found in a file.
+/// The findings in a file.
 #[derive(Default)]
 struct Found {
     topics: BTreeMap<u16, Topic>,

@@ -8,7 +8,7 @@ use std::io::Read;
 const HEADER: usize = 128;
 /// Deeper structures are nobody's recording.
 const DEEPEST: usize = 12;
-/// What a compressed variable may become, bytes.
+/// The largest size of a decompressed variable, bytes.
 const LARGEST: u64 = 1 << 31;
 
 const COMPRESSED: u32 = 15;
@@ -137,7 +137,7 @@ fn join(path: &str, name: &str) -> String {
     if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
 
-/// What is left to read.
+/// The part that is left to read.
 #[derive(Clone, Copy)]
 struct Bytes<'a> {
     left: &'a [u8],

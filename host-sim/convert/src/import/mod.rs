@@ -35,7 +35,7 @@ use std::path::PathBuf;
 use table::Log;
 use units::Quantity;
 
-/// What to import, and what is known about it.
+/// The files to import, and what is known about them.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
     /// In the order in which they were recorded.
@@ -52,7 +52,7 @@ pub struct Request {
     pub values: RigValues,
     /// A rig that exists: its resolution is used, and none is written.
     pub rig: Option<PathBuf>,
-    /// What is left as it stands.
+    /// The data that is not changed.
     pub keep: Keep,
     /// Each file is a run of its own, whatever clocks and names say.
     pub runs: bool,
@@ -65,24 +65,24 @@ pub struct Request {
 /// A file that was written.
 #[derive(Clone, Debug)]
 pub struct Written {
-    /// Where.
+    /// The place.
     pub path: PathBuf,
-    /// How many.
+    /// The number.
     pub rows: usize,
     /// From the first row to the last, s.
     pub seconds: f64,
 }
 
-/// What was done.
+/// The action.
 #[derive(Clone, Debug)]
 pub struct Imported {
     /// The rig to diagnose with.
     pub rig: PathBuf,
-    /// Whether values are still to be filled in there.
+    /// True if values are still to be filled in there.
     pub to_fill_in: bool,
     /// One a run.
     pub recordings: Vec<Written>,
-    /// What was assumed, changed or left out, a sentence each.
+    /// The things assumed, changed or left out, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -206,7 +206,7 @@ fn joined(wholes: Vec<Rows>, notes: &mut Vec<String>) -> Vec<Rows> {
     out
 }
 
-/// What the rate of the rows can and cannot show.
+/// A sentence on what the rate of the rows can and cannot show.
 fn rate(runs: &[Rows], notes: &mut Vec<String>) {
     let steps: Vec<f64> = runs.iter().filter_map(|run| rows::median_step(&run.time)).collect();
     let Some(step) = steps.into_iter().max_by(f64::total_cmp) else { return };

@@ -13,7 +13,7 @@ pub(super) struct Array {
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 impl Array {
-    /// Whether the bytes claim to be of this format.
+    /// True if the bytes claim to be of this format.
     pub(super) fn is_here(bytes: &[u8]) -> bool {
         bytes.starts_with(MAGIC)
     }
@@ -60,7 +60,7 @@ impl Array {
     }
 }
 
-/// Of each axis, the distance between neighbours: the last axis is the nearest in C's order, the first in Fortran's.
+/// The distance between neighbours on each axis: the last axis is the nearest in C's order, the first in Fortran's.
 fn strides(shape: &[usize], is_fortran: bool) -> Vec<usize> {
     let mut strides = vec![1; shape.len()];
     let mut stride = 1;
@@ -72,7 +72,7 @@ fn strides(shape: &[usize], is_fortran: bool) -> Vec<usize> {
     strides
 }
 
-/// What follows a key of the header, which is the text of a Python dictionary.
+/// Returns the text after a key of the header, which is the text of a Python dictionary.
 fn value<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, after) = header.split_once(key)?;
     Some(after.strip_prefix(['\'', '"'])?.trim_start().strip_prefix(':')?.trim_start())
@@ -108,7 +108,7 @@ fn numbers(kind: &str, data: &[u8], count: usize) -> Option<Vec<f64>> {
     Some(data.chunks_exact(width).map(read).collect())
 }
 
-/// How a kind of number is read from its bytes, the least significant first and filled up with zeros.
+/// Returns the function that reads a kind of number from its bytes, the least significant first and filled up with zeros.
 fn number_of(kind: &str) -> Option<fn([u8; 8]) -> f64> {
     /// The first bytes.
     fn first<const N: usize>(wide: [u8; 8]) -> [u8; N] {

@@ -74,7 +74,7 @@ fn unit(of: &TypePtr) -> Option<Unit> {
     })
 }
 
-/// What a LeRobot dataset calls the elements of its lists: `meta/info.json` in a folder above the file.
+/// The names that a LeRobot dataset gives the elements of its lists: `meta/info.json` in a folder above the file.
 struct Names(Option<Value>);
 
 impl Names {

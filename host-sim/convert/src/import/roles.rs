@@ -7,18 +7,18 @@ use device_sim::failure::Failure;
 use std::fmt;
 use std::path::Path;
 
-/// What a column of a recording may be.
+/// The role of a column of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// Time stamps.
     Time,
-    /// What was sent to the drive.
+    /// The command that was sent to the drive.
     Command,
     /// The coordinate.
     Position,
     /// Its speed.
     Velocity,
-    /// What a position loop was asked to follow.
+    /// The reference of a position loop.
     Reference,
     /// Inclination below the horizontal.
     Tilt,
@@ -44,7 +44,7 @@ impl Role {
         }
     }
 
-    /// What its unit may measure.
+    /// The quantities that its unit may measure.
     fn takes(self, quantity: Quantity) -> bool {
         use Quantity as Q;
         match self {

@@ -15,20 +15,20 @@ pub(super) struct Rows {
     pub origin: f64,
     /// Every other column that was found; NaN where the file has nothing.
     pub columns: BTreeMap<Role, Vec<f64>>,
-    /// What position and reference measure.
+    /// The quantity of position and reference.
     pub position: Quantity,
-    /// What the command measures, and what the reference does.
+    /// The quantity of the command, and that of the reference.
     pub command: Quantity,
-    /// What the reference measures.
+    /// The quantity of the reference.
     pub reference: Quantity,
 }
 
-/// What the caller knows beside the columns.
+/// The caller's knowledge in addition to the columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known {
     /// Rows a second, where no column tells the time.
     pub rate_hz: Option<f64>,
-    /// Whether nothing drives the axis: the command is zero.
+    /// True if nothing drives the axis: the command is zero.
     pub undriven: bool,
 }
 
@@ -122,7 +122,7 @@ fn find_all(logs: &[Log], choices: &[Choice]) -> Result<BTreeMap<Role, Chosen>, 
     Ok(found)
 }
 
-/// Whether these files alone have what a recording needs.
+/// True if these files alone have what a recording needs.
 pub(super) fn is_whole(logs: &[Log], choices: &[Choice], known: Known) -> bool {
     find_all(logs, choices).is_ok_and(|found| {
         (found.contains_key(&Role::Position) || found.contains_key(&Role::Velocity))

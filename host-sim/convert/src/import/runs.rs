@@ -6,7 +6,7 @@ use super::rows::{Rows, median_step};
 use super::units::Quantity;
 use std::f64::consts::TAU;
 
-/// What is left alone on request.
+/// The data that is left alone on request.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Keep {
     /// Rest at the ends and in the middle.
@@ -21,7 +21,7 @@ const GAP_S: f64 = 0.05;
 /// Rest kept at each end of a run, s, and the longest rest that is kept within one.
 const REST_S: f64 = 0.5;
 const LONGEST_REST_S: f64 = 10.0;
-/// What is shorter is not worth a file.
+/// The shortest run that is worth a file.
 const SHORTEST_S: f64 = 1.0;
 const FEWEST_ROWS: usize = 20;
 

@@ -1,4 +1,4 @@
-//! Whether files with the same columns are runs of their own: only their clocks or their names can say so. Two sensors of one run
+//! Decides if files with the same columns are runs of their own: only their clocks or their names can say so. Two sensors of one run
 //! have the same columns too.
 
 use super::rows::Rows;

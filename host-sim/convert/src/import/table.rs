@@ -1,4 +1,4 @@
-//! What every reader hands on: tables of numbers with named columns, whatever the file's format.
+//! The result of every reader: tables of numbers with named columns, whatever the file's format.
 
 use super::units::{self, Unit};
 

@@ -77,7 +77,7 @@ fn fields(line: &str, separator: char) -> Vec<&str> {
     out
 }
 
-/// How a text is laid out.
+/// The layout of a text.
 struct Layout {
     separator: char,
     count: usize,

@@ -1,6 +1,6 @@
 //! Units as people write them into headers, and what each is in the contract's.
 
-/// What a unit measures.
+/// The quantity that a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// In s.
@@ -23,7 +23,7 @@ pub enum Quantity {
     Current,
     /// In V.
     Voltage,
-    /// Of no physical unit: converter steps, per cent, a duty cycle.
+    /// A command without a physical unit: converter steps, per cent, a duty cycle.
     Plain,
 }
 
@@ -49,7 +49,7 @@ impl Quantity {
 /// A unit: what it measures, and how much one of it is in the contract's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
-    /// What it measures.
+    /// The quantity that it measures.
     pub quantity: Quantity,
     /// One of it in [`Quantity::unit`].
     pub factor: f64,

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What the rig is known to be.
+/// The known values of the rig.
 #[derive(Clone, Debug, Default)]
 pub struct RigValues {
     /// kg·m² or kg.

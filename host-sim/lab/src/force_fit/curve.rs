@@ -42,7 +42,7 @@ impl Landmarks {
         self.0[piece] + share * (self.0[piece + 1] - self.0[piece])
     }
 
-    /// How many pieces there are.
+    /// Returns the number of pieces.
     pub fn pieces(&self) -> usize {
         self.0.len() - 1
     }
@@ -62,7 +62,7 @@ const PEAK_WEIGHT: f64 = 8.0;
 /// The points of one cell, laid over one another.
 #[derive(Clone, Debug)]
 pub struct Overlaid {
-    /// Of each piece, the sums of its parts.
+    /// The sums of the parts of each piece.
     pieces: Vec<[Part; PARTS]>,
 }
 
@@ -74,11 +74,11 @@ struct Part {
     square: f64,
 }
 
-/// Where knots lie within each piece, 0 to 1, both ends included and rising.
+/// The places of the knots within each piece, 0 to 1, both ends included and rising.
 pub type Knots = Vec<Vec<f64>>;
 
 impl Overlaid {
-    /// Of so many pieces, without points.
+    /// Returns one of so many pieces, without points.
     pub fn new(pieces: usize) -> Self {
         Self { pieces: vec![[Part::default(); PARTS]; pieces] }
     }

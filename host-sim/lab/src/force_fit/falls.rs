@@ -1,4 +1,4 @@
-//! Where the force of an insertion falls because a layer gives way: the landmarks that insertions have in common. Numbers only: depth in
+//! The places where the force of an insertion falls because a layer gives way: the landmarks that insertions have in common. Numbers only: depth in
 //! mm, force in N.
 
 /// Points are taken together over this depth to look for falls.
@@ -23,7 +23,7 @@ pub struct Fall {
     pub end_mm: f64,
     /// The force at its beginning, from a straight line through the rise before it.
     pub peak_n: f64,
-    /// How far it falls.
+    /// The fall of the force.
     pub drop_n: f64,
 }
 

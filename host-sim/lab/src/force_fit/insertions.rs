@@ -13,7 +13,7 @@ const SHORTEST_MM: f64 = 1.0;
 const DRAWN_BACK_MM: f64 = 1.0;
 /// Speed is told over this time, s: long against an encoder's step, short against a way in.
 const SPEED_S: f64 = 0.1;
-/// What is slower or faster than the way's median by more than this share is its beginning, its end, or a jump at a puncture.
+/// The largest share by which the needle may be slower or faster than the way's median; beyond it is a beginning, an end, or a jump at a puncture.
 const EVEN: f64 = 0.5;
 /// As many a second are enough for a curve with knots of a quarter of a mm.
 const MOST_HZ: f64 = 1_000.0;
@@ -23,9 +23,9 @@ const MOST_HZ: f64 = 1_000.0;
 pub struct Moment {
     /// s.
     pub time_s: f64,
-    /// Of the tip past the entry point, along the needle, mm.
+    /// The depth of the tip past the entry point, along the needle, mm.
     pub depth_mm: f64,
-    /// Of the needle to the skin, °.
+    /// The angle of the needle to the skin, °.
     pub angle_deg: f64,
     /// Against insertion, N.
     pub force_n: f64,

@@ -21,7 +21,7 @@ const SAME_SPEED: f64 = 0.2;
 /// Angles that differ by less than this are one angle of the design, °.
 const SAME_ANGLE_DEG: f64 = 4.0;
 
-/// How well an insertion is told.
+/// The quality of the fit of an insertion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// Which insertion.
@@ -36,9 +36,9 @@ pub struct Judgement {
     pub unseen_n: f64,
     /// The same with a table that has seen it; none for one that was given to judge by.
     pub seen_n: Option<f64>,
-    /// Whether the table had another insertion at this speed and angle.
+    /// True if the table had another insertion at this speed and angle.
     pub has_neighbours: bool,
-    /// Of each layer that gives way, the force at which it does: measured and in the table, N.
+    /// The force at which each layer gives way: measured and in the table, N.
     pub peaks_n: Vec<(f64, f64)>,
 }
 
@@ -59,9 +59,9 @@ pub fn worst_peak(judged: &[Judgement]) -> Option<f64> {
 pub struct Fit {
     /// The table.
     pub table: Table,
-    /// What it was fitted to.
+    /// The insertions that it was fitted to.
     pub insertions: Vec<Insertion>,
-    /// What it was judged by: those given for it, or each of the others in its turn, left out.
+    /// The insertions that it was judged by: those given for it, or each of the others in its turn, left out.
     pub judged: Vec<Judgement>,
 }
 
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn insertions_of_cells_that_were_never_measured_judge_the_filling() {
+    fn insertions_in_unmeasured_cells_judge_the_interpolation() {
         let unseen = [insertion(1.0, 30.0, 0), insertion(3.0, 45.0, 0)];
         let fit = fit(five_cells(1), &unseen).expect("there is something to fit");
         assert_eq!(fit.judged.len(), 2);

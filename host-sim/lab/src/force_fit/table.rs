@@ -12,7 +12,7 @@
 use super::curve::{Curve, Knots, Landmarks, Overlaid, is_rise, place_knots};
 use control_core::config::MAX_DEPTHS;
 
-/// Where a cell's force comes from.
+/// The origin of a cell's force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Insertions at this speed and angle.
@@ -28,7 +28,7 @@ pub enum Origin {
 pub struct Cell {
     /// Force over perpendicular depth.
     pub force: Curve,
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 

@@ -10,10 +10,10 @@ const PASS_MM: f64 = 2.0;
 /// A new pass whose angle differs by less than this from the last one's has the same direction, °.
 const SAME_DIRECTION_DEG: f64 = 3.0;
 
-/// Where the needle was.
+/// The needle's place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
-    /// How far the tip was past the entry point, along the needle, mm.
+    /// The depth of the tip past the entry point, along the needle, mm.
     pub depth_mm: f64,
     /// Angle of the needle to the skin, rad.
     pub angle_rad: f64,
@@ -34,7 +34,7 @@ pub struct Gesture {
     pub places: Vec<Place>,
 }
 
-/// How the needle's angle kept to the wanted one, ° .
+/// The error of the needle's angle, °.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AngleError {
     /// Root mean square, every mm of the way counting the same, so that a needle at rest adds nothing.
@@ -43,7 +43,7 @@ pub struct AngleError {
     pub largest_deg: f64,
 }
 
-/// How often the needle was pushed in before it left the skin again.
+/// The number of times that the needle was pushed in before it left the skin again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Passes {
     /// Ways in: one, and one more whenever it was pushed in again by 2 mm after having been drawn back by 2 mm.
@@ -53,7 +53,7 @@ pub struct Passes {
 }
 
 impl Gesture {
-    /// Of places at any rate above [`RATE_HZ`], each the mean of those of its hundredth of a second.
+    /// Returns places at [`RATE_HZ`] from places at any higher rate, each the mean of its hundredth of a second.
     pub fn new(rate_hz: f64, places: impl IntoIterator<Item = Place>) -> Self {
         let many = ((rate_hz / RATE_HZ).round() as usize).max(1);
         let (mut means, mut sum, mut counted) = (Vec::new(), Place::default(), 0_usize);
@@ -94,7 +94,7 @@ impl Gesture {
         steps.map(|mm| mm * RATE_HZ).collect()
     }
 
-    /// How the angle kept to `wanted_rad` along the whole way; none where the tip has not moved.
+    /// Returns the error of the angle from `wanted_rad` along the whole way; `None` if the tip has not moved.
     pub fn angle_error(&self, wanted_rad: f64) -> Option<AngleError> {
         let (mut squares, mut way, mut largest) = (0.0, 0.0, 0.0_f64);
         for (place, mm) in self.places.iter().skip(1).zip(self.steps_mm()) {
@@ -108,7 +108,7 @@ impl Gesture {
         (way > 0.0).then(|| AngleError { rms_deg: (squares / way).sqrt(), largest_deg: largest })
     }
 
-    /// How often it was pushed in anew, and in another direction: that of a pass is the angle at its deepest place.
+    /// Returns the number of times that it was pushed in anew, and in another direction: that of a pass is the angle at its deepest place.
     pub fn passes(&self) -> Passes {
         let Some(first) = self.places.first() else { return Passes::default() };
         let (mut inwards, mut turn, mut angles) = (true, *first, Vec::new());

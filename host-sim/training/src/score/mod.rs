@@ -25,7 +25,7 @@ use target::Reached;
 use tasks::{LayerName, Tasks};
 use vessel::Targets;
 
-/// What the score is called in JSON.
+/// The name of the score in JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
     /// In their order in time.
@@ -38,9 +38,9 @@ pub struct Score {
 pub struct Insertion {
     /// When it began, s into the recording.
     pub begin_s: f64,
-    /// How long it took, s.
+    /// The duration, s.
     pub time_s: f64,
-    /// How far the tip went in all, in, out and sideways, mm. Twice the depth is the least.
+    /// The length of the tip's way, in, out and sideways, mm. Twice the depth is the least.
     pub path_mm: f64,
     /// Deepest place along the needle, mm.
     pub depth_mm: f64,
@@ -48,37 +48,37 @@ pub struct Insertion {
     pub peak_force_n: f64,
     /// Walls that gave way.
     pub punctures: u32,
-    /// Whether the vessel's wall was among them.
+    /// True if the vessel's wall was among them.
     pub vessel: bool,
     /// Depth along the needle at which the vessel was first touched, mm; none where it was not.
     pub vessel_contact_path_mm: Option<f64>,
-    /// How far the tip went on after the vessel's wall had given way, mm; none where it did not.
+    /// The distance that the tip went on after the vessel's wall had given way, mm; none if it did not give way.
     pub overshoot_mm: Option<f64>,
     /// Time in the vessel's lumen, s.
     pub in_lumen_s: f64,
-    /// How often blood came into the hub.
+    /// The number of times that blood came into the hub.
     pub flashbacks: u32,
     /// Layers that were open in the needle's own track when it met them again.
     pub met_in_track: u32,
     /// Layers that gave way once more, for instance beside the track.
     pub pierced_again: u32,
-    /// Whether the needle went through the vessel's far wall.
+    /// True if the needle went through the vessel's far wall.
     pub through_far_wall: bool,
-    /// How often something that was to be spared was touched.
+    /// The number of times that something to be spared was touched.
     pub spared_hits: u32,
-    /// What became of the patient's target; none where there is none.
+    /// The result for the patient's target; none if the patient has none.
     pub target: Option<Reached>,
-    /// What became of the procedure's tasks; none where it asks for none.
+    /// The results of the procedure's tasks; none if it has none.
     pub tasks: Option<Tasks>,
-    /// What was to be spared and was touched, by name.
+    /// The names of structures to be spared that were touched.
     pub hit: Vec<String>,
-    /// What was to be spared and was not touched, by name.
+    /// The names of structures to be spared that were not touched.
     pub spared: Vec<String>,
-    /// How often the needle was turned beyond the largest angle that the patient's fixture allows.
+    /// The number of times that the needle was turned beyond the largest angle that the patient's fixture allows.
     pub barriers: u32,
     /// Largest force across the needle that would have held its direction of entry, N; none where the patient has no fixture.
     pub largest_lateral_n: Option<f64>,
-    /// How often the needle was pushed in: once, and again whenever it was after having been drawn back by 2 mm.
+    /// The number of times that the needle was pushed in: once, and again whenever it was after having been drawn back by 2 mm.
     pub passes: u32,
     /// Those of them that went in another direction, by 3° or more.
     pub redirections: u32,
@@ -101,7 +101,7 @@ pub struct Insertion {
 /// Ticks of an insertion and where they are.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<'a> {
-    /// What it is a part of.
+    /// The whole that it is a part of.
     pub stretch: &'a Stretch,
     /// First tick.
     pub begin: u64,
@@ -184,7 +184,7 @@ impl Span<'_> {
     }
 }
 
-/// What insertions are judged by.
+/// The figures by which insertions are judged.
 #[derive(Clone, Debug)]
 pub struct Judge {
     entry_rad: f64,

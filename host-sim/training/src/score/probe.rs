@@ -1,4 +1,4 @@
-//! How much of the needle the ultrasound image showed, from what the page told of the probe.
+//! The share of the needle that the ultrasound image showed, from the page's messages about the probe.
 
 use control_core::TICK_HZ;
 use recording::messages::Probe;
@@ -6,7 +6,7 @@ use recording::messages::Probe;
 /// The page says at least once a second what the image shows; after this time without a word it shows none.
 const LONGEST_TICKS: u64 = TICK_HZ as u64 * 3 / 2;
 
-/// What the image showed of the needle, each as a mean over the time at which there was an image.
+/// The parts of the needle that the image showed, each as a mean over the time at which there was an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     /// Share of the time at which it showed the tip.

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 
 /// Frequencies above this say nothing of a movement, Hz (ω_c^max = 40π rad/s in the paper).
 pub const HIGHEST_HZ: f64 = 20.0;
-/// What of the normalised spectrum is below this is noise (V̄ in the paper).
+/// The level of the normalised spectrum below which it is noise (V̄ in the paper).
 pub const THRESHOLD: f64 = 0.05;
-/// How much finer the spectrum is looked at than the movement's own length resolves it (padding by 2⁴ in the paper).
+/// The factor by which padding refines the spectrum (2⁴ in the paper).
 const PADDING: usize = 16;
 /// A movement in fewer samples than this has no spectrum to speak of.
 const FEWEST: usize = 8;

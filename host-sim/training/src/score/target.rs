@@ -1,4 +1,4 @@
-//! What an insertion was to reach and what it was to spare, by name, from the device's events and where the tip was along the skin.
+//! The structures that an insertion was to reach and to spare, by name, from the device's events and the tip's place along the skin.
 //!
 //! A target is a layer, or a part of it that ends to either side: layers of the device go on for ever, so that a bursa is missed here only
 //! where its patient says how far it reaches. What the hand feels there is the layer all the same.
@@ -8,7 +8,7 @@ use device_sim::profile::{Beside, Goal};
 use link::frames::{Event, EventKind};
 use serde::{Deserialize, Serialize};
 
-/// Whether a target was reached.
+/// The outcome for a target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -21,16 +21,16 @@ pub enum Outcome {
     Beyond,
 }
 
-/// What became of a target.
+/// The result for a target.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Whether it was reached.
+    /// Its outcome.
     pub outcome: Outcome,
     /// Time in it, all visits together, s.
     pub time_s: f64,
-    /// How often the tip passed its depth where it does not reach.
+    /// The number of times that the tip passed its depth outside it.
     pub passed_beside: u32,
 }
 
@@ -85,7 +85,7 @@ pub(super) fn walk(
     (found, visits)
 }
 
-/// Whether the tip comes into a layer from above.
+/// True if the tip comes into a layer from above.
 fn enters(kind: &EventKind, layer: u8, has_wall: bool) -> bool {
     match kind {
         EventKind::Contact { layer: met } => *met == layer && !has_wall,
@@ -94,7 +94,7 @@ fn enters(kind: &EventKind, layer: u8, has_wall: bool) -> bool {
     }
 }
 
-/// Whether the tip comes back from the layer below.
+/// True if the tip comes back from the layer below.
 fn leaves_below(kind: &EventKind, below: Option<(u8, bool)>) -> bool {
     below.is_some_and(|(layer, _)| *kind == EventKind::Exit { layer })
 }

@@ -1,4 +1,4 @@
-//! What became of a procedure's tasks (tourniquet, plunger, catheter): done, missed, at the wrong place or in the wrong order, and how many
+//! The results of a procedure's tasks (tourniquet, plunger, catheter): done, missed, at the wrong place or in the wrong order, and how many
 //! of the mistakes are critical.
 //!
 //! The rule. A task is done when it was done with the tip where the procedure wants it, and no task that comes before it in the procedure
@@ -12,7 +12,7 @@ use device_sim::profile::Profile;
 use link::frames::{Event, EventKind};
 use serde::{Deserialize, Serialize};
 
-/// What became of the tasks of one insertion.
+/// The results of the tasks of one insertion.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tasks {
     /// Mistakes that are critical.
@@ -23,7 +23,7 @@ pub struct Tasks {
     pub list: Vec<TaskResult>,
 }
 
-/// What became of one task.
+/// The result of one task.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TaskResult {
     /// Its name.
@@ -32,7 +32,7 @@ pub struct TaskResult {
     pub mistake: Option<Mistake>,
     /// True if the mistake is critical.
     pub is_critical: bool,
-    /// Where the tip was when the task was done: `outside`, `target`, or the name of what it was in; none where it was missed.
+    /// The tip's place when the task was done: `outside`, `target`, or the name of what it was in; none where it was missed.
     pub tip: Option<String>,
 }
 
@@ -41,11 +41,11 @@ pub struct TaskResult {
 pub(super) struct Done {
     /// Its number in the procedure.
     pub(super) number: usize,
-    /// Where the tip was.
+    /// The tip's place.
     pub(super) tip: Tip,
 }
 
-/// Where the tip was.
+/// The tip's place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Tip {
     /// Outside the skin.
@@ -181,7 +181,7 @@ fn layer_at(events: &[Event], (begin, tick): (u64, u64), layers: &[LayerName]) -
 }
 
 impl Judge {
-    /// What became of the tasks of an insertion; `visits` are those of the target.
+    /// Returns the results of the tasks of an insertion; `visits` are those of the target.
     pub(super) fn tasks(&self, span: Span<'_>, visits: &[(u64, u64)]) -> Option<Tasks> {
         if self.tasks.is_empty() {
             return None;
@@ -196,7 +196,7 @@ impl Judge {
         Some(judge(&self.tasks, &from_first(done.collect())))
     }
 
-    /// Where the tip was at `tick`.
+    /// Returns the tip's place at `tick`.
     fn tip(&self, span: Span<'_>, tick: u64, visits: &[(u64, u64)]) -> Tip {
         if !(span.begin..span.end).contains(&tick) {
             return Tip::Outside;
@@ -270,7 +270,7 @@ mod tests {
         }
     }
 
-    /// What a nurse would say of each, from the guideline: on before the puncture, catheter in the lumen, off before the needle is out.
+    /// Tests each task as the guideline has it: on before the puncture, catheter in the lumen, off before the needle is out.
     #[test]
     fn mistakes_of_a_venepuncture_are_counted() {
         let on = "tourniquet_on@outside ";

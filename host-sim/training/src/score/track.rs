@@ -3,7 +3,7 @@
 
 use link::frames::{Event, EventKind};
 
-/// What a needle met again.
+/// The structures that a needle met again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MetAgain {
     /// Layers that were passed without giving way, because they had before: in the track.

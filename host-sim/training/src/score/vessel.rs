@@ -1,4 +1,4 @@
-//! What the needle did to the vessel, from the device's events: contact, lumen, far wall, structures that it should have spared. It counts
+//! The needle's effect on the vessel, from the device's events: contact, lumen, far wall, structures that it should have spared. It counts
 //! ticks and layers, and knows no lengths or forces.
 
 use link::frames::{Event, EventKind};
@@ -14,20 +14,20 @@ pub struct Targets {
     pub spared: Vec<u8>,
 }
 
-/// What happened in one insertion.
+/// The events of one insertion.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Passage {
     /// When the near wall was first touched.
     pub contact_tick: Option<u64>,
     /// When it first gave way.
     pub entry_tick: Option<u64>,
-    /// How long the tip was in the lumen, all visits together.
+    /// The time of the tip in the lumen, all visits together.
     pub in_lumen_ticks: u64,
-    /// How often it came into the lumen: blood in the hub.
+    /// The number of times that it came into the lumen: blood in the hub.
     pub flashbacks: u32,
-    /// Whether the far wall gave way.
+    /// True if the far wall gave way.
     pub through_far_wall: bool,
-    /// How often a layer that was to be spared was touched.
+    /// The number of times that a layer to be spared was touched.
     pub spared_hits: u32,
 }
 

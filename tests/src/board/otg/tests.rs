@@ -82,7 +82,7 @@ fn packets_beyond_the_receive_fifo_wait() {
 }
 
 #[test]
-fn words_beyond_a_transmit_fifo_and_too_much_packet_memory_are_noted() {
+fn overfull_transmit_fifos_and_packet_memory_are_noted() {
     let mut core = ready();
     (0..33).for_each(|_| core.write(FIFO0 + FIFO_STRIDE, 0));
     core.write(GRXFSIZ, 320);
@@ -122,7 +122,7 @@ fn a_disconnected_core_is_not_on_the_bus() {
 }
 
 #[test]
-fn a_soft_reset_clears_the_interrupts_and_keeps_the_transceiver_on() {
+fn a_soft_reset_clears_interrupts_and_keeps_the_transceiver() {
     let mut core = ready();
     core.bus_reset();
     assert_eq!(core.read(GINTSTS) & USBRST, USBRST);
@@ -150,7 +150,7 @@ fn a_host_gives_up_on_a_device_that_never_answers() {
 }
 
 #[test]
-fn a_host_that_stops_its_frames_puts_the_device_to_sleep_and_wakes_it() {
+fn a_host_that_stops_its_frames_suspends_the_device() {
     let mut core = ready();
     core.bus_idle();
     assert_eq!(core.read(GINTSTS) & USBSUSP, USBSUSP);
