@@ -213,6 +213,7 @@ fields! {
     DriveDelayUs: "delay_us",
     SlidingShare: "sliding",
     FrictionLimitOut: "limit_out_n",
+    Vertex: "vertex_mm",
 }
 
 impl fmt::Display for Refusal {

@@ -193,6 +193,6 @@ fn check_wall(wall: &Wall, layer: u8, config: &Config) -> Result<(), Refusal> {
 
 fn check_parabola(parabola: &config::Parabola) -> Result<(), Refusal> {
     within(Field::Compliance, parabola.compliance.0, milli(50), milli(1_000_000))?;
-    within(Field::PunctureTravel, parabola.vertex.0, milli(-30_000), milli(100_000))?;
+    within(Field::Vertex, parabola.vertex.0, milli(-30_000), milli(100_000))?;
     within(Field::BaseForce, parabola.base.0, milli(-20_000), milli(20_000))
 }

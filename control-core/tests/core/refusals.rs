@@ -100,7 +100,7 @@ fn a_wall_that_would_ring_hit_or_pull_is_refused() {
     assert!(is_field(with_wall(|w| w.relief.compliance.0 = q(1_000.1)), Field::Compliance));
     assert!(is_field(with_wall(|w| w.puncture_travel.0 = q(0.04)), Field::PunctureTravel));
     assert!(is_field(with_wall(|w| w.puncture_travel.0 = q(30.1)), Field::PunctureTravel));
-    assert!(is_field(with_wall(|w| w.elastic.vertex.0 = q(-30.1)), Field::PunctureTravel));
+    assert!(is_field(with_wall(|w| w.elastic.vertex.0 = q(-30.1)), Field::Vertex));
     assert!(is_field(with_wall(|w| w.relief.base.0 = q(-20.1)), Field::BaseForce));
 }
 

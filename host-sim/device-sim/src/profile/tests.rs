@@ -35,6 +35,18 @@ fn a_refusal_names_the_file_the_layer_and_the_reason() {
 }
 
 #[test]
+fn a_value_out_of_range_is_named_by_its_key_and_layer() {
+    for (old, new, wanted) in [
+        ("vertex_mm = 4.0", "vertex_mm = 400.0", "vertex_mm is 400.0000"),
+        ("friction_n_per_mm = 0.02", "friction_n_per_mm = 500", "friction_n_per_mm is 500.0000"),
+        ("unload_n_per_mm = 1.0", "unload_n_per_mm = 100", "unload_n_per_mm is 100.0000"),
+    ] {
+        let said = Profile::parse(text(BUILT_IN[0].1.replacen(old, new, 1))).expect_err(new).to_string();
+        assert!(said.contains(wanted) && said.ends_with("(in layer 0, skin)"), "{said}");
+    }
+}
+
+#[test]
 fn friction_may_have_a_static_and_a_dynamic_level() {
     let with = |keys: &str| {
         let friction = format!("[friction]\nlaw = \"stick-slip\"\n{keys}\n\n[[layer]]");
