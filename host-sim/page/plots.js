@@ -54,13 +54,31 @@ const NAME_GAP = 8;
 
 const label = (value, step) => number(value, step < 1 ? 1 : 0);
 
-export class TimePlot {
+/** A plot of depth and force on a canvas, with an axis for each. */
+class Plot {
   constructor(canvas, colours) {
     this.surface = surface(canvas);
     this.colours = colours;
     this.depth = depthRange();
     this.force = forceRange();
     this.found = { low: 0, high: 0 };
+  }
+
+  /** Clears the canvas and fits the axis of depth; returns the trace's first entry within the window. */
+  begin(trace, now) {
+    const { context: g, width, height } = this.surface;
+    g.fillStyle = this.colours.panel;
+    g.fillRect(0, 0, width, height);
+    const from = trace.firstSince(now - WINDOW_S);
+    extremes(trace, trace.depthLow, trace.depthHigh, from, this.found);
+    this.depth.cover(this.found.low, this.found.high);
+    return from;
+  }
+}
+
+export class TimePlot extends Plot {
+  constructor(canvas, colours) {
+    super(canvas, colours);
     this.marks = []; // punctures: { t, text }
   }
 
@@ -75,11 +93,7 @@ export class TimePlot {
 
   draw(trace, now) {
     const { context: g, width, height } = this.surface;
-    g.fillStyle = this.colours.panel;
-    g.fillRect(0, 0, width, height);
-    const from = trace.firstSince(now - WINDOW_S);
-    extremes(trace, trace.depthLow, trace.depthHigh, from, this.found);
-    this.depth.cover(this.found.low, this.found.high);
+    const from = this.begin(trace, now);
     extremes(trace, trace.motorLow, trace.motorHigh, from, this.found);
     const { low, high } = this.found;
     extremes(trace, trace.lawLow, trace.lawHigh, from, this.found);
@@ -222,22 +236,10 @@ function columns(g, trace, lows, highs, from, now, left, wide, range, top, high)
   g.stroke();
 }
 
-export class PhasePlot {
-  constructor(canvas, colours) {
-    this.surface = surface(canvas);
-    this.colours = colours;
-    this.depth = depthRange();
-    this.force = forceRange();
-    this.found = { low: 0, high: 0 };
-  }
-
+export class PhasePlot extends Plot {
   draw(trace, now) {
     const { context: g, width, height } = this.surface;
-    g.fillStyle = this.colours.panel;
-    g.fillRect(0, 0, width, height);
-    const from = trace.firstSince(now - WINDOW_S);
-    extremes(trace, trace.depthLow, trace.depthHigh, from, this.found);
-    this.depth.cover(this.found.low, this.found.high);
+    const from = this.begin(trace, now);
     extremes(trace, trace.lawLow, trace.lawHigh, from, this.found);
     this.force.cover(this.found.low, this.found.high);
     const box = { left: GUTTER.left, top: GUTTER.top, wide: width - GUTTER.left - 14, high: height - GUTTER.top - 40 };
