@@ -9,11 +9,11 @@ use super::law::{first_or_both, sign};
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
-struct Law {
+struct AsymmetricFrictionLaw {
     viscous_only: bool,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for AsymmetricFrictionLaw {
     fn names(&self) -> Vec<String> {
         first_or_both("viscous_difference", "coulomb_difference", !self.viscous_only)
     }
@@ -32,7 +32,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law { viscous_only: effect.is_set("viscous_only") }))
+        Some(Box::new(AsymmetricFrictionLaw { viscous_only: effect.is_set("viscous_only") }))
     }
     fn is_dry(&self) -> bool {
         true

@@ -9,9 +9,9 @@ use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
-struct Law(Load);
+struct BacklashLaw(Load);
 
-impl ForceLaw for Law {
+impl ForceLaw for BacklashLaw {
     fn names(&self) -> Vec<String> {
         vec!["inertia_ratio".into()]
     }
@@ -35,7 +35,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law(Load::new(effect))))
+        Some(Box::new(BacklashLaw(Load::new(effect))))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)

@@ -9,9 +9,9 @@ use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
-struct Law;
+struct CoulombFrictionLaw;
 
-impl ForceLaw for Law {
+impl ForceLaw for CoulombFrictionLaw {
     fn names(&self) -> Vec<String> {
         vec!["coulomb".into()]
     }
@@ -27,7 +27,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law))
+        Some(Box::new(CoulombFrictionLaw))
     }
     fn is_dry(&self) -> bool {
         true

@@ -12,14 +12,14 @@ use std::f64::consts::TAU;
 const STIFFEST_HZ: f64 = 400.0;
 
 #[derive(Debug, Clone)]
-struct Law {
+struct DriveComplianceLaw {
     omega: f64,
     damping: f64,
     /// Position and speed of the resonator; none before the first force.
     state: Option<(f64, f64)>,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for DriveComplianceLaw {
     fn names(&self) -> Vec<String> {
         vec!["inertia_ratio".into()]
     }
@@ -66,7 +66,7 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let omega = TAU * effect.shape_or("resonance_hz", 1.0);
-        Some(Box::new(Law { omega, damping: effect.shape_or("damping", 0.05), state: None }))
+        Some(Box::new(DriveComplianceLaw { omega, damping: effect.shape_or("damping", 0.05), state: None }))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)

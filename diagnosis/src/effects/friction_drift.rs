@@ -8,13 +8,13 @@ use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
-struct Law {
+struct FrictionDriftLaw {
     time_constant: f64,
     /// True if only dry friction drifts, because the rig has no viscous friction.
     dry_only: bool,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for FrictionDriftLaw {
     fn names(&self) -> Vec<String> {
         first_or_both("coulomb", "viscous", !self.dry_only)
     }
@@ -35,7 +35,7 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let time_constant = effect.shape_or("time_constant", 1.0);
-        Some(Box::new(Law { time_constant, dry_only: effect.is_set("dry_only") }))
+        Some(Box::new(FrictionDriftLaw { time_constant, dry_only: effect.is_set("dry_only") }))
     }
     fn is_dry(&self) -> bool {
         true

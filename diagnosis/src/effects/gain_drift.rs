@@ -10,7 +10,7 @@ use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
-struct Law {
+struct GainDriftLaw {
     time_constant: f64,
     /// Time at which the drift comes all at once, s.
     at_once_s: f64,
@@ -19,7 +19,7 @@ struct Law {
     heat: f64,
 }
 
-impl Law {
+impl GainDriftLaw {
     /// The heat in the middle of a step, which it moves on to the step's end.
     fn heated(&mut self, state: &State, mean_square: f64) -> f64 {
         let from = self.heat;
@@ -29,7 +29,7 @@ impl Law {
     }
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for GainDriftLaw {
     fn names(&self) -> Vec<String> {
         vec!["change".into()]
     }
@@ -56,7 +56,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law {
+        Some(Box::new(GainDriftLaw {
             time_constant: effect.shape_or("time_constant", 1.0),
             at_once_s: effect.shape_or("at_once_s", f64::INFINITY),
             mean_square: effect.shape.get("mean_square").copied(),

@@ -8,11 +8,11 @@ use super::law::sign;
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
-struct Law {
+struct LoadDependentFrictionLaw {
     of_drive: bool,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for LoadDependentFrictionLaw {
     fn names(&self) -> Vec<String> {
         vec!["coefficient".into()]
     }
@@ -29,7 +29,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law { of_drive: effect.is_set("of_drive") }))
+        Some(Box::new(LoadDependentFrictionLaw { of_drive: effect.is_set("of_drive") }))
     }
     fn is_dry(&self) -> bool {
         true

@@ -4,12 +4,12 @@ use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, 
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
-struct Law {
+struct MissedCountsLaw {
     names: Vec<String>,
     times: Vec<f64>,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for MissedCountsLaw {
     fn names(&self) -> Vec<String> {
         self.names.clone()
     }
@@ -29,7 +29,7 @@ impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
         let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
-        Some(Box::new(Law { names, times }))
+        Some(Box::new(MissedCountsLaw { names, times }))
     }
     fn in_sensor(&self) -> bool {
         true

@@ -7,12 +7,12 @@ use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
 #[derive(Debug, Clone)]
-struct Law {
+struct PositionDependentDampingLaw {
     profile: Profile,
     of_inertia: bool,
 }
 
-impl Law {
+impl PositionDependentDampingLaw {
     /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and its part of the acceleration.
     fn inertia(&self, state: &State, out: &mut [f64]) {
         let step = 1e-3 * 0.5 * (self.profile.high - self.profile.low);
@@ -27,7 +27,7 @@ impl Law {
     }
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for PositionDependentDampingLaw {
     fn names(&self) -> Vec<String> {
         self.profile.names()
     }
@@ -50,7 +50,10 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law { profile: Profile::new(effect), of_inertia: effect.is_set("of_inertia") }))
+        Some(Box::new(PositionDependentDampingLaw {
+            profile: Profile::new(effect),
+            of_inertia: effect.is_set("of_inertia"),
+        }))
     }
     fn follows_travel(&self) -> bool {
         true

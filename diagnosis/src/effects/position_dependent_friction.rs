@@ -6,9 +6,9 @@ use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
 #[derive(Debug, Clone)]
-struct Law(Profile);
+struct PositionDependentFrictionLaw(Profile);
 
-impl ForceLaw for Law {
+impl ForceLaw for PositionDependentFrictionLaw {
     fn names(&self) -> Vec<String> {
         self.0.names()
     }
@@ -24,7 +24,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law(Profile::new(effect))))
+        Some(Box::new(PositionDependentFrictionLaw(Profile::new(effect))))
     }
     fn is_dry(&self) -> bool {
         true

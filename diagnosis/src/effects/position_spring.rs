@@ -10,7 +10,7 @@ use super::law::first_or_both;
 use super::{Effect, EffectName, State, Subsystem, Variable, experiments};
 
 #[derive(Debug, Clone)]
-struct Law {
+struct PositionSpringLaw {
     from: f64,
     one_sided: bool,
     preload: bool,
@@ -19,7 +19,7 @@ struct Law {
     faded: f64,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for PositionSpringLaw {
     fn names(&self) -> Vec<String> {
         // Where it is at rest is not known: a force that is there at the start.
         first_or_both("stiffness", "preload", self.preload)
@@ -46,7 +46,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law {
+        Some(Box::new(PositionSpringLaw {
             from: effect.shape_or("from", 0.0),
             one_sided: effect.is_set("one_sided"),
             preload: effect.is_set("preload"),

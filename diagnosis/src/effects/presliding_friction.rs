@@ -13,13 +13,13 @@ use crate::numerics::golden_section::logarithmic;
 const SPREAD: f64 = 10.0;
 
 #[derive(Debug, Clone)]
-struct Law {
+struct PreslidingFrictionLaw {
     bristles: Bristles,
     /// Alike, they are LuGre's, which dampen as they bend.
     alike: bool,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for PreslidingFrictionLaw {
     fn names(&self) -> Vec<String> {
         first_or_both("coulomb", "damping", self.alike)
     }
@@ -40,7 +40,10 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law { bristles: Bristles::new(effect), alike: effect.shape_or("spread", 1.0) <= 1.0 }))
+        Some(Box::new(PreslidingFrictionLaw {
+            bristles: Bristles::new(effect),
+            alike: effect.shape_or("spread", 1.0) <= 1.0,
+        }))
     }
     fn needed(&self) -> &'static [&'static str] {
         &["deflection"]

@@ -6,9 +6,9 @@ use super::definition::{
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
-struct Law;
+struct QuadraticDragLaw;
 
-impl ForceLaw for Law {
+impl ForceLaw for QuadraticDragLaw {
     fn names(&self) -> Vec<String> {
         vec!["coefficient".into()]
     }
@@ -24,7 +24,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law))
+        Some(Box::new(QuadraticDragLaw))
     }
     fn depends_on(&self) -> Option<Variable> {
         Some(Variable::Speed)

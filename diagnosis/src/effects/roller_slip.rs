@@ -9,9 +9,9 @@ use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
-struct Law(Load);
+struct RollerSlipLaw(Load);
 
-impl ForceLaw for Law {
+impl ForceLaw for RollerSlipLaw {
     fn names(&self) -> Vec<String> {
         vec!["inertia_ratio".into()]
     }
@@ -30,7 +30,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law(Load::new(effect))))
+        Some(Box::new(RollerSlipLaw(Load::new(effect))))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Grip)

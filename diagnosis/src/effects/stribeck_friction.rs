@@ -9,12 +9,12 @@ use super::{Effect, EffectName, State, Subsystem, Variable};
 use crate::numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
-struct Law {
+struct StribeckFrictionLaw {
     speed: f64,
     exponent: f64,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for StribeckFrictionLaw {
     fn names(&self) -> Vec<String> {
         vec!["peak".into()]
     }
@@ -31,7 +31,7 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let (speed, exponent) = (effect.shape_or("speed", 1.0), effect.shape_or("exponent", 2.0));
-        Some(Box::new(Law { speed, exponent }))
+        Some(Box::new(StribeckFrictionLaw { speed, exponent }))
     }
     fn is_dry(&self) -> bool {
         true

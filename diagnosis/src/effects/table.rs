@@ -73,7 +73,7 @@ impl Table {
 
 /// A force without a name, with what it remembers.
 #[derive(Debug, Clone)]
-struct Law {
+struct TableLaw {
     table: Table,
     /// Travel of one turn, rad or m.
     turn: f64,
@@ -82,7 +82,7 @@ struct Law {
     turned: f64,
 }
 
-impl Law {
+impl TableLaw {
     /// Values of the variables; `velocity` in place of the state's, whose sign may be asked for at rest.
     fn values(&self, s: &State, velocity: f64) -> [f64; 2] {
         let of = |variable: &Variable| match variable {
@@ -99,7 +99,7 @@ impl Law {
     }
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for TableLaw {
     fn names(&self) -> Vec<String> {
         vec!["force".into()]
     }
@@ -128,7 +128,7 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let table = effect.table.clone()?;
-        Some(Box::new(Law { table, turn: effect.shape_or("turn", TAU), way: 0.0, turned: 0.0 }))
+        Some(Box::new(TableLaw { table, turn: effect.shape_or("turn", TAU), way: 0.0, turned: 0.0 }))
     }
 }
 

@@ -6,9 +6,9 @@ use super::definition::{
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
-struct Law;
+struct TiltGravityLaw;
 
-impl ForceLaw for Law {
+impl ForceLaw for TiltGravityLaw {
     fn names(&self) -> Vec<String> {
         vec!["weight".into()]
     }
@@ -24,7 +24,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law))
+        Some(Box::new(TiltGravityLaw))
     }
     fn nominal_term(&self) -> Option<NominalTerm> {
         Some(NominalTerm::Weight)

@@ -8,9 +8,9 @@ use super::joint_terms::JointTerms;
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
-struct Law;
+struct ViscousFrictionLaw;
 
-impl ForceLaw for Law {
+impl ForceLaw for ViscousFrictionLaw {
     fn names(&self) -> Vec<String> {
         vec!["viscous".into()]
     }
@@ -26,7 +26,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(Law))
+        Some(Box::new(ViscousFrictionLaw))
     }
     fn nominal_term(&self) -> Option<NominalTerm> {
         Some(NominalTerm::Viscous)

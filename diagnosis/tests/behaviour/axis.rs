@@ -65,6 +65,17 @@ pub struct Taken {
 
 pub const BENCH: Taken = Taken { rate: 500.0, seconds: 8.0, start: (0.0, 0.0), counts: 2e5 };
 
+/// Returns a generator of numbers from -0.5 to 0.5, the same for each seed.
+fn white(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        random ^= random >> 12;
+        random ^= random << 25;
+        random ^= random >> 27;
+        (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+}
+
 /// Runs the machine under a command over time; `seed` draws a white disturbance of 1 % of its dry friction.
 pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f64) -> Recording {
     let steps = 40;
@@ -73,13 +84,7 @@ pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -
     let (mut q_load, mut v_load) = taken.start;
     let (mut driven, mut behind) = (command(0.0), 0.0);
     let follow = |by: f64| if by > 0.0 { 1.0 - (-h / by).exp() } else { 1.0 };
-    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut noise = || {
-        random ^= random >> 12;
-        random ^= random << 25;
-        random ^= random >> 27;
-        (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut noise = white(seed);
     let mut out = Recording { file: format!("{seed}.csv"), ..Recording::default() };
     for row in 0..(taken.rate * taken.seconds) as u32 {
         let t = f64::from(row) / taken.rate;

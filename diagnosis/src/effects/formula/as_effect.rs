@@ -8,12 +8,12 @@ use crate::effects::{Effect, EffectName, State, Subsystem};
 
 /// A formula along a recording or in a plant, with the values of its shape.
 #[derive(Debug, Clone)]
-struct Law {
+struct FormulaLaw {
     formula: &'static Formula,
     shape: Vec<f64>,
 }
 
-impl ForceLaw for Law {
+impl ForceLaw for FormulaLaw {
     fn names(&self) -> Vec<String> {
         self.formula.terms()
     }
@@ -33,7 +33,7 @@ impl EffectLaw for Formula {
         let formula = effect.name.formula()?;
         // Without a value: the middle of what it may be.
         let value = |(key, low, high): &Movable| effect.shape_or(key, 0.5 * (low + high));
-        Some(Box::new(Law { formula, shape: formula.shape.iter().map(value).collect() }))
+        Some(Box::new(FormulaLaw { formula, shape: formula.shape.iter().map(value).collect() }))
     }
     fn is_dry(&self) -> bool {
         self.is_dry
