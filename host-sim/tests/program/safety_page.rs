@@ -1,6 +1,6 @@
-//! docs/safety.md names tests and CONTRIBUTING.md files: each is where it says.
+//! docs/safety.md and docs/diagnosis-design.md name tests and CONTRIBUTING.md files: each is where it says.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Returns the texts between backquotes in a line.
 fn quoted(line: &str) -> impl Iterator<Item = &str> {
@@ -47,6 +47,34 @@ fn every_test_that_the_page_names_is_there() {
         }
     }
     assert!(seen > 45, "only {seen} tests were seen: the reader of the page is blind");
+}
+
+/// The text of every Rust source below a folder.
+fn sources(folder: PathBuf) -> String {
+    let entries = std::fs::read_dir(folder).expect("it can be listed");
+    let paths = entries.map(|entry| entry.expect("it can be listed").path());
+    paths
+        .map(|path| match path.extension() {
+            _ if path.is_dir() => sources(path),
+            Some(end) if end == "rs" => std::fs::read_to_string(path).expect("a source can be read"),
+            _ => String::new(),
+        })
+        .collect()
+}
+
+#[test]
+fn every_test_that_the_diagnosis_design_names_is_there() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");
+    let page = std::fs::read_to_string(top.join("docs/diagnosis-design.md")).expect("the page");
+    let (_, table) = page.split_once("| fault | test |").expect("its table");
+    let rows = table.split("\n\n").next().unwrap_or_default();
+    let code = sources(top.join("diagnosis/src")) + &sources(top.join("diagnosis/tests"));
+    let cells = rows.lines().filter_map(|row| row.split(" | ").nth(1));
+    let tests: Vec<&str> = cells.flat_map(quoted).filter(|word| !word.contains('/')).collect();
+    assert!(tests.len() >= 10, "only {tests:?}");
+    for test in tests {
+        assert!(code.contains(&format!("fn {test}()")), "diagnosis has no test `{test}`");
+    }
 }
 
 #[test]
