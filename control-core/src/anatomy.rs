@@ -20,9 +20,9 @@ use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 
 /// The smallest angle to the skin that is distinguished: 5°. Below it, layers stay where they are met at 5°.
-pub const SMALLEST_ANGLE: Milliradians = Milliradians(87);
+pub(crate) const SMALLEST_ANGLE: Milliradians = Milliradians(87);
 /// Straight in.
-pub const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
+pub(crate) const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
 /// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor does not heal a wall.
 const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
 /// Ticks from one look at the tilt to the next.

@@ -15,7 +15,7 @@ mod log;
 pub mod monitor;
 pub mod port;
 pub mod reset;
-pub mod stage_timing;
+pub(crate) mod stage_timing;
 pub mod store;
 pub mod supervision;
 pub mod tasks;

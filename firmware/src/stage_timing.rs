@@ -40,7 +40,7 @@ impl Stages {
     }
 
     /// Begins a session: the longest times count anew.
-    pub fn forget_longest(&self) {
+    pub(crate) fn forget_longest(&self) {
         for longest in &self.longest {
             longest.store(0, Relaxed);
         }

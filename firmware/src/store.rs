@@ -19,7 +19,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// Raised whenever the bytes of a stored record mean something else.
-pub const LAYOUT_VERSION: u8 = 6;
+pub(crate) const LAYOUT_VERSION: u8 = 6;
 /// Words of a cell: 1 KiB, room for the longest record.
 pub const CELL_WORDS: usize = 256;
 /// Erased flash.

@@ -25,7 +25,7 @@ impl Task {
     pub const ALL: [Self; 4] = [Self::Tick, Self::Usb, Self::Telemetry, Self::Tilt];
 
     /// Returns the milliseconds for which it may be silent.
-    pub const fn allowance_ms(self) -> u32 {
+    pub(crate) const fn allowance_ms(self) -> u32 {
         match self {
             Task::Tick => timing::TICK_SILENCE_MS,
             Task::Usb | Task::Telemetry => timing::TASK_SILENCE_MS,

@@ -7,7 +7,6 @@ mod inclinometer;
 mod watch;
 
 pub use accelerometer::Accelerometer;
-pub use angle::{below_horizontal, from_sine};
 pub use inclinometer::{Inclinometer, ReadCode};
 pub use watch::{Reading, TiltWatch};
 

@@ -31,29 +31,29 @@ pub const TICK_TIMER_COUNTS: u32 = TICK_TIMER_HZ / TICK_HZ;
 pub const OUTPUT_CYCLES: u32 = CORE_HZ / 50_000;
 
 /// Two ticks further apart than this are not neighbours: a period and a half.
-pub const TICK_MISSED_CYCLES: u32 = TICK_CYCLES + TICK_CYCLES / 2;
+pub(crate) const TICK_MISSED_CYCLES: u32 = TICK_CYCLES + TICK_CYCLES / 2;
 
 /// Rate of the supervisor, and of everything that it sets off: often enough that its 1 ms is small against the 20 ms in
 /// which a hung task must have lost its torque, seldom enough to cost nothing.
 pub const SUPERVISOR_HZ: u32 = 1_000;
 
 /// The tilt sensor is read at twice the 100 Hz at which it measures: no measurement is missed, whatever its clock does.
-pub const TILT_PERIOD_MS: u32 = 5;
+pub(crate) const TILT_PERIOD_MS: u32 = 5;
 
 /// The time for which the tick may be silent before the supervisor calls it hung: it runs ten times in that time. A tick that never
 /// returns starves the supervisor too, and is left to the watchdog.
-pub const TICK_SILENCE_MS: u32 = 2;
+pub(crate) const TICK_SILENCE_MS: u32 = 2;
 
 /// The time for which the USB and telemetry tasks may be silent: both run every millisecond, and five of them are more than the
 /// longest of either ever measured, yet leave time to act within 20 ms.
-pub const TASK_SILENCE_MS: u32 = 5;
+pub(crate) const TASK_SILENCE_MS: u32 = 5;
 
 /// The time for which the tilt task may be silent: two of its periods and a millisecond.
-pub const TILT_SILENCE_MS: u32 = 2 * TILT_PERIOD_MS + 1;
+pub(crate) const TILT_SILENCE_MS: u32 = 2 * TILT_PERIOD_MS + 1;
 
 /// Ticks without a sign of the supervisor after which the tick takes torque away by itself: 5 ms. It is what catches a task
 /// that keeps the supervisor from running, for instance a USB stack that waits for a flag with interrupts masked.
-pub const SUPERVISOR_SILENCE_TICKS: u32 = 50;
+pub(crate) const SUPERVISOR_SILENCE_TICKS: u32 = 50;
 
 /// The independent watchdog, nominal. Its oscillator runs at 17 to 47 kHz instead of 32: 10 ms lie between 6.8 ms, still
 /// several periods of the supervisor, and 18.8 ms, still within the 20 ms for a hung task.
@@ -75,13 +75,13 @@ pub const PULL_SETTLE_CYCLES: u32 = CORE_HZ / 50_000;
 pub const ENCODER_FILTER: u8 = 0b0111;
 
 /// Readings that fail in a row before the tilt sensor counts as broken: 50 ms. One bad transfer is no reason to drop torque.
-pub const TILT_BAD_READINGS: u32 = 10;
+pub(crate) const TILT_BAD_READINGS: u32 = 10;
 
 /// Readings without a new measurement before the tilt sensor counts as stuck: 100 ms, ten measurements.
-pub const TILT_STALE_READINGS: u32 = 20;
+pub(crate) const TILT_STALE_READINGS: u32 = 20;
 
 /// Equal measurements before a sensor that resolves its own noise (LIS3DSH, 0.06 mg) counts as stuck: half a second.
-pub const TILT_FROZEN_MEASUREMENTS: u32 = 50;
+pub(crate) const TILT_FROZEN_MEASUREMENTS: u32 = 50;
 
 /// Clock of the tilt sensor's SPI, at most; both revisions allow 10 MHz, and a slow edge rings less.
 pub const TILT_SPI_HZ: u32 = 1_500_000;

@@ -20,7 +20,7 @@ pub const PROTOCOL_VERSION: u16 = 9;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
-pub const POSE_HZ: u16 = 1_000;
+pub(crate) const POSE_HZ: u16 = 1_000;
 /// Stages whose time is reported.
 pub const STAGES: usize = 8;
 

@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// More particles are refused: the picture would not keep up.
-pub const MOST_PARTICLES: usize = 20_000;
+pub(crate) const MOST_PARTICLES: usize = 20_000;
 
 /// One layer of tissue: a slab of tetrahedra.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,11 +7,11 @@
 use crate::vector::{Vector, add, cross, dot, length, scale, sub};
 
 /// Place in mm and inverse mass in 1/g of a particle.
-pub type Point = [f32; 4];
+pub(crate) type Point = [f32; 4];
 
 /// The place of a particle.
 #[inline]
-pub fn place(point: &Point) -> Vector {
+pub(crate) fn place(point: &Point) -> Vector {
     [point[0], point[1], point[2]]
 }
 
@@ -23,7 +23,7 @@ fn shift(point: &mut Point, by: Vector) {
 }
 
 /// One constraint: what the solver has to know of it.
-pub trait Constraint {
+pub(crate) trait Constraint {
     /// The particles that it moves; the same number for every constraint of a type, unused ones repeat a used one.
     fn particles(&self) -> impl Iterator<Item = u32>;
     /// One projection. `inverse_dt2` is 1/dt² in 1/s²; `lambda` is the multiplier so far in this substep.
@@ -100,7 +100,7 @@ fn six_volumes(p: [Vector; 4]) -> f32 {
 }
 
 /// Signed volume of a tetrahedron in mm³.
-pub fn volume(p: [Vector; 4]) -> f32 {
+pub(crate) fn volume(p: [Vector; 4]) -> f32 {
     six_volumes(p) / 6.0
 }
 
@@ -193,7 +193,7 @@ fn angle(p: [Vector; 4]) -> Option<(f32, [Vector; 4])> {
 }
 
 /// Angle between the normals of two triangles that share the edge `p[0]`, `p[1]`, in rad; 0 where they are flat.
-pub fn bending_angle(p: [Vector; 4]) -> f32 {
+pub(crate) fn bending_angle(p: [Vector; 4]) -> f32 {
     angle(p).map_or(0.0, |(angle, _)| angle)
 }
 
@@ -234,7 +234,7 @@ impl Constraint for Bending {
 }
 
 /// Most particles that a place is given by.
-pub const MOST_CORNERS: usize = 8;
+pub(crate) const MOST_CORNERS: usize = 8;
 
 /// A place in the tissue: a weighted mean of particles. It moves with them.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,7 +12,7 @@
 
 pub mod body;
 pub mod configuration;
-pub mod constraint;
+pub(crate) mod constraint;
 mod lattice;
 pub mod needle;
 pub mod push;

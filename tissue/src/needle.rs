@@ -9,7 +9,7 @@ use crate::constraint::{Anchor, Point, place};
 use crate::vector::{Vector, add, cross, direction, dot, is_finite, length, scale, sub};
 
 /// A held place that would be pulled farther aside than this lets go and is taken hold of anew, mm.
-pub const TEAR_MM: f32 = 3.0;
+pub(crate) const TEAR_MM: f32 = 3.0;
 /// Tissue springs back after a puncture with this time constant, s.
 const RECOVERY_S: f32 = 0.08;
 /// Distance between the places along the shaft where tissue is held, mm.

@@ -14,7 +14,7 @@ pub struct Medium {
 }
 
 /// Speed that every machine assumes, m/s.
-pub const ASSUMED_SPEED: f32 = 1540.0;
+pub(crate) const ASSUMED_SPEED: f32 = 1540.0;
 
 /// Impedance, attenuation and speed of blood, fat, muscle and bone: textbook values.
 pub const BLOOD: Medium = Medium { impedance: 1.61, attenuation: 0.18, speed: 1570.0, speckle_db: -34.0 };
@@ -27,9 +27,11 @@ pub const BONE: Medium = Medium { impedance: 7.80, attenuation: 5.0, speed: 4080
 /// Skin: density 1109 kg/m³ × 1624 m/s; our assumption.
 pub const SKIN: Medium = Medium { impedance: 1.80, attenuation: 1.8, speed: 1624.0, speckle_db: 5.0 };
 /// Tendon: our assumption, between muscle and skin.
-pub const TENDON: Medium = Medium { impedance: 1.84, attenuation: 1.5, speed: 1650.0, speckle_db: 7.0 };
+pub(crate) const TENDON: Medium =
+    Medium { impedance: 1.84, attenuation: 1.5, speed: 1650.0, speckle_db: 7.0 };
 /// The wall of a vessel: our assumption, a little harder than muscle.
-pub const VESSEL_WALL: Medium = Medium { impedance: 1.78, attenuation: 0.9, speed: 1580.0, speckle_db: 6.0 };
+pub(crate) const VESSEL_WALL: Medium =
+    Medium { impedance: 1.78, attenuation: 0.9, speed: 1580.0, speckle_db: 6.0 };
 /// Steel of a needle.
 pub const STEEL: Medium = Medium { impedance: 45.0, attenuation: 0.1, speed: 5800.0, speckle_db: 0.0 };
 
@@ -47,7 +49,7 @@ impl Medium {
     }
 
     /// Share of the pressure that comes back from the interface to `other`; squared it is the share of the intensity.
-    pub fn pressure_reflection(&self, other: &Medium) -> f32 {
+    pub(crate) fn pressure_reflection(&self, other: &Medium) -> f32 {
         (other.impedance - self.impedance) / (other.impedance + self.impedance)
     }
 

@@ -117,7 +117,7 @@ impl Probe {
 
     /// Half the beam's thickness at a depth as the standard deviation of a Gaussian, mm: thinnest at the focus, and wider away
     /// from it as a Gaussian beam of the wavelength is.
-    pub fn beam_sigma_mm(&self, depth_mm: f32) -> f32 {
+    pub(crate) fn beam_sigma_mm(&self, depth_mm: f32) -> f32 {
         let sigma = self.thickness_mm / FWHM;
         let wavelength = 1.54 / self.mhz;
         // Waist of the pressure w₀ = √2·σ, Rayleigh range π·w₀²/λ.

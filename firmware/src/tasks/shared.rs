@@ -8,9 +8,9 @@ use control_core::units::{DacCode, Milliradians};
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// Enumerated, configured and not suspended: a bit of [`Shared::link`].
-pub const LINK_CONFIGURED: u8 = 1;
+pub(crate) const LINK_CONFIGURED: u8 = 1;
 /// A program has the port open (DTR): a bit of [`Shared::link`].
-pub const LINK_READY: u8 = 2;
+pub(crate) const LINK_READY: u8 = 2;
 
 /// All of them; there is one on a device.
 pub struct Shared {
@@ -73,7 +73,7 @@ impl Shared {
     }
 
     /// Gives the supervisor the code that a converter of this width was given.
-    pub fn set_given(&self, width: DacWidth, code: DacCode) {
+    pub(crate) fn set_given(&self, width: DacWidth, code: DacCode) {
         // As 16 bits: the highest of any width are in one place.
         self.given.store(code.0 << (16 - width.bits()), Relaxed);
     }

@@ -27,7 +27,7 @@ fn arc_tangent(y: i32, x: i32) -> Milliradians {
 }
 
 /// Inclination of the x axis below the horizontal: an axis that points down measures −1 g.
-pub fn below_horizontal(acceleration: Acceleration) -> Milliradians {
+pub(crate) fn below_horizontal(acceleration: Acceleration) -> Milliradians {
     let Acceleration { x_mg, y_mg, z_mg } = acceleration;
     let square = |mg: i32| mg.unsigned_abs().saturating_mul(mg.unsigned_abs());
     let across = square(y_mg).saturating_add(square(z_mg)).isqrt();
@@ -35,7 +35,7 @@ pub fn below_horizontal(acceleration: Acceleration) -> Milliradians {
 }
 
 /// The angle whose sine is `sine_milli` thousandths; clamped to a right angle.
-pub fn from_sine(sine_milli: i32) -> Milliradians {
+pub(crate) fn from_sine(sine_milli: i32) -> Milliradians {
     let sine = sine_milli.clamp(-1000, 1000);
     let cosine = (1_000_000 - sine * sine).unsigned_abs().isqrt();
     arc_tangent(sine, cosine as i32)

@@ -153,7 +153,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The same where the movement may take up to `longest`.
-    pub async fn play_within(
+    pub(crate) async fn play_within(
         &mut self,
         excitation: &Excitation,
         longest: Duration,

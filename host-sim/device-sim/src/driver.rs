@@ -14,9 +14,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Time between heartbeats; the device waits for four of them.
-pub const HEARTBEAT: Duration = Duration::from_millis(50);
+pub(crate) const HEARTBEAT: Duration = Duration::from_millis(50);
 /// An unanswered command is repeated after this.
-pub const REPEAT: Duration = Duration::from_millis(100);
+pub(crate) const REPEAT: Duration = Duration::from_millis(100);
 /// A command that gives torque is not repeated to a device that has sent no samples for this long; it sends a block every 3.2 ms.
 const DOUBT: Duration = Duration::from_millis(50);
 /// A device that sends no samples for this long has started anew or is gone: hello again.

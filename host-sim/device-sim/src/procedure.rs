@@ -126,13 +126,13 @@ impl Procedure {
     }
 
     /// Returns the number of the step that is going on `seconds` into the procedure.
-    pub fn step_at(&self, seconds: f64) -> usize {
+    pub(crate) fn step_at(&self, seconds: f64) -> usize {
         let in_round = seconds.max(0.0) % self.round_s;
         self.moves.partition_point(|m| m.begin_s <= in_round).saturating_sub(1)
     }
 
     /// Returns the name of the task that the scripted hand does when a step begins.
-    pub fn task_of(&self, step: usize) -> Option<&str> {
+    pub(crate) fn task_of(&self, step: usize) -> Option<&str> {
         let task = self.moves.get(step)?.task?;
         Some(self.tasks.get(task)?.name.as_str())
     }

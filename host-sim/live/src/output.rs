@@ -42,7 +42,7 @@ pub fn page(what: &str, url: &str) {
 }
 
 /// Prints the address of a page for other computers, and the same as a QR code for a camera.
-pub fn page_for_others(url: &str) {
+pub(crate) fn page_for_others(url: &str) {
     note!("for tablets and phones: {url}");
     // An address always fits.
     if let Ok(code) = qrcode::QrCode::new(url) {

@@ -12,7 +12,7 @@ use link::frames;
 use serde::{Deserialize, Serialize};
 
 /// Topic and JSON schema of every channel.
-pub const CHANNELS: [(&str, &str, &str); 8] = [
+pub(crate) const CHANNELS: [(&str, &str, &str); 8] = [
     ("/setup", "Setup", include_str!("schemas/setup.json")),
     ("/hello", "Hello", include_str!("schemas/hello.json")),
     ("/samples", "Samples", include_str!("schemas/samples.json")),
@@ -244,7 +244,7 @@ fn held(value: f64) -> I16F16 {
 
 impl Samples {
     /// A block as it came, or its first `keep` samples.
-    pub fn from_block(first_tick: u64, samples: &[Sample]) -> Self {
+    pub(crate) fn from_block(first_tick: u64, samples: &[Sample]) -> Self {
         Self {
             first_tick,
             count: samples.iter().map(|s| s.count).collect(),

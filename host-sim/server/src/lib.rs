@@ -3,7 +3,7 @@
 mod bounded_listener;
 pub mod class;
 pub mod guide;
-pub mod live_gains;
+pub(crate) mod live_gains;
 pub mod outlets;
 pub mod patient_manager;
 pub mod realtime_clock;

@@ -6,30 +6,30 @@ use control_core::compensation::{Gain, Gains};
 
 /// The gains that a device has stored, and the share of them in force.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LiveGains {
+pub(crate) struct LiveGains {
     stored: Option<Gains>,
     share: f64,
 }
 
 impl LiveGains {
     /// Takes the device's own report: all of its gains are active.
-    pub fn learn(&mut self, device: &Device) {
+    pub(crate) fn learn(&mut self, device: &Device) {
         self.stored = device.compensation.is_some().then_some(device.compensation.gains);
         self.share = 1.0;
     }
 
     /// Nothing is known of the device any more.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// The share in force, 0 to 1; none where there is nothing to compensate.
-    pub fn share(&self) -> Option<f64> {
+    pub(crate) fn share(&self) -> Option<f64> {
         self.stored.map(|_| self.share)
     }
 
     /// The gains for `share` (0 to 1) of the stored ones, where there are any.
-    pub fn at(&mut self, share: f64) -> Option<Gains> {
+    pub(crate) fn at(&mut self, share: f64) -> Option<Gains> {
         let stored = self.stored?;
         self.share = share.clamp(0.0, 1.0);
         let of = |gain: Gain| Gain((f64::from(gain.0) * self.share).round() as u8);

@@ -54,7 +54,7 @@ impl SavedPatients {
     }
 
     /// Returns `name` or, where a patient has it already, the next of `name-2`, `name-3` and so on.
-    pub fn free_name(&self, name: &str) -> Result<String, Failure> {
+    pub(crate) fn free_name(&self, name: &str) -> Result<String, Failure> {
         let is_free = |name: &str| {
             !profile::BUILT_IN.iter().any(|(known, _)| *known == name) && !self.file(name).exists()
         };

@@ -49,7 +49,7 @@ impl LiveScore {
     }
 
     /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its figures.
-    pub fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
+    pub(crate) fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
             let (samples, events) = (Vec::new(), Vec::new());

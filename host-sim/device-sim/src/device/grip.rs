@@ -17,7 +17,7 @@ pub struct Grip {
 
 impl Grip {
     /// Largest force along the needle before it slips, N. Only the driven roller holds it; the other one turns freely.
-    pub fn slips_at_n(self) -> f64 {
+    pub(crate) fn slips_at_n(self) -> f64 {
         self.pressing_n * self.friction
     }
 

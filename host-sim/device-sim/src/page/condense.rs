@@ -7,7 +7,7 @@ use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
 
 /// Length of a [`Bucket`] in ticks: 5 ms, so that 10 s are 2,000 of them, more than a plot has columns.
-pub const BUCKET_TICKS: u64 = 50;
+pub(crate) const BUCKET_TICKS: u64 = 50;
 /// Ticks a second until a device has said otherwise.
 const DEFAULT_TICK_HZ: u32 = control_core::TICK_HZ;
 

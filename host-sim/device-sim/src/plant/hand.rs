@@ -66,7 +66,7 @@ impl Hand {
     }
 
     /// Moves the tremor on by a tick: displacement in m and its speed in m/s.
-    pub fn tremor_tick(&mut self) -> (f64, f64) {
+    pub(crate) fn tremor_tick(&mut self) -> (f64, f64) {
         if self.grip.tremor_rms_m == 0.0 {
             return (0.0, 0.0);
         }

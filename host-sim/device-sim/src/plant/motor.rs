@@ -44,7 +44,7 @@ pub struct Amplifier {
 
 impl Motor {
     /// The current in A that a set value of −1 to 1 asks for, within the limit.
-    pub fn wanted_current(&self, set_value: f64) -> f64 {
+    pub(crate) fn wanted_current(&self, set_value: f64) -> f64 {
         let asked = set_value * self.full_scale_torque / self.torque_constant;
         asked.clamp(-self.current_limit, self.current_limit)
     }

@@ -229,7 +229,7 @@ fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
 }
 
 /// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way, where it has one.
-pub fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
+pub(crate) fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
     let wall = layer.wall?;
     Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
 }

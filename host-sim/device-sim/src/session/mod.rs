@@ -10,9 +10,10 @@ pub use messages::{
     Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
     RecordingStatus, ReplayStatus, TaskDone,
 };
+pub(crate) use scene::vessel_name;
 pub use scene::{
     Scene, SceneBeside, SceneBody, SceneLayer, SceneNeedle, SceneOutline, SceneVessel, Source, state_name,
-    tissue_name, vessel_name,
+    tissue_name,
 };
 
 use control_core::controller::Sample;

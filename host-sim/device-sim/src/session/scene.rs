@@ -194,7 +194,7 @@ pub fn tissue_name(tissue: Tissue) -> &'static str {
 }
 
 /// Returns the name for programs of the tip's place relative to a vessel.
-pub fn vessel_name(code: u8) -> &'static str {
+pub(crate) fn vessel_name(code: u8) -> &'static str {
     match VesselState::from_code(code) {
         Some(VesselState::Outside) => "outside",
         Some(VesselState::Touching) => "touching",

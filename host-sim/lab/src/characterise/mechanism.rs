@@ -102,7 +102,7 @@ impl BareDevice {
     }
 
     /// The same with a hand that turns the roller by `external` N·m.
-    pub fn tick_under(&mut self, tilt: f64, external: f64) {
+    pub(crate) fn tick_under(&mut self, tilt: f64, external: f64) {
         while let Some(order) = self.endpoint.next_order() {
             self.controller.order(order);
         }

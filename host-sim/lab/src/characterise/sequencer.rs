@@ -140,7 +140,7 @@ impl<'a> Sequencer<'a> {
     }
 
     /// Seconds recorded.
-    pub fn played_s(&self) -> f64 {
+    pub(crate) fn played_s(&self) -> f64 {
         self.samples.len() as f64 / f64::from(TICK_HZ)
     }
 

@@ -49,7 +49,7 @@ impl Landmarks {
 }
 
 /// True for the pieces over which a force rises or stays; the others are falls.
-pub fn is_rise(piece: usize) -> bool {
+pub(crate) fn is_rise(piece: usize) -> bool {
     piece.is_multiple_of(2)
 }
 
@@ -163,7 +163,7 @@ fn tridiagonal(mut diagonal: Vec<f64>, upper: &[f64], mut right: Vec<f64>) -> Ve
 }
 
 /// Places `count` knots beyond the ends of the pieces where they help most, the same in all cells.
-pub fn place_knots(cells: &[&Overlaid], pieces: usize, count: usize) -> Knots {
+pub(crate) fn place_knots(cells: &[&Overlaid], pieces: usize, count: usize) -> Knots {
     /// Places that a knot may have within a piece.
     const CANDIDATES: usize = 16;
     let mut knots: Knots = vec![vec![0.0, 1.0]; pieces];

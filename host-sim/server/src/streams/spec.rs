@@ -106,7 +106,7 @@ pub struct Token(String);
 
 impl Token {
     /// The smallest number of characters.
-    pub const SHORTEST: usize = 12;
+    pub(crate) const SHORTEST: usize = 12;
 
     /// True if `said` is the token; takes equally long wherever they first differ.
     pub(super) fn is(&self, said: &[u8]) -> bool {

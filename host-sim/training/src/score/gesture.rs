@@ -21,7 +21,7 @@ pub struct Place {
 
 impl Place {
     /// Along the skin and below it, mm.
-    pub fn in_section(self) -> (f64, f64) {
+    pub(crate) fn in_section(self) -> (f64, f64) {
         let (sin, cos) = self.angle_rad.sin_cos();
         (self.depth_mm * cos, self.depth_mm * sin)
     }
@@ -95,7 +95,7 @@ impl Gesture {
     }
 
     /// Returns the error of the angle from `wanted_rad` along the whole way; `None` if the tip has not moved.
-    pub fn angle_error(&self, wanted_rad: f64) -> Option<AngleError> {
+    pub(crate) fn angle_error(&self, wanted_rad: f64) -> Option<AngleError> {
         let (mut squares, mut way, mut largest) = (0.0, 0.0, 0.0_f64);
         for (place, mm) in self.places.iter().skip(1).zip(self.steps_mm()) {
             let error = (place.angle_rad - wanted_rad).to_degrees();

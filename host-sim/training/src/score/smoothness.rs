@@ -5,9 +5,9 @@
 use std::f64::consts::TAU;
 
 /// Frequencies above this say nothing of a movement, Hz (ω_c^max = 40π rad/s in the paper).
-pub const HIGHEST_HZ: f64 = 20.0;
+pub(crate) const HIGHEST_HZ: f64 = 20.0;
 /// The level of the normalised spectrum below which it is noise (V̄ in the paper).
-pub const THRESHOLD: f64 = 0.05;
+pub(crate) const THRESHOLD: f64 = 0.05;
 /// The factor by which padding refines the spectrum (2⁴ in the paper).
 const PADDING: usize = 16;
 /// A movement in fewer samples than this has no spectrum to speak of.
@@ -15,7 +15,7 @@ const FEWEST: usize = 8;
 
 /// Spectral arc length of `speed` (any unit, evenly sampled at `rate_hz`): about −1.4 for one smooth movement, the more negative the less
 /// smooth. None where nothing moved, or for too short a time.
-pub fn spectral_arc_length(speed: &[f64], rate_hz: f64) -> Option<f64> {
+pub(crate) fn spectral_arc_length(speed: &[f64], rate_hz: f64) -> Option<f64> {
     if speed.len() < FEWEST || rate_hz.is_nan() || rate_hz <= 0.0 {
         return None;
     }

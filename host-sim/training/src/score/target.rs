@@ -100,7 +100,7 @@ fn leaves_below(kind: &EventKind, below: Option<(u8, bool)>) -> bool {
 }
 
 /// Names of what was to be spared: touched, and left alone. `spared` has number and name of each.
-pub fn hit_and_spared(
+pub(crate) fn hit_and_spared(
     events: &[Event],
     (begin, end): (u64, u64),
     spared: &[(u8, String)],

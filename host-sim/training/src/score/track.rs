@@ -13,7 +13,7 @@ pub struct MetAgain {
 }
 
 /// Reads `events`, which are in their order in time: what was met again from `begin` to `end`, and had given way at any time before.
-pub fn met_again(events: &[Event], (begin, end): (u64, u64)) -> MetAgain {
+pub(crate) fn met_again(events: &[Event], (begin, end): (u64, u64)) -> MetAgain {
     let mut again = MetAgain::default();
     let mut given = [false; 8];
     for event in events.iter().filter(|event| event.tick <= end) {
