@@ -48,16 +48,14 @@ pub(crate) fn find(top: &Path) -> Result<Vec<Brought>, String> {
         ));
     }
     if let Some(id) = keys.keys().find(|id| !found.contains_key(*id)) {
-        return Err(format!("the key tells of `{id}`, and {} has no such case", cases.display()));
+        return Err(format!("the key lists `{id}`, and {} has no such case", cases.display()));
     }
     found.into_iter().map(|(id, path)| case(&id, &path, &keys)).collect()
 }
 
 fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought, String> {
-    let truth = keys
-        .get(id)
-        .cloned()
-        .ok_or_else(|| format!("the key tells nothing of the case {}", path.display()))?;
+    let truth =
+        keys.get(id).cloned().ok_or_else(|| format!("the key does not list the case {}", path.display()))?;
     Ok(Brought { id: id.into(), paths: paths(path)?, truth })
 }
 
@@ -105,7 +103,7 @@ fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
         return Ok(list.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
     }
     Err(format!(
-        "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/benchmark.md tells the format",
+        "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/benchmark.md describes the format",
         top.display()
     ))
 }

@@ -104,7 +104,7 @@ pub fn follows(mut board: Board, config: Option<Config>) -> ([u32; 8], usize) {
     // The device numbers its ticks from the first one, and says in which it started.
     let mut events = pc.heard.events.iter();
     let started = events.find(|event| event.kind == EventKind::Started).expect("the device started").tick;
-    // The table of seed 000 looks up speed and angle in one tick of four, counted from the tick that took the patient. No frame
+    // The table of Paper 000 looks up speed and angle in one tick of four, counted from the tick that took the patient. No frame
     // names that tick. The needle rests until long after it, so only its remainder by four matters.
     let candidates: Vec<Option<u64>> = config.as_ref().map_or(vec![None], |_| (0..4).map(Some).collect());
     let plan = config.unwrap_or_else(Config::commissioned_virtual).plan().expect("it may run");

@@ -144,7 +144,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// The state of a signal after so many ticks, as many calls of [`Reference::tick`] give, leg by leg and without the cycles
+    /// Returns the state of a signal that so many calls of [`Reference::tick`] lead to, computed leg by leg and without the cycles
     /// that begin again.
     pub fn after(signal: &Signal, ticks: u32) -> Self {
         let legs = 2 * u32::from(steps_and_ratio(signal).0);

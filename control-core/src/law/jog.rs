@@ -1,4 +1,4 @@
-//! The law of seed 001: the jog effect of each wall and the friction between them.
+//! The law of Paper 001: the jog effect of each wall and the friction between them.
 
 use super::{ForceLimits, LayerHit, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
@@ -15,7 +15,7 @@ use fixed::types::{I2F30, I8F24, I16F16, I32F32};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// The law of friction inside tissue (seed 001, eq. 2).
+/// The law of friction inside tissue (Paper 001, eq. 2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrictionLaw {
     /// Equation 2 as printed. It lets go of a resting needle within a second.

@@ -165,11 +165,11 @@ macro_rules! laws {
 }
 
 laws! {
-    /// Seed 001: the jog effect of each wall, and friction in each layer.
+    /// Paper 001: the jog effect of each wall, and friction in each layer.
     Jog(FrictionLaw) => jog,
-    /// Seed 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of the direction.
+    /// Paper 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of the direction.
     Sparte(Sparte) => sparte,
-    /// Seed 000: a table over depth, speed and angle.
+    /// Paper 000: a table over depth, speed and angle.
     Xr(ForceTable) => xr,
 }
 

@@ -1,4 +1,4 @@
-//! The law of seed 002 (SPARTE), for an injection into a joint: a wall rises along a polynomial of second order until it
+//! The law of Paper 002 (SPARTE), for an injection into a joint: a wall rises along a polynomial of second order until it
 //! gives way; then the tip cuts against a *tracking wall*, which follows it at a distance that makes the cutting force of its
 //! layer, while LuGre friction rubs along the shaft; on the way out both act the other way, cutting with magnitudes of its
 //! own. A fixture holds the direction of entry: its lateral force is computed and told, for this device turns freely.

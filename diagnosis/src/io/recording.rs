@@ -62,7 +62,7 @@ impl Rows {
             if let Some(known) = COLUMNS.iter().position(|column| column == name)
                 && place[known].replace(index).is_some()
             {
-                return Err(format!("the column {name} stands there twice; keep one of them"));
+                return Err(format!("there are two columns {name}; keep one of them"));
             }
         }
         if let Some(needed) = (0..3).find(|needed| place[*needed].is_none()) {

@@ -202,7 +202,7 @@ impl Rig {
         for (key, value) in positive {
             if value.is_some_and(f64::is_nan) {
                 return Err(format!(
-                    "{key} is still to be filled in: no recording tells it; put in what your simulation has"
+                    "{key} is not filled in, and recordings do not show it; enter the value of your simulation"
                 ));
             }
             if value.is_some_and(|x| !(x.is_finite() && x > 0.0 && x < 1e30)) {
@@ -221,7 +221,7 @@ impl Rig {
         let gain = self.actuator.gain;
         if gain.is_nan() {
             return Err(
-                "actuator.gain is still to be filled in: it is the force for one unit of command, and no recording tells it".into(),
+                "actuator.gain is not filled in: it is the force for one unit of command, and recordings do not show it".into(),
             );
         }
         if !(gain.is_finite() && gain != 0.0 && gain.abs() < 1e30) {

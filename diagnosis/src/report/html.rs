@@ -54,7 +54,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
 /// The motion that the simulation gives beside the one that was recorded.
 fn motion(out: &mut String, outcome: &Outcome) {
     let Some(first) = outcome.evidence.simulated.first() else { return };
-    let _ = write!(out, "<section><h2>Simulated beside recorded: {}, held out</h2>", safe(&first.file));
+    let _ = write!(out, "<section><h2>Simulated and recorded: {}, held out</h2>", safe(&first.file));
     let found = first.figures("patched").is_some();
     let wanted: &[&str] = if found { &["nominal", "patched"] } else { &["nominal", "refit"] };
     motion_picture::in_windows(out, first, wanted);

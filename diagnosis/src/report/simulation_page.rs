@@ -67,7 +67,7 @@ pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[Stri
     }
     for one in compared {
         let names: Vec<&str> = one.models.iter().map(|m| m.model.as_str()).collect();
-        let _ = write!(out, "<section><h2>Simulated beside recorded: {}</h2>", safe(&one.file));
+        let _ = write!(out, "<section><h2>Simulated and recorded: {}</h2>", safe(&one.file));
         in_windows(&mut out, one, &names);
         table(&mut out, one);
         free_run(&mut out, one, &names);

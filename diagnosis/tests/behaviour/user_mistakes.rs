@@ -213,7 +213,7 @@ const MISTAKES: [(&str, &str, &str, &str); 10] = [
         "holdout.csv",
         "model.weight acts through the tilt and fit.csv has no column tilt_rad",
     ),
-    ("unfilled.toml", "fit.csv", "holdout.csv", "model.inertia is still to be filled in"),
+    ("unfilled.toml", "fit.csv", "holdout.csv", "model.inertia is not filled in"),
 ];
 
 #[test]

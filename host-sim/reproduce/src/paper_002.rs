@@ -65,7 +65,8 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     }
     figures.push((
         clamping(&profile, &traces),
-        "Fig. 5: the clamping force along the way. It is computed and told: this device turns freely.".into(),
+        "Fig. 5: the clamping force along the way. It is computed and reported: this device turns freely."
+            .into(),
     ));
     figures.push((
         over_depth(&traces),
@@ -76,7 +77,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
     for words in [
         "The forces of the withdrawal are “of the same kind, in the opposite direction”: no number. Ours have their own magnitudes in the patient's file.",
         "The coefficients of the polynomial before the puncture and of the friction are other papers'. Depths of the layers are not given: ours stand in the patient's file with their sources.",
-        "Where the bursa lies along the skin: the patient's file says from where to where. In the first injection the needle goes in at 37° and passes beside it, is drawn back by 20 mm, turned to 45°, and reaches it. Layers of the device go on for ever: beside the bursa the hand feels its cutting force all the same.",
+        "The place of the bursa along the skin: the patient's file says from where to where. In the first injection the needle goes in at 37° and passes beside it, is drawn back by 20 mm, turned to 45°, and reaches it. Layers of the device go on for ever: beside the bursa the hand feels its cutting force all the same.",
         "Need 1 asks for a free entry point, and the conclusion says that it is fixed: here the procedure chooses it.",
     ] {
         sheet.paragraph(words);

@@ -6,7 +6,7 @@ use lab::force_fit::{self, Fit, insertions, page, table::Origin, writer};
 use live::{examples, say};
 use std::path::{Path, PathBuf};
 
-/// Fit the force table of seed 000, F(depth, speed, angle), to insertions at several speeds and angles.
+/// Fit the force table of Paper 000, F(depth, speed, angle), to insertions at several speeds and angles.
 ///
 /// Reads recordings of this program (MCAP), or CSV with the columns time_s, depth_mm (along the needle), force_n and angle_deg. It is
 /// judged by the insertions of --holdout; without any, by each insertion in its turn, left out. Writes the table, which a profile's
@@ -58,7 +58,7 @@ fn save(path: &Path, text: &str) -> Result<(), Failure> {
 fn report(fit: &Fit) {
     for (speed, angle, origin) in fit.table.not_measured() {
         let how = match origin {
-            Origin::Nearest => "the nearest measured cell stands for it",
+            Origin::Nearest => "taken from the nearest measured cell",
             _ => "taken as separable",
         };
         say!("no data at {speed:.1} mm/s and {angle:.0}°: {how}");

@@ -82,7 +82,10 @@ impl Simulate {
                  `host-sim simulate --rig {rig} --fit FILE.csv --recording {recording} --out {out}`."
             ));
         } else {
-            items.push("Use the values that were fitted by motion: they stand in `fitted-rig.toml` beside this page.".into());
+            items.push(
+                "Use the values that were fitted by motion: they are in `fitted-rig.toml` next to this page."
+                    .into(),
+            );
         }
         if self.export.is_empty() {
             items.push(

@@ -1,4 +1,4 @@
-//! From insertions to a force table on the command line: seed 000's experiment with a truth that is known.
+//! From insertions to a force table on the command line: Paper 000's experiment with a truth that is known.
 
 use crate::common::{figure, folder, refused, run, run_well, text};
 use control_core::controller::Sample;

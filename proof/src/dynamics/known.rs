@@ -78,7 +78,7 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
             coefficients.extend((1..=6).map(|k| format!("legendre_{k}")));
         }
         "cogging" | "torque_ripple" | "mass_imbalance" | "encoder_eccentricity" => {
-            shape.insert("turn".into(), rig.turn.ok_or("the turn is not told")?);
+            shape.insert("turn".into(), rig.turn.ok_or("the rig does not give the turn")?);
             for (i, order) in orders(name, key)?.iter().enumerate() {
                 shape.insert(format!("order_{i}"), *order);
                 coefficients.extend([format!("cos_{i}"), format!("sin_{i}")]);

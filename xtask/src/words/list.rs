@@ -32,6 +32,9 @@ pub(super) const PHRASES: &[Phrase] = &[
     phrase("made where there is none", "created if missing", "shorter"),
     phrase("from which on", "the smallest … at which, above which", "the thing first, then its condition"),
     phrase("in its place", "instead, replaces it", "shorter, and not a place"),
+    phrase("seed 000", "Paper 000", "a seed is the start of a random generator"),
+    phrase("seed 001", "Paper 001", "a seed is the start of a random generator"),
+    phrase("seed 002", "Paper 002", "a seed is the start of a random generator"),
     phrase("in their place", "instead, replaces them", "shorter, and not a place"),
 ];
 

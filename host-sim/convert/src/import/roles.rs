@@ -367,7 +367,7 @@ fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Failure {
 pub(super) fn missing(logs: &[Log], role: Role) -> Failure {
     let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
     Failure::input(format_args!(
-        "{}: none of its columns is known as the {role}; say which with --column {role}=NAME[:UNIT]; its columns are {}",
+        "{}: no column is known to be the {role}; say which with --column {role}=NAME[:UNIT]; its columns are {}",
         files.join(", "),
         listed(logs)
     ))

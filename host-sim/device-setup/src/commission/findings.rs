@@ -92,7 +92,7 @@ impl fmt::Display for Trouble {
             ),
             Trouble::Zero(codes) => write!(
                 f,
-                "the amplifier stands still {codes:.0} codes from the middle: trim its offset to less than 100 and commission again"
+                "the amplifier gives no torque at {codes:.0} codes from the middle: trim its offset to less than 100 and commission again"
             ),
         }
     }
@@ -109,7 +109,7 @@ fn travelled(samples: &[Sample]) -> (i32, u32) {
 }
 
 /// True if the roller has been moved and then rested for `rest_ticks`.
-pub fn has_moved_and_rests(samples: &[Sample], rest_ticks: usize) -> bool {
+pub(crate) fn has_moved_and_rests(samples: &[Sample], rest_ticks: usize) -> bool {
     let Some((begin, tail)) = samples.len().checked_sub(rest_ticks).map(|at| samples.split_at(at)) else {
         return false;
     };
@@ -128,7 +128,11 @@ fn moved(samples: &[Sample]) -> Result<i32, Trouble> {
 
 /// Counts a turn and their sign from `turns` turns of the roller in the direction of insertion; `known` where a person knows
 /// better.
-pub fn counts_a_turn(samples: &[Sample], turns: u32, known: Option<u16>) -> Result<(u16, bool), Trouble> {
+pub(crate) fn counts_a_turn(
+    samples: &[Sample],
+    turns: u32,
+    known: Option<u16>,
+) -> Result<(u16, bool), Trouble> {
     let counts = moved(samples)?;
     let found = f64::from(counts.unsigned_abs()) / f64::from(turns.max(1));
     let off = |counts: u16| (found / f64::from(counts) - 1.0).abs();
@@ -145,13 +149,13 @@ pub fn roller_radius(samples: &[Sample], mm: f64, counts_per_turn: u16) -> Resul
 }
 
 /// Mean tilt of the last `ticks`, mrad.
-pub fn mean_tilt(samples: &[Sample], ticks: usize) -> f64 {
+pub(crate) fn mean_tilt(samples: &[Sample], ticks: usize) -> f64 {
     let tail = &samples[samples.len().saturating_sub(ticks)..];
     tail.iter().map(|sample| f64::from(sample.tilt_mrad)).sum::<f64>() / tail.len().max(1) as f64
 }
 
 /// Checks that the tilt follows a needle that is pointed down, from `flat` to `down` in mrad.
-pub fn check_tilt(flat: f64, down: f64) -> Result<(), Trouble> {
+pub(crate) fn check_tilt(flat: f64, down: f64) -> Result<(), Trouble> {
     match down - flat {
         turned if turned <= -LEAST_TILT => Err(Trouble::TiltBackwards),
         turned if turned < LEAST_TILT => Err(Trouble::TiltSilent),
@@ -204,7 +208,7 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
 }
 
 /// The same as felt along the needle over a roller of this radius, with a drive that is late by `delay_us`.
-pub fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16) -> config::Mechanism {
+pub(crate) fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16) -> config::Mechanism {
     let radius = radius_mm * 1e-3;
     config::Mechanism {
         mass: Grams(I16F16::saturating_from_num((found.inertia / radius / radius * 1e3).clamp(1.0, 1_000.0))),
@@ -215,14 +219,14 @@ pub fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16) -> con
 
 /// The largest movement in a tick, in counts, that makes the device too fast at 0.4 m/s: its ceiling of speed. The
 /// device trips at a sixth of it.
-pub fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
+pub(crate) fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
     let per_count = TAU * radius_mm / f64::from(counts_per_turn);
     // Two is the least that the device takes.
     ((6.0 * LARGEST_SPEED / f64::from(TICK_HZ) / per_count).ceil() as u16).max(2)
 }
 
 /// The code of zero torque for a device that has `offset` N·m too much, where a code is `code` N·m.
-pub fn converter_zero(device: &Device, offset: f64) -> Result<i16, Trouble> {
+pub(crate) fn converter_zero(device: &Device, offset: f64) -> Result<i16, Trouble> {
     let code = device.full_scale_torque.0.to_num::<f64>() * 1e-3 / f64::from(device.dac.span());
     let sign = if device.motor_reversed { -1.0 } else { 1.0 };
     let zero = f64::from(device.dac_zero) - sign * offset / code;

@@ -44,7 +44,7 @@ impl Written {
     /// Checks that it is one of the layers and ends below its beginning.
     pub(super) fn check(self, layers: &[Layer]) -> Result<(), String> {
         if !layers.iter().any(|layer| layer.tissue == self.tissue) {
-            return Err("target.tissue is none of the layers; name one of them".into());
+            return Err("target.tissue is not one of the layers; name one of them".into());
         }
         match (self.from_mm, self.to_mm) {
             (None, None) => Ok(()),

@@ -1,4 +1,4 @@
-//! From insertions at several speeds and angles to the force table of seed 000, and how good it is on insertions that it has not seen.
+//! From insertions at several speeds and angles to the force table of Paper 000, and how good it is on insertions that it has not seen.
 //!
 //! [`insertions`] reads recordings, [`mod@falls`], [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may
 //! not run a device, and it takes a force as it was measured, whoever measured it. What is judged is the table that is written.
@@ -229,7 +229,7 @@ mod tests {
         Insertion { name, speed_mm_s: speed * off, angle_deg: angle * off, points: points.collect() }
     }
 
-    /// The five cells of seed 000, Fig. 2, each `takes` times.
+    /// The five cells of Paper 000, Fig. 2, each `takes` times.
     fn five_cells(takes: u32) -> Vec<Insertion> {
         let cells = [(1.0, 60.0), (3.0, 60.0), (5.0, 60.0), (5.0, 30.0), (5.0, 45.0)];
         cells.iter().flat_map(|(v, a)| (0..takes).map(move |take| insertion(*v, *a, take))).collect()
