@@ -13,7 +13,7 @@ fn errors_name_file_and_line() {
         ("time_s,command,position_counts\n0,0,0\n0.1,inf,1\n", "line 3"),
         ("time_s,command,position_counts\n0,0,0\n\n0.1,0,1\n", "line 3"),
         ("time_s,command\n0,0\n", "position_counts"),
-        ("time_s,command,position_counts,time_s\n0,0,0,0\n", "twice"),
+        ("time_s,command,position_counts,time_s\n0,0,0,0\n", "two columns time_s"),
         ("time_s,command,position_counts\n0,,0\n", "line 2"),
         ("", "time_s"),
     ];
