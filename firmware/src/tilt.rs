@@ -12,7 +12,7 @@ pub use watch::{Reading, TiltWatch};
 
 use control_core::units::Milliradians;
 
-/// Something that measures the inclination. Called from the tilt task at [`crate::timing::TILT_PERIOD_MS`]; it may wait
+/// Something that measures the inclination. Called from the tilt task at `TILT_PERIOD_MS`; it may wait
 /// for a bus, not for a measurement.
 pub trait TiltSource {
     /// The latest measurement.

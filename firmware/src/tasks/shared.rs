@@ -35,7 +35,7 @@ pub struct Shared {
     pub missed_ticks: AtomicU32,
     /// Codes that were written after the converter's instant. Written by the tick.
     pub late_codes: AtomicU32,
-    /// The state that the USB host has set: [`LINK_CONFIGURED`], [`LINK_READY`]. Written by the USB task.
+    /// The state that the USB host has set: `LINK_CONFIGURED`, `LINK_READY`. Written by the USB task.
     pub link: AtomicU8,
     /// Asks the USB task to throw away what waits for a PC that is gone. Set by telemetry.
     pub discard: AtomicBool,

@@ -47,7 +47,7 @@ fn a_column_that_only_a_person_knows_is_asked_with_its_option() {
         (
             written(out, "b.csv", table("t,theta_deg,foo").as_bytes()),
             &[],
-            "none of its columns is known as the command; say which with --column command=NAME[:UNIT]; its columns are t, theta_deg, foo; or give --undriven",
+            "no column is known to be the command; say which with --column command=NAME[:UNIT]; its columns are t, theta_deg, foo; or give --undriven",
         ),
         (
             written(out, "c.csv", table("t,pos_m,pos_mm").as_bytes()),
