@@ -2,7 +2,7 @@
 //!
 //! A wall is away, touching (the tip pushes it in and carries what lies under it) or inserted (its pierced place is held to
 //! the needle's axis and dragged along it). In between, the tissue is held to the shaft at points a little apart. Whatever
-//! the needle does, no place is ever wanted farther from its rest than the wall's give, the drag and [`TEAR_MM`] allow: this
+//! the needle does, no place is ever wanted farther from its rest than the wall's give, the drag and `TEAR_MM` allow: this
 //! keeps the picture bounded.
 
 use crate::constraint::{Anchor, Point, place};
