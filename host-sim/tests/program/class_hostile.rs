@@ -65,7 +65,7 @@ fn send_noise(at: SocketAddr, stop: &AtomicBool) -> u64 {
 
 /// A Zenoh program of somebody else's.
 fn stranger(meeting: &Meeting) -> Session {
-    let mut config = Config::commissioned_virtual();
+    let mut config = Config::default();
     let endpoints = format!("[\"tcp/{}\"]", meeting.address);
     for (key, value) in [
         ("mode", "\"client\""),
