@@ -153,10 +153,10 @@ fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selecti
     let model = &found.standing.model.model;
     let own: &[Effect] = &model.effects;
     let is_selected = |effect: &Effect| Material::is_of_class(&selected.standing.materials, effect.name);
-    let says_much = |effect: &Effect| {
+    let is_comparable = |effect: &Effect| {
         !is_by_command(effect) || (CommandLaw::new(effect).is_none() && is_selected(effect))
     };
-    let is_judged = own.iter().all(says_much) && selection.judges(own);
+    let is_judged = own.iter().all(is_comparable) && selection.judges(own);
     // Both fitted, and both judged, under one noise.
     let again = prepared.context(&found.fit).fit_at(model.clone(), &selected.standing.model.noise);
     let left = |of: &Found, model| discrepancy(prepared, of, model, &found.null.noise);

@@ -158,7 +158,7 @@ mod tests {
     use crate::io::rig::Rig;
 
     #[test]
-    fn a_loss_of_the_drives_force_is_of_the_force_asked_for() {
+    fn a_gears_loss_rests_on_the_force_that_the_motion_needs() {
         let time_s: Vec<f64> = (0..6000).map(|row| f64::from(row) * 1e-3).collect();
         let recording = Recording {
             command: time_s.iter().map(|t| (40.0 * t).sin()).collect(),

@@ -4,6 +4,7 @@
 use super::laws::Columns;
 use super::state::State;
 use crate::effects::{Effect, EffectName as N};
+use crate::selection::periodic::of_orders;
 
 /// Orders of a turn that are tried.
 const ORDERS: usize = 24;
@@ -58,12 +59,4 @@ impl State<'_> {
         }
         name.definition().is_of_orders(&taken).then_some(best)
     }
-}
-
-/// An effect that is made of whole orders of a turn, rad or m.
-fn of_orders(name: N, turn: f64, orders: &[f64]) -> Effect {
-    let keys: Vec<String> = orders.iter().map(|order| format!("order_{order}")).collect();
-    let waves = keys.iter().map(String::as_str).zip(orders.iter().copied());
-    let shape: Vec<(&str, f64)> = std::iter::once(("turn", turn)).chain(waves).collect();
-    Effect::shaped(name, &shape)
 }
