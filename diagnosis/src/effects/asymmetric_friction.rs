@@ -6,6 +6,7 @@ use super::definition::{
 };
 use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
 #[derive(Debug, Clone)]
@@ -28,11 +29,22 @@ impl ForceLaw for AsymmetricFrictionLaw {
     }
 }
 
+shape! {
+    /// The terms of the law.
+    struct Shape {
+        /// True if only viscous friction differs: a rig with an offset holds the dry part already.
+        viscous_only: flag,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(AsymmetricFrictionLaw { viscous_only: effect.is_set("viscous_only") }))
+        Some(Box::new(AsymmetricFrictionLaw { viscous_only: Shape::of(effect).viscous_only }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn is_dry(&self) -> bool {
         true

@@ -4,7 +4,8 @@ use super::definition::{
     Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
     Shown, Span,
 };
-use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
+use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden_section::logarithmic;
 
@@ -31,17 +32,28 @@ fn widest(span: &Span) -> f64 {
     (0.08 * span.speed).max(60.0 * span.count)
 }
 
+shape! {
+    /// The gap.
+    struct Shape {
+        /// Its width, rad or m.
+        gap: needed,
+        /// Natural frequency of load and motor while a flank touches, Hz.
+        contact_hz: needed,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(BacklashLaw(Load::new(effect))))
+        let Shape { gap, contact_hz } = Shape::of(effect);
+        Some(Box::new(BacklashLaw(Load::behind_gap(effect, gap, contact_hz))))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["gap", "coast", "contact_hz", "ratio"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS, Machine::KEYS]
     }
 }
 
@@ -66,7 +78,7 @@ impl EffectSearch for Defined {
         out
     }
     fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
-        let dry = effect.shape_or("dry", 1.0);
+        let Machine { dry, .. } = Machine::of(effect);
         vec![
             ("gap", span.count, 2.0 * widest(span)),
             ("coast", 0.2 * dry, 4.0 * dry),
@@ -75,7 +87,7 @@ impl EffectSearch for Defined {
         ]
     }
     fn is_possible(&self, effect: &Effect) -> bool {
-        own_friction(effect) <= MOST_OF_DRY * effect.shape_or("dry", 0.0)
+        own_friction(effect) <= MOST_OF_DRY * Machine::of(effect).dry
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
         let gain = allowed.gain;
@@ -83,7 +95,7 @@ impl EffectSearch for Defined {
     }
     fn twins(&self, effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         // A gap that the encoder does not see, and the spring that its flanks are.
-        let unseen = effect.shape_or("gap", f64::INFINITY) < SEEN * shown.count;
+        let unseen = Shape::of(effect).gap < SEEN * shown.count;
         let spring = unseen.then_some(EffectName::DriveCompliance);
         spring.into_iter().chain(shown.one_length.then_some(EffectName::PreslidingFriction)).collect()
     }

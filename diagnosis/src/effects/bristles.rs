@@ -5,6 +5,17 @@
 //! and Swevers 2003): asperities of many sizes.
 
 use super::Effect;
+use super::shape::shape;
+
+shape! {
+    /// The travel over which bristles bend.
+    struct Shape {
+        /// Travel over which the middle one bends, rad or m.
+        deflection: needed,
+        /// Ratio of the longest such travel to the shortest.
+        spread: 1.0,
+    }
+}
 
 /// Elements of a spread: enough to look smooth over a decade.
 const ELEMENTS: u32 = 6;
@@ -17,7 +28,7 @@ pub(crate) struct Bristles {
 
 /// Travel over which each element bends, from short to long; one where they are not spread.
 pub(crate) fn lengths(effect: &Effect) -> Vec<f64> {
-    let (middle, spread) = (effect.shape_or("deflection", 1.0), effect.shape_or("spread", 1.0));
+    let Shape { deflection: middle, spread } = Shape::of(effect);
     if spread <= 1.0 {
         return vec![middle];
     }

@@ -1,6 +1,7 @@
 //! Torque periodic in the angle, independent of the command: teeth and poles, or a screw. Its orders are sought in the residual.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem, Variable};
 
@@ -9,6 +10,9 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[waves::KEYS]
     }
     fn has_own_phase(&self) -> bool {
         true

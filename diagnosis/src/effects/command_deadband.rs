@@ -1,15 +1,29 @@
 //! Small commands do nothing; larger ones pass whole or lose the width.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
+use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable};
 use crate::numerics::golden_section::logarithmic;
+
+shape! {
+    /// The band.
+    struct Shape {
+        /// Largest command that does nothing, in the command's unit.
+        half_width: 0.0,
+        /// True if larger commands lose the width; they pass whole otherwise.
+        shift: flag,
+    }
+}
 
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        let half_width = effect.shape_or("half_width", 0.0);
-        Some(CommandLaw::Deadband { half_width, shift: effect.is_set("shift") })
+        let Shape { half_width, shift } = Shape::of(effect);
+        Some(CommandLaw::Deadband { half_width, shift })
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn depends_on(&self) -> Option<Variable> {
         Some(Variable::Command)

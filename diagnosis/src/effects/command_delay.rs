@@ -2,6 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
+use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
@@ -10,17 +11,25 @@ fn longest(span: &Span) -> f64 {
     (5.0 * span.row).max(0.03)
 }
 
+shape! {
+    /// The delay.
+    struct Shape {
+        /// Time between command and force, s.
+        delay: needed,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        Some(CommandLaw::of_delay(effect.shape_or("delay", 0.0)))
+        Some(CommandLaw::of_delay(Shape::of(effect).delay))
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["delay"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.delay += effect.shape_or("delay", 0.0);
+        joint.delay += Shape::of(effect).delay;
         true
     }
 }

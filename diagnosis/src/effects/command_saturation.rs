@@ -2,19 +2,28 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
 use super::joint_terms::JointTerms;
+use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
+
+shape! {
+    /// The clip.
+    struct Shape {
+        /// Largest command that passes, in the command's unit.
+        limit: needed,
+    }
+}
 
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        Some(CommandLaw::Clip { limit: effect.shape_or("limit", 0.0) })
+        Some(CommandLaw::Clip { limit: Shape::of(effect).limit })
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["limit"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        let clip = effect.shape_or("limit", f64::INFINITY);
+        let clip = Shape::of(effect).limit;
         joint.limit = Some(joint.limit.map_or(clip, |limit| limit.min(clip)));
         true
     }

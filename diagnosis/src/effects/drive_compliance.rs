@@ -4,6 +4,7 @@ use super::definition::{
     Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown,
     Span,
 };
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
@@ -61,18 +62,28 @@ fn highest(span: &Span) -> f64 {
     (0.5 / span.block).max((0.25 / span.row).min(STIFFEST_HZ))
 }
 
+shape! {
+    /// The resonance of the load against the motor.
+    struct Shape {
+        /// Its frequency, Hz.
+        resonance_hz: needed,
+        /// Its damping over the critical one.
+        damping: needed,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        let omega = TAU * effect.shape_or("resonance_hz", 1.0);
-        Some(Box::new(DriveComplianceLaw { omega, damping: effect.shape_or("damping", 0.05), state: None }))
+        let Shape { resonance_hz, damping } = Shape::of(effect);
+        Some(Box::new(DriveComplianceLaw { omega: TAU * resonance_hz, damping, state: None }))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["resonance_hz", "damping"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn is_relative_to_gain(&self) -> bool {
         true

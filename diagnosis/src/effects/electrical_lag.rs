@@ -2,20 +2,29 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
+use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
+
+shape! {
+    /// The lag.
+    struct Shape {
+        /// L/R, s.
+        time_constant: needed,
+    }
+}
 
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
-        Some(CommandLaw::of_lag(effect.shape_or("time_constant", 0.0)))
+        Some(CommandLaw::of_lag(Shape::of(effect).time_constant))
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["time_constant"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        joint.lag += effect.shape_or("time_constant", 0.0);
+        joint.lag += Shape::of(effect).time_constant;
         true
     }
 }

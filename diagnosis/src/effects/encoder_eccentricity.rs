@@ -2,6 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::mass_imbalance::{LEAST_TURNS, once_a_turn};
+use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem};
 
@@ -10,6 +11,9 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[waves::KEYS]
     }
     fn has_own_phase(&self) -> bool {
         true

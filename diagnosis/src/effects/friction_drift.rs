@@ -4,22 +4,29 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span,
 };
 use super::law::{first_or_both, sign};
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
-#[derive(Debug, Clone)]
-struct FrictionDriftLaw {
-    time_constant: f64,
-    /// True if only dry friction drifts, because the rig has no viscous friction.
-    dry_only: bool,
+shape! {
+    /// The course of the drift.
+    struct Shape {
+        /// Time in which it has come to 1 - 1/e, s.
+        time_constant: needed,
+        /// True if only dry friction drifts, because the rig has no viscous friction.
+        dry_only: flag,
+    }
 }
+
+#[derive(Debug, Clone)]
+struct FrictionDriftLaw(Shape);
 
 impl ForceLaw for FrictionDriftLaw {
     fn names(&self) -> Vec<String> {
-        first_or_both("coulomb", "viscous", !self.dry_only)
+        first_or_both("coulomb", "viscous", !self.0.dry_only)
     }
     fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
-        let settled = 1.0 - (-state.time / self.time_constant).exp();
+        let settled = 1.0 - (-state.time / self.0.time_constant).exp();
         out[0] = -sign(velocity) * settled;
         if let Some(viscous) = out.get_mut(1) {
             *viscous = -velocity * settled;
@@ -34,8 +41,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        let time_constant = effect.shape_or("time_constant", 1.0);
-        Some(Box::new(FrictionDriftLaw { time_constant, dry_only: effect.is_set("dry_only") }))
+        Some(Box::new(FrictionDriftLaw(Shape::of(effect))))
     }
     fn is_dry(&self) -> bool {
         true
@@ -43,8 +49,8 @@ impl EffectLaw for Defined {
     fn drifts(&self) -> bool {
         true
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["time_constant"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
 }
 

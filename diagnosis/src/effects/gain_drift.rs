@@ -6,16 +6,25 @@
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
 };
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
+shape! {
+    /// The course of the drift.
+    struct Shape {
+        /// Time in which it has come to 1 - 1/e under a constant load, s.
+        time_constant: needed,
+        /// Time at which the drift comes all at once, s.
+        at_once_s: (f64::INFINITY),
+        /// Square of the command under which the heat settles at one; none where it follows the time alone.
+        mean_square: optional,
+    }
+}
+
 #[derive(Debug, Clone)]
 struct GainDriftLaw {
-    time_constant: f64,
-    /// Time at which the drift comes all at once, s.
-    at_once_s: f64,
-    /// Square of the command under which the heat settles at one; none where it follows the time alone.
-    mean_square: Option<f64>,
+    shape: Shape,
     heat: f64,
 }
 
@@ -24,7 +33,7 @@ impl GainDriftLaw {
     fn heated(&mut self, state: &State, mean_square: f64) -> f64 {
         let from = self.heat;
         let settled = state.command * state.command / mean_square;
-        self.heat += (settled - from) * -(-state.dt / self.time_constant).exp_m1();
+        self.heat += (settled - from) * -(-state.dt / self.shape.time_constant).exp_m1();
         0.5 * (from + self.heat)
     }
 }
@@ -34,11 +43,11 @@ impl ForceLaw for GainDriftLaw {
         vec!["change".into()]
     }
     fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
-        out[0] = if let Some(mean_square) = self.mean_square {
+        out[0] = if let Some(mean_square) = self.shape.mean_square {
             state.drive * self.heated(state, mean_square)
-        } else if !self.at_once_s.is_finite() {
-            state.drive * (1.0 - (-state.time / self.time_constant).exp())
-        } else if state.time >= self.at_once_s {
+        } else if !self.shape.at_once_s.is_finite() {
+            state.drive * (1.0 - (-state.time / self.shape.time_constant).exp())
+        } else if state.time >= self.shape.at_once_s {
             state.drive
         } else {
             0.0
@@ -56,12 +65,7 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(GainDriftLaw {
-            time_constant: effect.shape_or("time_constant", 1.0),
-            at_once_s: effect.shape_or("at_once_s", f64::INFINITY),
-            mean_square: effect.shape.get("mean_square").copied(),
-            heat: 0.0,
-        }))
+        Some(Box::new(GainDriftLaw { shape: Shape::of(effect), heat: 0.0 }))
     }
     fn scales_drive(&self) -> bool {
         true
@@ -69,8 +73,8 @@ impl EffectLaw for Defined {
     fn drifts(&self) -> bool {
         true
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["time_constant"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
 }
 

@@ -182,8 +182,13 @@ mod tests {
 
     #[test]
     fn at_rest_nothing_that_depends_on_speed_acts() {
-        for name in [EffectName::ViscousFriction, EffectName::QuadraticDrag, EffectName::StribeckFriction] {
-            let (mut law, mut out) = (Law::new(&Effect::shaped(name, &[])).unwrap(), [1.0]);
+        let of_speed: [(EffectName, &[(&str, f64)]); 3] = [
+            (EffectName::ViscousFriction, &[]),
+            (EffectName::QuadraticDrag, &[]),
+            (EffectName::StribeckFriction, &[("speed", 1.0)]),
+        ];
+        for (name, shape) in of_speed {
+            let (mut law, mut out) = (Law::new(&Effect::shaped(name, shape)).unwrap(), [1.0]);
             law.terms(&State { velocity: 3.0, rest: true, dt: 1e-3, ..State::default() }, &mut out);
             assert_eq!(out[0], 0.0, "{name}");
         }

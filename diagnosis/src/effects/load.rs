@@ -7,9 +7,29 @@
 //! Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to a ceiling. Both are driven by
 //! the command, so that little noise of the measured motion enters, and bounded, so that nothing drifts.
 
-use super::Effect;
-use super::State;
+use super::shape::shape;
+use super::{Effect, State};
 use std::f64::consts::TAU;
+
+shape! {
+    /// The machine that a joint divides: accelerations of the whole, with its load's part.
+    struct Machine {
+        /// Acceleration per unit of command.
+        per_command: 1.0,
+        /// Deceleration by dry friction.
+        dry: 0.0,
+        /// Deceleration by viscous friction per unit of speed, 1/s.
+        viscous: 0.0,
+        /// Acceleration per unit of the measured load.
+        per_force: 0.0,
+        /// Acceleration by the weight on an axis that is upright.
+        weight: 0.0,
+        /// Deceleration of the load by its own dry friction.
+        coast: needed,
+        /// Load inertia over motor inertia.
+        ratio: needed,
+    }
+}
 
 /// The load's motion against the motor's.
 #[derive(Debug, Clone)]
@@ -55,8 +75,8 @@ pub(super) const MOST_OF_DRY: f64 = 1.2;
 
 /// The load's own dry friction over the whole inertia.
 pub(super) fn own_friction(effect: &Effect) -> f64 {
-    let get = |key: &str| effect.shape_or(key, 0.0);
-    get("coast") * get("ratio") / (1.0 + get("ratio"))
+    let Machine { coast, ratio, .. } = Machine::of(effect);
+    coast * ratio / (1.0 + ratio)
 }
 
 /// Damping of the contact: it bounces once or twice.
@@ -68,23 +88,32 @@ const STEP: f64 = 0.35;
 const GRIP_STEP_S: f64 = 1.2e-3;
 
 impl Load {
-    pub(crate) fn new(effect: &Effect) -> Self {
-        let get = |key: &str, otherwise: f64| effect.shape_or(key, otherwise);
-        let (dry, coast) = (get("dry", 0.0), get("coast", 0.0));
+    /// A load behind a gap, rad or m, whose contact has a natural frequency, Hz.
+    pub(super) fn behind_gap(effect: &Effect, gap: f64, contact_hz: f64) -> Self {
+        Self { half: 0.5 * gap, contact: TAU * contact_hz, ..Self::of(Machine::of(effect)) }
+    }
+
+    /// A load held by a grip that carries `limit`, in the command's unit, and slips at twice the creep `creep`, rad/s or m/s.
+    pub(super) fn in_grip(effect: &Effect, limit: f64, creep: f64) -> Self {
+        Self { limit, creep, ..Self::of(Machine::of(effect)) }
+    }
+
+    fn of(machine: Machine) -> Self {
+        let Machine { per_command, dry, viscous, per_force, weight, coast, ratio } = machine;
         Self {
-            half: 0.5 * get("gap", 0.0),
-            contact: TAU * get("contact_hz", 200.0),
-            ratio: get("ratio", 1.0),
-            per_command: get("per_command", 1.0),
+            half: 0.0,
+            contact: 0.0,
+            ratio,
+            per_command,
             dry,
-            viscous: get("viscous", 0.0),
-            per_force: get("per_force", 0.0),
-            weight: get("weight", 0.0),
+            viscous,
+            per_force,
+            weight,
             tilt: (0.0, 0.0),
             coast,
             share: if dry > 0.0 { coast / dry } else { 1.0 },
-            limit: get("limit", f64::INFINITY),
-            creep: get("creep", 1e-3),
+            limit: f64::INFINITY,
+            creep: 0.0,
             lead: None,
         }
     }
@@ -190,16 +219,9 @@ mod tests {
     const RATIO: f64 = 1.5;
 
     fn grip() -> Load {
-        let shape = [
-            ("limit", 0.5),
-            ("creep", 0.05),
-            ("ratio", RATIO),
-            ("per_command", 100.0),
-            ("dry", 10.0),
-            ("coast", 10.0),
-            ("per_force", 20.0),
-        ];
-        Load::new(&Effect::shaped(EffectName::RollerSlip, &shape))
+        let shape =
+            [("ratio", RATIO), ("per_command", 100.0), ("dry", 10.0), ("coast", 10.0), ("per_force", 20.0)];
+        Load::in_grip(&Effect::shaped(EffectName::RollerSlip, &shape), 0.5, 0.05)
     }
 
     /// Command that drives the motor alone after a while at one speed.

@@ -5,6 +5,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed,
 };
 use super::law::sign;
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -25,11 +26,22 @@ impl ForceLaw for LoadDependentFrictionLaw {
     }
 }
 
+shape! {
+    /// The force that presses.
+    struct Shape {
+        /// True if the drive's own force presses, as in a gear; the measured load otherwise.
+        of_drive: flag,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(LoadDependentFrictionLaw { of_drive: effect.is_set("of_drive") }))
+        Some(Box::new(LoadDependentFrictionLaw { of_drive: Shape::of(effect).of_drive }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn is_dry(&self) -> bool {
         true

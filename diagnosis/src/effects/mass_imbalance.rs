@@ -3,6 +3,7 @@
 use super::definition::{
     EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Shown, Span,
 };
+use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem, Variable};
 
@@ -20,6 +21,9 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[waves::KEYS]
     }
     fn has_own_phase(&self) -> bool {
         true

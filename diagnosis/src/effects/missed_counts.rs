@@ -1,6 +1,7 @@
 //! Counts that the encoder loses permanently: steps of what it reads. The steps are found before any effect is.
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::shape::{Missing, ShapeKey};
 use super::{Effect, EffectName, State, Subsystem};
 
 #[derive(Debug, Clone)]
@@ -30,6 +31,9 @@ impl EffectLaw for Defined {
         let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
         let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
         Some(Box::new(MissedCountsLaw { names, times }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        const { &[&[ShapeKey::new("time_", Missing::Numbered)]] }
     }
     fn in_sensor(&self) -> bool {
         true

@@ -12,6 +12,7 @@ mod formula;
 pub(crate) mod joint_terms;
 mod law;
 mod load;
+mod shape;
 mod state;
 mod travel_profile;
 mod variable;
@@ -28,6 +29,7 @@ pub use variable::Variable;
 
 use definition::Definition;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use shape::{Missing, ShapeKey};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -243,14 +245,23 @@ impl Effect {
         effect
     }
 
-    /// One value of the shape, or what stands for it where it is missing.
-    pub fn shape_or(&self, key: &str, otherwise: f64) -> f64 {
-        self.shape.get(key).copied().unwrap_or(otherwise)
+    /// One value of the shape. A missing one is what the effect's file declares, and not a number where that declares nothing.
+    pub fn value(&self, key: &str) -> f64 {
+        let declared = || match self.shape_key(key).map(|known| known.missing) {
+            Some(Missing::Is(value)) => value,
+            _ => f64::NAN,
+        };
+        self.shape.get(key).copied().unwrap_or_else(declared)
     }
 
-    /// True if a value of the shape that stands for yes or no is set.
-    pub(crate) fn is_set(&self, key: &str) -> bool {
-        self.shape_or(key, 0.0) > 0.5
+    /// Returns what its file declares of a key of the shape.
+    fn shape_key(&self, key: &str) -> Option<&'static ShapeKey> {
+        self.name.definition().shape_keys().iter().copied().flatten().find(|known| known.is(key))
+    }
+
+    /// The travel of one turn, rad or m, where the effect repeats with a known one.
+    pub fn turn(&self) -> Option<f64> {
+        self.shape.get("turn").copied()
     }
 
     /// One coefficient; where it is missing, zero, and one of a table, which is a force as it stands.
@@ -261,7 +272,7 @@ impl Effect {
 
     /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of their coefficients.
     pub fn waves(&self) -> Vec<(String, f64)> {
-        let turn = self.shape_or("turn", std::f64::consts::TAU);
+        let turn = self.turn().unwrap_or(std::f64::consts::TAU);
         let mut waves: Vec<(String, f64)> = Vec::new();
         for (key, value) in &self.shape {
             if let Some(order) = key.strip_prefix("order_") {
@@ -272,6 +283,28 @@ impl Effect {
         }
         waves.sort_by(|a, b| a.1.total_cmp(&b.1));
         waves
+    }
+
+    /// Checks that the shape holds the values that the effect's file declares and no other.
+    fn check_keys(&self) -> Result<(), String> {
+        if self.name.formula().is_some() {
+            return Ok(());
+        }
+        let keys: Vec<&ShapeKey> = self.name.definition().shape_keys().iter().copied().flatten().collect();
+        if let Some(other) = self.shape.keys().find(|key| self.shape_key(key).is_none()) {
+            let known = match keys.iter().map(|known| known.in_words()).collect::<Vec<_>>().split_last() {
+                None => "none".to_owned(),
+                Some((last, [])) => last.clone(),
+                Some((last, others)) => format!("{} and {last}", others.join(", ")),
+            };
+            return Err(format!("shape.{other} is not a value of {}, which has {known}", self.name));
+        }
+        for ShapeKey { name, .. } in keys.iter().filter(|known| known.missing == Missing::Refused) {
+            if !self.shape.get(*name).is_some_and(|value| *value > 0.0) {
+                return Err(format!("shape.{name} is required and must be above zero"));
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the numbers can be run; the reason where not.
@@ -293,11 +326,7 @@ impl Effect {
                 return Err(format!("its parameter {key} has no value; give it as shape.{key}"));
             }
         }
-        for key in self.name.definition().needed() {
-            if !self.shape.get(*key).is_some_and(|value| *value > 0.0) {
-                return Err(format!("shape.{key} is required and must be above zero"));
-            }
-        }
+        self.check_keys()?;
         for (key, value) in &self.shape {
             if (key.starts_with("period_") || key == "turn" || key == "per_command") && *value == 0.0 {
                 return Err(format!("shape.{key} must not be zero"));

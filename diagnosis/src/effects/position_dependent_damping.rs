@@ -4,6 +4,7 @@
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
 use super::travel_profile::{self, Profile};
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
 #[derive(Debug, Clone)]
@@ -46,14 +47,25 @@ impl ForceLaw for PositionDependentDampingLaw {
 /// Degree of the polynomial along the travel that an inertia may follow.
 const INERTIA_DEGREE: f64 = 12.0;
 
+shape! {
+    /// The quantity that changes along the travel.
+    struct Shape {
+        /// True if it is the inertia, which has no name and speaks only against others.
+        of_inertia: flag,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PositionDependentDampingLaw {
             profile: Profile::new(effect),
-            of_inertia: effect.is_set("of_inertia"),
+            of_inertia: Shape::of(effect).of_inertia,
         }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[travel_profile::Shape::KEYS, Shape::KEYS]
     }
     fn follows_travel(&self) -> bool {
         true

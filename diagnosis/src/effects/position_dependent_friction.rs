@@ -2,6 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::law::{legendre, sign};
+use super::shape::ShapeKey;
 use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
@@ -25,6 +26,9 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PositionDependentFrictionLaw(Profile::new(effect))))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[travel_profile::Shape::KEYS]
     }
     fn is_dry(&self) -> bool {
         true

@@ -7,29 +7,40 @@ use super::definition::{
 };
 use super::joint_terms::JointTerms;
 use super::law::first_or_both;
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, Variable, experiments};
+
+shape! {
+    /// The place and the kind of the spring.
+    struct Shape {
+        /// Place at which it is straight, rad or m.
+        from: 0.0,
+        /// True if it pulls beyond that place only.
+        one_sided: flag,
+        /// True if a force is there at the start, because it is not known where the spring is at rest.
+        preload: flag,
+        /// Time in which the force fades while the spring stays bent, s.
+        fades_s: (f64::INFINITY),
+    }
+}
 
 #[derive(Debug, Clone)]
 struct PositionSpringLaw {
-    from: f64,
-    one_sided: bool,
-    preload: bool,
-    /// Time in which the force fades while the spring stays bent, s.
-    fades_s: f64,
+    shape: Shape,
     faded: f64,
 }
 
 impl ForceLaw for PositionSpringLaw {
     fn names(&self) -> Vec<String> {
         // Where it is at rest is not known: a force that is there at the start.
-        first_or_both("stiffness", "preload", self.preload)
+        first_or_both("stiffness", "preload", self.shape.preload)
     }
     fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
-        let x = state.position - self.from;
+        let x = state.position - self.shape.from;
         // Maxwell's spring and dashpot in series: what has faded is no longer bent.
-        self.faded += (x - self.faded) * (1.0 - (-state.dt / self.fades_s).exp());
+        self.faded += (x - self.faded) * (1.0 - (-state.dt / self.shape.fades_s).exp());
         let bent = x - self.faded;
-        out[0] = if self.one_sided { -bent.max(0.0) } else { -bent };
+        out[0] = if self.shape.one_sided { -bent.max(0.0) } else { -bent };
         if let Some(preload) = out.get_mut(1) {
             *preload = 1.0;
         }
@@ -46,20 +57,18 @@ pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(PositionSpringLaw {
-            from: effect.shape_or("from", 0.0),
-            one_sided: effect.is_set("one_sided"),
-            preload: effect.is_set("preload"),
-            fades_s: effect.shape_or("fades_s", f64::INFINITY),
-            faded: 0.0,
-        }))
+        Some(Box::new(PositionSpringLaw { shape: Shape::of(effect), faded: 0.0 }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        if effect.shape_or("fades_s", f64::INFINITY).is_finite() || effect.is_set("one_sided") {
+        let Shape { from, one_sided, fades_s, .. } = Shape::of(effect);
+        if fades_s.is_finite() || one_sided {
             return false;
         }
         joint.stiffness += effect.coefficient("stiffness");
-        joint.slack = effect.shape_or("from", 0.0);
+        joint.slack = from;
         joint.bias += effect.coefficient("preload");
         true
     }
@@ -91,13 +100,13 @@ impl EffectSearch for Defined {
         if term > 0 { FREE } else { POSITIVE }
     }
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
-        1 + usize::from(effect.is_set("preload"))
+        1 + usize::from(Shape::of(effect).preload)
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
         shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()
     }
     fn plain(&self, effect: &Effect) -> Option<Plain> {
-        (!effect.is_set("one_sided")).then_some(Plain { rank: 5, has_twin: true })
+        (!Shape::of(effect).one_sided).then_some(Plain { rank: 5, has_twin: true })
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
         let spring = match fitted {

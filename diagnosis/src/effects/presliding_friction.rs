@@ -1,11 +1,12 @@
 //! Elastic bristles before sliding: the hysteresis just after a reversal (Dahl 1968; LuGre, Canudas de Wit et al. 1995).
 
-use super::bristles::{Bristles, lengths};
+use super::bristles::{Bristles, Shape, lengths};
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
     Span,
 };
 use super::law::{first_or_both, sign};
+use super::shape::ShapeKey;
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden_section::logarithmic;
 
@@ -42,11 +43,11 @@ impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PreslidingFrictionLaw {
             bristles: Bristles::new(effect),
-            alike: effect.shape_or("spread", 1.0) <= 1.0,
+            alike: Shape::of(effect).spread <= 1.0,
         }))
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["deflection"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
 }
 
@@ -75,7 +76,7 @@ impl EffectSearch for Defined {
         true
     }
     fn gives_way_over(&self, effect: &Effect) -> Option<f64> {
-        Some(effect.shape_or("deflection", 0.0))
+        Some(Shape::of(effect).deflection)
     }
     fn is_in_doubt_at_limit(&self, term: usize) -> bool {
         // Bristles without damping are bristles all the same.

@@ -4,7 +4,8 @@ use super::definition::{
     Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
     Shown, Span,
 };
-use super::load::{Load, MOST_OF_DRY, RATIOS, own_friction};
+use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 use crate::numerics::golden_section::logarithmic;
 
@@ -26,17 +27,28 @@ impl ForceLaw for RollerSlipLaw {
 /// Least force that a grip carries over its load's own friction, about which the rig says no more.
 const HOLDS: f64 = 0.9;
 
+shape! {
+    /// The grip.
+    struct Shape {
+        /// Largest force that it carries, as a command, in the command's unit.
+        limit: needed,
+        /// Half the creep at which it slips, rad/s or m/s.
+        creep: needed,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        Some(Box::new(RollerSlipLaw(Load::new(effect))))
+        let Shape { limit, creep } = Shape::of(effect);
+        Some(Box::new(RollerSlipLaw(Load::in_grip(effect, limit, creep))))
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Grip)
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["limit", "creep", "coast", "ratio"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS, Machine::KEYS]
     }
 }
 
@@ -62,7 +74,7 @@ impl EffectSearch for Defined {
         out
     }
     fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
-        let dry = effect.shape_or("dry", 1.0);
+        let Machine { dry, .. } = Machine::of(effect);
         // Beyond the largest command: what the load's own friction takes a grip carries too. One that holds even then never slips.
         let friction = span.rig.dry / span.rig.per_command.abs();
         vec![
@@ -74,9 +86,9 @@ impl EffectSearch for Defined {
     }
     fn is_possible(&self, effect: &Effect) -> bool {
         // The load's own friction is no more than the machine's, and a grip holds its load against it, or it never held.
-        let get = |key: &str| effect.shape_or(key, 0.0);
-        own_friction(effect) <= MOST_OF_DRY * get("dry")
-            && get("limit") * get("per_command").abs() >= HOLDS * get("coast")
+        let Machine { dry, per_command, coast, .. } = Machine::of(effect);
+        own_friction(effect) <= MOST_OF_DRY * dry
+            && Shape::of(effect).limit * per_command.abs() >= HOLDS * coast
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
         // A small mass that always slips is a friction of another form, not a drive that lets go.
@@ -106,7 +118,7 @@ impl EffectReport for Defined {
         let ratio_of_load = (x / ratio).abs();
         let part = ratio_of_load / (1.0 + ratio_of_load);
         let part_sd = (x_sd / ratio).abs() / (1.0 + ratio_of_load).powi(2);
-        let drive = limit * fitted.inertia * fitted.effect.shape_or("per_command", ratio).abs();
+        let drive = limit * fitted.inertia * Machine::of(fitted.effect).per_command.abs();
         let value = part * drive;
         let sd = ((part * s / limit * drive).powi(2)
             + (part_sd * drive).powi(2)

@@ -5,6 +5,7 @@ use super::definition::{
     Span,
 };
 use super::law::sign;
+use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, Variable};
 use crate::numerics::golden_section::logarithmic;
 
@@ -26,18 +27,28 @@ impl ForceLaw for StribeckFrictionLaw {
     }
 }
 
+shape! {
+    /// The drop towards sliding speed.
+    struct Shape {
+        /// Speed at which the drop has fallen to 1/e, rad/s or m/s.
+        speed: needed,
+        /// Power of the speed in the exponent.
+        exponent: 2.0,
+    }
+}
+
 pub(super) struct Defined;
 
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
-        let (speed, exponent) = (effect.shape_or("speed", 1.0), effect.shape_or("exponent", 2.0));
+        let Shape { speed, exponent } = Shape::of(effect);
         Some(Box::new(StribeckFrictionLaw { speed, exponent }))
     }
     fn is_dry(&self) -> bool {
         true
     }
-    fn needed(&self) -> &'static [&'static str] {
-        &["speed"]
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[Shape::KEYS]
     }
     fn depends_on(&self) -> Option<Variable> {
         Some(Variable::Speed)

@@ -1,6 +1,7 @@
 //! A force as a table over one or two variables: what is there and has no name.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::shape::{Missing, ShapeKey};
 use super::{Effect, EffectName, State, Subsystem, Variable};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -128,7 +129,10 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let table = effect.table.clone()?;
-        Some(Box::new(TableLaw { table, turn: effect.shape_or("turn", TAU), way: 0.0, turned: 0.0 }))
+        Some(Box::new(TableLaw { table, turn: effect.turn().unwrap_or(TAU), way: 0.0, turned: 0.0 }))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        const { &[&[ShapeKey::new("turn", Missing::Optional)]] }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought in the residual.
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem};
 
@@ -9,6 +10,9 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, true)))
+    }
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
+        &[waves::KEYS]
     }
     fn has_own_phase(&self) -> bool {
         true

@@ -2,11 +2,24 @@
 
 use super::definition::{Fitted, Span};
 use super::law::legendre;
+use super::shape::shape;
 use super::{Effect, EffectName};
 
 /// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or bump, and one that is
 /// narrow beside the travel.
 const DEGREES: [f64; 3] = [3.0, 6.0, 12.0];
+
+shape! {
+    /// The stretch that a profile spans.
+    struct Shape {
+        /// Its lower end, rad or m.
+        low: (-1.0),
+        /// Its upper end, rad or m.
+        high: 1.0,
+        /// Degree of the polynomial, a whole number.
+        degree: 3.0,
+    }
+}
 
 /// Ends of the travel, rad or m, and the degree.
 #[derive(Debug, Clone)]
@@ -18,8 +31,8 @@ pub(super) struct Profile {
 
 impl Profile {
     pub(super) fn new(effect: &Effect) -> Self {
-        let get = |key: &str, otherwise: f64| effect.shape_or(key, otherwise);
-        Self { low: get("low", -1.0), high: get("high", 1.0), degree: get("degree", 3.0) as usize }
+        let Shape { low, high, degree } = Shape::of(effect);
+        Self { low, high, degree: degree as usize }
     }
 
     pub(super) fn names(&self) -> Vec<String> {
@@ -42,7 +55,7 @@ pub(super) fn grid(name: EffectName, span: &Span) -> Vec<Effect> {
 }
 
 pub(super) fn freedom(effect: &Effect) -> usize {
-    effect.shape_or("degree", 3.0) as usize
+    Shape::of(effect).degree as usize
 }
 
 /// Largest less smallest of the fitted polynomial over the travel.

@@ -2,8 +2,16 @@
 
 use super::definition::{Fitted, ForceLaw, Reported, sized};
 use super::law::wave_mean;
+use super::shape::{Missing, ShapeKey};
 use super::{Effect, State};
 use std::f64::consts::TAU;
+
+/// The keys of every effect that is made of waves: the travel of a turn, orders of it, or periods where no turn is known, rad or m.
+pub(super) const KEYS: &[ShapeKey] = &[
+    ShapeKey::new("turn", Missing::Optional),
+    ShapeKey::new("order_", Missing::Numbered),
+    ShapeKey::new("period_", Missing::Numbered),
+];
 
 /// Cosine and sine of each wave, times the drive where that is asked.
 #[derive(Debug, Clone)]
@@ -17,7 +25,7 @@ impl Waves {
     pub(super) fn new(effect: &Effect, of_drive: bool) -> Self {
         let mut found = effect.waves();
         if found.is_empty() {
-            found.push(("1".into(), TAU / effect.shape_or("turn", TAU)));
+            found.push(("1".into(), TAU / effect.turn().unwrap_or(TAU)));
         }
         Self {
             waves: found.iter().map(|wave| wave.1).collect(),
@@ -59,9 +67,9 @@ pub(super) fn amplitude(fitted: &Fitted) -> (f64, f64) {
 pub(super) fn report(fitted: &Fitted, is_relative: bool) -> Vec<Reported> {
     let mut waves: Vec<f64> = fitted.effect.waves().into_iter().map(|(_, wave)| wave).collect();
     if waves.is_empty() {
-        waves.push(TAU / fitted.effect.shape_or("turn", TAU));
+        waves.push(TAU / fitted.effect.turn().unwrap_or(TAU));
     }
-    let turn = fitted.effect.shape.get("turn").copied();
+    let turn = fitted.effect.turn();
     let unit = if is_relative { "1" } else { fitted.force };
     // Free periods are numbered from the strongest.
     let size = |k: usize| fitted.term(2 * k).0.hypot(fitted.term(2 * k + 1).0);

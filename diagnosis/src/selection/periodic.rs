@@ -310,7 +310,7 @@ pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
         .collect();
     waves.sort_by(f64::total_cmp);
     let Some(longest_wave) = waves.first() else { return true };
-    let first = effect.shape.get("turn").map_or(*longest_wave, |turn| TAU / turn);
+    let first = effect.turn().map_or(*longest_wave, |turn| TAU / turn);
     // Where no turn is known waves may stand closer than the longest allows teeth to.
     let orders: Vec<f64> = waves.iter().map(|wave| (wave / first).round()).collect();
     let mut run = 1;
@@ -320,7 +320,7 @@ pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
         longest = longest.max(run);
     }
     // Waves that run on and are no multiples of the longest are irregular.
-    let regular = effect.shape.contains_key("turn")
+    let regular = effect.turn().is_some()
         || waves.iter().zip(&orders).all(|(wave, order)| (wave / first - order).abs() < MULTIPLE);
     longest <= if regular { LONGEST_RUN } else { LONGEST_RUN - 1 }
 }

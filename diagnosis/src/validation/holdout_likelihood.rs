@@ -44,7 +44,7 @@ fn pattern(fit: &Fit, model: &Model, effect: usize) -> Vec<(f64, f64, f64)> {
         waves.iter().zip(terms.chunks_exact(2)).map(|(w, t)| (*w, t[0], t[1])).collect()
     };
     let mut sum = of(0);
-    let commensurate = model.effects[effect].shape.contains_key("turn");
+    let commensurate = model.effects[effect].turn().is_some();
     for r in 1..fit.prepared.len() {
         let other = of(r);
         let groups: Vec<Vec<usize>> = groups(waves.len(), commensurate);
@@ -68,7 +68,7 @@ pub(crate) fn waves_of(model: &Model, effect: usize) -> Vec<f64> {
     let effect = &model.effects[effect];
     let waves: Vec<f64> = effect.waves().into_iter().map(|(_, w)| w).collect();
     if waves.is_empty() {
-        vec![std::f64::consts::TAU / effect.shape_or("turn", std::f64::consts::TAU)]
+        vec![std::f64::consts::TAU / effect.turn().unwrap_or(std::f64::consts::TAU)]
     } else {
         waves
     }
@@ -210,7 +210,7 @@ impl Pattern {
             let most = highest(&waves, &group);
             (group, columns, reach, most)
         };
-        let groups = groups(waves.len(), which.shape.contains_key("turn")).into_iter().map(of_group);
+        let groups = groups(waves.len(), which.turn().is_some()).into_iter().map(of_group);
         Some(Self { shape: pattern(fit, model, effect), groups: groups.collect() })
     }
 }

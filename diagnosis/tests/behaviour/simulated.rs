@@ -104,7 +104,7 @@ fn bristles_of_one_length_and_of_many_are_distinguished() {
         let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(names, ["presliding_friction"], "{}", outcome.summary());
         let patched = &outcome.patched_rig.effects[0];
-        assert_eq!(patched.shape_or("spread", 1.0) > 1.0, spread, "{effect}: {patched:?}");
+        assert_eq!(patched.value("spread") > 1.0, spread, "{effect}: {patched:?}");
         let value = outcome.report.effects[0].parameters["stiffness"].value;
         let truth = stiffer * common::C / 0.2;
         assert!((value / truth - 1.0).abs() < 0.15, "{effect}: stiffness {value} instead of {truth}");

@@ -4,6 +4,7 @@
 //! for both.
 
 use crate::effects::joint_terms::JointTerms;
+use crate::effects::shape::ShapeKey;
 use crate::effects::{CommandLaw, Effect, State, Variable};
 
 /// A law with its state. The force is the sum of coefficient times term; laws in the sensor give travel instead.
@@ -108,8 +109,8 @@ pub(crate) trait EffectLaw: Sync {
     /// Puts jumps that were found into an effect that is of them: times, s, and how far the reading jumps, rad or m.
     fn put_jumps(&self, _effect: &mut Effect, _jumps: &[(f64, f64)]) {}
 
-    /// Shape values without which it cannot be run; all are above zero.
-    fn needed(&self) -> &'static [&'static str] {
+    /// Returns the keys of its shape, in groups.
+    fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[]
     }
 

@@ -54,7 +54,7 @@ impl Fitted<'_> {
 
     /// A value of the shape with its standard deviation.
     pub(crate) fn shape(&self, key: &str) -> (f64, f64) {
-        let value = self.effect.shape_or(key, 0.0);
+        let value = self.effect.value(key);
         (value, value * (self.shape_sd)(key))
     }
 

@@ -32,7 +32,8 @@ impl EffectLaw for Formula {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let formula = effect.name.formula()?;
         // Without a value: the middle of what it may be.
-        let value = |(key, low, high): &Movable| effect.shape_or(key, 0.5 * (low + high));
+        let value =
+            |(key, low, high): &Movable| effect.shape.get(*key).copied().unwrap_or(0.5 * (low + high));
         Some(Box::new(FormulaLaw { formula, shape: formula.shape.iter().map(value).collect() }))
     }
     fn is_dry(&self) -> bool {

@@ -78,7 +78,7 @@ pub(crate) fn columns(
         });
     }
     // A loss in proportion to the recorded command would shrink what it is to explain.
-    let rests_on_command = is_by_command(effect) || effect.is_set("of_drive");
+    let rests_on_command = is_by_command(effect) || effect.value("of_drive") > 0.5;
     let with_asked = rests_on_command.then(|| asked.tracks(sights, scale));
     let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
     let of: Vec<Vec<Vec<f64>>> =
