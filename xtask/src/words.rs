@@ -7,7 +7,7 @@ mod list;
 mod prose;
 
 use crate::shell::{self, Failure};
-use list::{OPENINGS, Phrase, STILL_TO_CLEAN, STILL_TO_RENAME};
+use list::{OPENINGS, Phrase};
 use prose::Word;
 pub(crate) use prose::code;
 use std::collections::HashMap;
@@ -52,14 +52,12 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
             let Some(prose) = prose::reader(name) else { continue };
             let Ok(text) = fs::read_to_string(entry.path()) else { continue };
             findings.extend(phrases(&prose(&text), list::PHRASES).iter().map(|found| found.message(&below)));
-            if name.ends_with(".rs") && !STILL_TO_RENAME.iter().any(|folder| below.starts_with(folder)) {
+            if name.ends_with(".rs") {
                 findings.extend(long_names(&text).into_iter().map(|(line, name)| {
                     format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
                 }));
             }
-            if [".rs", ".js"].iter().any(|end| name.ends_with(end))
-                && !STILL_TO_CLEAN.iter().any(|folder| below.starts_with(folder))
-            {
+            if [".rs", ".js"].iter().any(|end| name.ends_with(end)) {
                 findings.extend(openings(&text).into_iter().map(|(line, word)| {
                     format!(
                         "{below}:{line}: a doc comment opens with \"{word}\": write a sentence, such as \"Returns …\", \"True if …\" or \

@@ -211,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stop_within_a_block_is_a_dip_to_what_friction_stops_and_neither_a_crawl_nor_a_slower_stretch() {
+    fn a_dip_that_friction_can_stop_is_a_stop_within_a_block() {
         let time_s: Vec<f64> = (0..101).map(|i| f64::from(i) * 2.5e-3).collect();
         let recording = Recording {
             command: vec![0.0; time_s.len()],

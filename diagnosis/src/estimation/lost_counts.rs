@@ -298,7 +298,7 @@ mod tests {
     use crate::numerics::bootstrap::Random;
 
     #[test]
-    fn a_jump_within_a_block_is_one_in_two_parts_and_parts_that_oppose_each_other_are_none() {
+    fn two_parts_of_one_jump_agree_in_sign() {
         let (now, next) = ([1.0, -0.6, 0.1, 0.0, 0.0], [0.0, 1.0, -0.6, 0.1, 0.0]);
         let left =
             |a: f64, b: f64| -> Vec<f64> { now.iter().zip(next).map(|(x, y)| a * x + b * y).collect() };
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_counts_are_found_where_in_a_block_they_fall_and_how_many() {
+    fn lost_counts_are_found_with_their_moment_and_number() {
         let after = |at: f64, t: f64| f64::from(u8::from(t >= at));
         let reads = |t: f64| 3000.3 * t - 2.0 * after(0.6003, t) - after(1.2349, t);
         let (lost, start) = lost(reads, Asked::UNKNOWN);
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn one_loss_is_none_before_it_is_known_that_counts_get_lost_and_an_impact_never_is() {
+    fn a_single_loss_needs_other_losses_and_an_impact_is_none() {
         let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
         let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
         assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_or_drifts_stays_within_what_the_rigs_frictions_allow() {
+    fn friction_differs_and_drifts_within_the_rigs_limits() {
         let (asymmetric, drift) = (EffectName::AsymmetricFriction, EffectName::FrictionDrift);
         let known = nominal(0.02, 0.05);
         let near = |(low, high): (f64, f64), (a, b): (f64, f64)| {

@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_rests_where_the_smoothed_speed_promises_counts_that_do_not_come() {
+    fn an_axis_rests_where_expected_counts_do_not_come() {
         let track = stopped_for_a_moment();
         let count = track.blocks.z[1] - track.blocks.z[0];
         let at = |counts_per_block: f64| {

@@ -34,7 +34,7 @@ const MOST_OF_REST: f64 = 0.4;
 /// Factor below which one model leaves clearly less than another.
 const CLEARLY_LESS: f64 = 0.8;
 
-/// What shares of the force error make of what was found.
+/// The verdict of shares of the force error on the effects that the search found.
 pub(crate) enum ByShares {
     /// Noise limits, or nothing takes enough: what was found stands as it is.
     Nothing,
@@ -94,7 +94,7 @@ fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
     !is_by_command(effect) || (CommandLaw::new(effect).is_none() && selected.share.least() >= MOST_SHARE)
 }
 
-/// What the recordings show of the axis.
+/// Returns the facts about the axis that the recordings show.
 fn shown(prepared: &Prepared, found: &Found) -> Shown {
     let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
     let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
@@ -130,7 +130,7 @@ fn standing_by_shares(
     ByShares::Selected { with: Box::new(with), alone }
 }
 
-/// What was found, with those of its effects confirmed that shares name too, whatever the shape that a regression gives them.
+/// Confirms those of the found effects that shares name too, whatever the shape that a regression gives them.
 fn as_found(own: &[Effect], materials: Vec<Material>) -> ByShares {
     let confirmed = |one: Material| {
         let name = own.iter().map(|effect| effect.name).find(|name| one.class.contains(name))?;
@@ -197,7 +197,7 @@ fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> 
     class
 }
 
-/// What was found, with those of its effects marked that shares name too.
+/// Marks those of the found effects that shares name too.
 pub(crate) fn confirmed(mut found: Found, materials: Vec<Material>) -> Found {
     for one in &mut found.standing.effects {
         one.material = Material::find(&materials, one.effect.name).cloned();
@@ -206,7 +206,7 @@ pub(crate) fn confirmed(mut found: Found, materials: Vec<Material>) -> Found {
     found
 }
 
-/// What limits how well recordings are explained.
+/// The limit to how well recordings are explained.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Regime {
     /// Noise, before anything was found.
@@ -268,7 +268,8 @@ fn standing(
     Found { fit, holdout, null, standing }
 }
 
-/// What a model leaves over what reading whole counts makes of it under some noise, on fitted or on held-out recordings, whichever is less.
+/// Ratio of the force that a model leaves to the force that reading whole counts causes under some noise: the smaller one of the fitted
+/// and the held-out recordings.
 fn discrepancy(prepared: &Prepared, found: &Found, model: &FittedModel, noise: &Noise) -> f64 {
     let (nominal, holdout) = (&prepared.nominal, &found.holdout.smoothed);
     let estimator = Estimator::new(&found.fit, noise, prepared.scale);

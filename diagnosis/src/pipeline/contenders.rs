@@ -48,7 +48,7 @@ fn odds(z: f64) -> f64 {
     behind / (1.0 - behind).max(1e-12)
 }
 
-/// What contenders are fitted with.
+/// The recordings and the context that contenders are fitted with.
 struct Field<'a> {
     prepared: &'a Prepared,
     assessment: &'a Assessment,

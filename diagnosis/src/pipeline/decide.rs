@@ -79,7 +79,7 @@ pub(crate) fn decide(
     }))
 }
 
-/// What a fit moved of the rig's values.
+/// Returns the values of the rig that a fit moved.
 fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
     let by_gain = fit.value(Key::Gain).map_or(1.0, |ratio| nominal.gain() / ratio);
     let is_known = nominal.virtual_inertia == 0.0 && by_gain > 0.0;

@@ -49,13 +49,13 @@ pub(crate) enum Reason {
     Repeats { correlation: f64 },
 }
 
-/// What a refit moved.
+/// The values of a rig and its recordings that a refit moved.
 pub(crate) struct Moved {
     /// Rows by which commands act after their time stamps; none where the recordings show no skew.
     pub(crate) late_rows: Option<f64>,
     /// Inertia over gain, over the rig's own.
     pub(crate) inertia_by_gain: f64,
-    /// How far that is from 1, in standard deviations of the rig's uncertainty; zero where the rig's inertia hardly matters.
+    /// Distance of that from 1, in standard deviations of the rig's uncertainty; zero where the rig's inertia hardly matters.
     pub(crate) deviations: f64,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct Complete {
     pub(crate) untested: Vec<(EffectName, String)>,
     /// Force errors under the three models.
     pub(crate) errors: FitTable,
-    /// What the refit moved.
+    /// The values that the refit moved.
     pub(crate) moved: Moved,
     /// Bandwidth of the residuals, Hz.
     pub(crate) bandwidth_hz: f64,
@@ -81,7 +81,7 @@ pub(crate) struct Complete {
     pub(crate) noise_floor: f64,
     /// Part of the held-out mean square above the noise that the patched model leaves.
     pub(crate) unexplained_fraction: f64,
-    /// Where the mismatch is, where nothing was named.
+    /// The place of the mismatch, if nothing was named.
     pub(crate) place: Option<Place>,
     /// The gain of a force of any form: alone where nothing is named, otherwise in addition to the named effects.
     pub(crate) free_form: Option<FreeForce>,

@@ -21,7 +21,7 @@ use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residuals::forces;
 
-/// How many candidates are judged per effect that may be named: who asks often enough hears a yes.
+/// Most candidates that are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
 
 /// The result of the search.
@@ -69,7 +69,7 @@ struct SearchState {
 #[derive(Default)]
 struct Tried {
     rejected: Vec<RejectedHypothesis>,
-    /// How many candidates were judged.
+    /// The number of candidates that were judged.
     count: usize,
     /// True once plain forces were looked for together.
     plain: bool,

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_judges_a_block_of_a_held_out_recording_knows_no_later_row() {
+    fn a_held_out_block_is_predicted_without_later_rows() {
         let farthest = |name: N, knows: Knows| {
             let [(a, nominal, total), (b, _, other)] =
                 [false, true].map(|is_mirrored| followed(is_mirrored, knows));
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_of_the_travel_is_looked_for_where_recordings_start_at_one_place() {
+    fn a_law_of_the_travel_needs_recordings_from_one_place() {
         let mut rig = Rig::of_values(0.01, 0.0, 0.05);
         let mut is_looked_for = |start_spread| {
             rig.encoder.start_spread = start_spread;
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn drifts_settle_within_the_recording_bristles_are_short_and_grips_hold() {
+    fn each_law_has_limits_to_what_it_may_be() {
         let span = span();
         let at_end = |name: N, time_constant: f64| {
             is_at_end(&Effect::shaped(name, &[("time_constant", time_constant)]), &span)

@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn teeth_and_poles_leave_gaps_between_their_orders_and_places_do_not() {
+    fn teeth_and_poles_leave_gaps_between_their_orders() {
         assert!(is_comb(&cogging(&[7.0, 12.0, 14.0, 21.0, 28.0]), &[1.0; 5]));
         assert!(is_comb(&cogging(&[1.0, 2.0, 3.0, 4.0]), &[1.0; 4]));
         assert!(!is_comb(&cogging(&[2.0, 3.0, 4.0, 5.0, 6.0]), &[1.0; 5]));

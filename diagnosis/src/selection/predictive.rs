@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_strong_and_rare_is_sure_and_what_meets_as_much_noise_is_not() {
+    fn a_strong_rare_gain_is_sure_and_one_within_noise_is_not() {
         let mut random = crate::numerics::bootstrap::Random::new(3);
         let mut noise = || (0..12).map(|_| random.below(1001) as f64 / 1000.0).sum::<f64>() - 6.0;
         let quiet: Vec<f64> = (0..6000).map(|_| noise()).collect();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_there_predicts_blocks_that_were_left_out_and_what_is_not_does_not() {
+    fn only_a_present_effect_predicts_blocks_that_were_left_out() {
         assert!(gain(0.3) > 50.0, "{}", gain(0.3));
         assert!(gain(0.0) < 3.0, "{}", gain(0.0));
     }

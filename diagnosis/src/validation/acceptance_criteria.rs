@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rests_on_few_moments_carries_only_where_it_is_nearly_all_and_as_large_everywhere() {
+    fn a_gain_from_few_moments_must_be_large_everywhere() {
         let rare = |found: &mut EffectEvidence| {
             found.holdout = gain(500.0, -60.0, 1.6);
             found.force.low = -1e-6;
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_as_large_everywhere_may_rest_on_one_moment_if_it_harms_in_no_other() {
+    fn one_moment_suffices_if_the_effect_harms_nowhere() {
         let once = |found: &mut EffectEvidence| {
             found.fit = gain(900.0, 100.0, 1.4);
             found.holdout = gain(300.0, -5.0, 1.0);
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_is_right_where_it_leaves_hardly_anything_and_is_as_large_everywhere() {
+    fn a_right_law_leaves_little_and_is_as_large_everywhere() {
         assert!(found().fits_everywhere());
         assert!(!EffectEvidence { share: 0.6, ..found() }.fits_everywhere());
         assert!(!EffectEvidence { sizes: vec![1.0, 1.5], ..found() }.fits_everywhere());
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn what_promises_is_sure_where_it_was_fitted_and_surely_harms_nowhere() {
+    fn a_promising_effect_gains_where_fitted_and_harms_nowhere() {
         let mut half = found();
         half.holdout = gain(300.0, -20.0, 1.5);
         half.force.low = -0.1;

@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unseen_gap_may_be_a_spring_and_a_wave_of_a_screw_may_be_of_its_motor() {
+    fn an_unseen_gap_may_be_a_spring() {
         use EffectName as N;
         let of = |name: N, shape: &[(&str, f64)], linear: bool| {
             let shown = Shown { linear, count: 1e-6, ..Shown::default() };

@@ -25,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drifts_of_gain_and_friction_by_the_same_part_are_one_of_the_inertia() {
+    fn gain_and_friction_drifting_alike_are_an_inertias_drift() {
         assert!(are_alike(-0.137, -0.137) && are_alike(-0.35, -0.5) && are_alike(0.2, 0.16));
         assert!(!are_alike(-0.1, -0.5) && !are_alike(-0.3, -0.1) && !are_alike(-0.2, 0.2));
     }

@@ -304,7 +304,7 @@ mod tests {
     use crate::io::rig::Rig;
 
     #[test]
-    fn the_offset_of_a_held_out_stretch_is_that_of_the_other_stretches() {
+    fn a_held_out_stretch_has_the_offset_of_the_others() {
         // Pushed on for the 0.6 s that are left out together, and gliding from then on.
         let moved = |t: f64| 5000.0 * (t + if t < 0.6 { t * t } else { 1.2 * t - 0.36 });
         let time_s: Vec<f64> = (0..5000).map(|row| f64::from(row) * 1e-3).collect();

@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_knows_the_travel_that_was_fitted_and_drag_knows_all() {
+    fn a_profile_knows_only_the_travel_that_was_fitted() {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let span = span_of(&[slide(10.0)], &nominal);

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_the_motion_repeats_with_it_and_what_comes_from_outside_does_not() {
+    fn only_a_force_of_the_motion_repeats_with_it() {
         let of_motion = |t: f64| (7.0 * t + (3.0 * t).sin()).sin();
         let told = repeats(vec![track(0.0, of_motion), track(0.3, of_motion)]);
         assert!(told.is_some_and(|correlation| correlation > 0.9), "{told:?}");

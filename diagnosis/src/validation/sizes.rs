@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_that_hardly_plays_an_effect_says_nothing_of_its_size() {
+    fn a_recording_with_little_of_an_effect_has_no_size() {
         let size = |factor, square| Size { factor, square };
         let fitted = || vec![size(1.0, 1.0), size(1.8, 0.01)];
         assert_eq!(played(fitted(), vec![size(0.9, 0.5)]), [1.0, 0.9]);

@@ -40,10 +40,3 @@ pub(super) const PHRASES: &[Phrase] = &[
 
 /// Words that do not open the first sentence of a doc comment: it says what is returned, true or stored.
 pub(super) const OPENINGS: &[&str] = &["What", "Whether", "How", "Where", "Of"];
-
-/// Folders and files whose doc comments still open otherwise; a clean one leaves this list.
-pub(super) const STILL_TO_CLEAN: &[&str] = &["diagnosis/src/pipeline/"];
-
-/// Folders and files with longer names of tests; a clean one leaves this list.
-pub(super) const STILL_TO_RENAME: &[&str] =
-    &["diagnosis/src/estimation/", "diagnosis/src/selection/", "diagnosis/src/validation/"];

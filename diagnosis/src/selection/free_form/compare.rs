@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_stands_where_it_takes_nearly_all_that_a_form_of_its_inputs_takes() {
+    fn a_name_takes_nearly_all_that_a_free_form_takes() {
         assert!(stands(20.0, 19.0, 20.5), "its own law");
         assert!(!stands(16.0, 20.0, 20.0), "the form takes a fifth more and leaves it nothing");
         assert!(stands(16.0, 5.0, 21.0), "something else is there beside it, which the form takes");
