@@ -1,7 +1,8 @@
 //! Time of a step of the tissue picture on one core, for `cargo xtask bench`: at least 5,000 particles, a needle that goes in
 //! and out. Prints `xpbd_step_ms=…`, the median over all steps, and the time of a step on meshes of about one, ten and a hundred
-//! times as many particles.
+//! times as many particles. Where `XPBD_MESH` names a file, the mesh is written there for the peer `xtask/peers/soft_body.py`.
 
+use std::path::Path;
 use std::time::Instant;
 use tissue::{Configuration, Needle, Tissue};
 
@@ -21,6 +22,9 @@ fn main() {
         }
     }
     let mut tissue = Tissue::new(&configuration).expect("the default limb can be built");
+    if let Some(path) = std::env::var_os("XPBD_MESH") {
+        write_mesh(&tissue, configuration.substeps, Path::new(&path));
+    }
     let times = sorted_ms(&mut tissue, STEPS);
     let [distances, volumes, bendings, ties] = tissue.solver().counts();
     println!(
@@ -45,6 +49,26 @@ fn main() {
         let ms = sorted_ms(&mut tissue, steps)[steps / 2];
         println!("work.xpbd.particles.{}={:.7}", tissue.points().len(), 1e-3 * ms);
     }
+}
+
+/// Writes as JSON: the particles at rest, mm, each with its inverse mass, 1/g; the distances and the volumes, each as corners, rest value
+/// (mm, mm³) and compliance; the substeps of a picture.
+fn write_mesh(tissue: &Tissue, substeps: u32, path: &Path) {
+    let list = |items: Vec<String>| format!("[{}]", items.join(","));
+    let points = tissue.rest().iter().map(|point| format!("{point:?}")).collect();
+    let distances = tissue.solver().distances().iter();
+    let distances =
+        distances.map(|one| format!("[{:?},{:?},{:?}]", one.ends, one.rest, one.compliance)).collect();
+    let volumes = tissue.solver().volumes().iter();
+    let volumes =
+        volumes.map(|one| format!("[{:?},{:?},{:?}]", one.corners, one.rest, one.compliance)).collect();
+    let text = format!(
+        "{{\"substeps\":{substeps},\"points\":{},\"distances\":{},\"volumes\":{}}}",
+        list(points),
+        list(distances),
+        list(volumes)
+    );
+    std::fs::write(path, text).expect("the mesh's file can be written");
 }
 
 /// Times of steps with a needle that goes in and out, from the shortest, in ms.

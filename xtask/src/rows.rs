@@ -47,7 +47,7 @@ pub(crate) const ROWS: [Row; 25] = [
     row("stream_samples_per_s", "samples/s", Some(10_000.0), Better::Higher),
     row("hand_to_page_p50_ms", "ms", None, Better::Lower),
     row("hand_to_page_p99_ms", "ms", None, Better::Lower),
-    peered(row("xpbd_step_ms", "ms", Some(2.0), Better::Lower), "MuJoCo"),
+    peered(row("xpbd_step_ms", "ms", Some(2.0), Better::Lower), "SciPy"),
     row("xpbd_growth", "times of linear", None, Better::Lower),
     peered(row("ultrasound_frame_ms", "ms", Some(8.0), Better::Lower), "NumPy"),
     row("class_growth", "times of linear", None, Better::Lower),

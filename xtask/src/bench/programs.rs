@@ -6,6 +6,7 @@ use crate::shell::{self, Failure, cargo};
 use crate::workspace_build::{BUILD, built};
 use crate::{boards, firmware, setup};
 use std::fs;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// The test programs of the crate `tests`: a folder each.
@@ -74,10 +75,17 @@ pub(crate) const EXAMPLES: [(&str, &str); 6] = [
     ("diagnosis_growth", "diagnose_growth"),
 ];
 
+/// The variable that names the file in which `xpbd_speed` leaves its mesh for its peer.
+const MESH: &str = "XPBD_MESH";
+
+fn mesh() -> PathBuf {
+    shell::target().join("xpbd-mesh.json")
+}
+
 /// Builds an example with the one build of everything, and runs it.
 pub(crate) fn example(name: &str) -> Result<Values, Failure> {
     let program = built(&["--example", name], &format!("examples/{name}"))?;
-    shell::output(&mut Command::new(program)).map(|text| values_in(&text))
+    shell::output(Command::new(program).env(MESH, mesh())).map(|text| values_in(&text))
 }
 
 /// Other people's solvers on the same tasks, in Python, and the rows that they stand beside.
@@ -95,7 +103,7 @@ pub(crate) fn peer(script: &str) -> Result<Values, Failure> {
 pub(crate) fn python(script: &str) -> Result<Command, Failure> {
     let mut command = Command::new(setup::python(&PEERS_PACKAGES)?);
     command.current_dir(shell::target());
-    command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+    command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").env(MESH, mesh());
     command.arg(shell::top().join("xtask/peers").join(script));
     Ok(command)
 }
