@@ -1,5 +1,5 @@
 // The WebSocket to the program: connects, connects again for as long as the page is open, and knows how old the data is.
-// What the messages say is documented in host-sim/device-sim/src/page/messages.rs.
+// The messages to the page are documented in host-sim/device-sim/src/page/messages.rs, those from it in session/control.rs there.
 
 const RETRY_MS = [250, 500, 1000, 2000];
 /** A server that says nothing for so long is gone, though the socket may not know: it speaks at least every 250 ms. */

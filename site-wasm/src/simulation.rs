@@ -5,10 +5,10 @@ use device_sim::driver::{Driver, Request};
 use device_sim::failure::Failure;
 use device_sim::lockstep;
 use device_sim::page::condense::Condenser;
-use device_sim::page::messages::{FromPage, Hand, ToPage};
+use device_sim::page::messages::ToPage;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
-use device_sim::session::{self, Control, Publisher, Session, Source, Subscription};
+use device_sim::session::{self, Control, Hand, Publisher, Session, Source, Subscription};
 use std::time::Duration;
 
 /// The procedure that the scripted hand follows.
@@ -108,11 +108,11 @@ impl Simulation {
 
     /// Does what the page asks for, if a device alone can; what is wrong with it where it asked for nonsense.
     pub fn receive(&mut self, text: &str) -> Result<(), String> {
-        let message = FromPage::parse(text)?;
-        if let Some(hand) = message.hand() {
+        let control = Control::parse(text)?;
+        if let Some(hand) = control.hand() {
             self.person = hand == Hand::Person;
         }
-        self.session.control(message.into());
+        self.session.control(control);
         Ok(())
     }
 

@@ -71,6 +71,14 @@ fn in_words(message: &str) -> String {
     }
 }
 
+/// Returns true for a plain name that leads to no other folder.
+pub fn is_file_name(name: &str) -> bool {
+    let is_plain = |c: char| c.is_alphanumeric() || " ._-".contains(c);
+    (1..=60).contains(&name.chars().count())
+        && name.chars().all(is_plain)
+        && name.starts_with(|c: char| c.is_alphanumeric())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -161,6 +161,8 @@ impl Outlets {
                 notice,
                 replay: None,
                 compensation: self.gains.share(),
+                // Each subscription fills in its own.
+                skipped_samples: 0,
             };
         });
     }

@@ -7,7 +7,7 @@ use device_sim::failure::Failure;
 use device_sim::named_files::Text;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{self, Profile};
-use device_sim::session::{PatientAnswer, PatientStatus, PatientWish, Scene, Source};
+use device_sim::session::{PatientAnswer, PatientStatus, Scene, Source};
 use recording::messages::Setup;
 
 /// The patient of a run.
@@ -46,28 +46,40 @@ impl PatientManager {
         self
     }
 
-    /// Checks a wish; what to ask of the device, or in one sentence why not.
-    pub fn ask(&mut self, wish: &PatientWish) -> Result<Patient, Failure> {
-        let mut save_as = None;
-        let profile = match wish {
-            PatientWish::Named(name) => Profile::parse_for(self.named(name)?, &self.device)?,
-            PatientWish::Edited(json) => self.edited(json)?,
-            PatientWish::Saved { name, profile } => {
-                let saved = self.saved.as_ref().ok_or_else(|| {
-                    Failure::input("this program keeps no patients; send it to the device without saving")
-                })?;
-                let name = saved.free_name(name)?;
-                let mut json = profile.clone();
-                if let Some(key) = json.get_mut("name") {
-                    *key = name.as_str().into();
-                }
-                save_as = Some(name);
-                self.edited(&json)?
-            }
-        };
-        // A patient that is chosen brings its own procedure; the scripted hand must find its way in any.
-        let own = matches!(wish, PatientWish::Named(_)).then(|| profile.procedure.clone());
-        let procedure = own.filter(|_| self.procedure.is_some());
+    /// Checks a patient that comes with the program or was saved; what to ask of the device, or in one sentence why not.
+    pub fn choose(&mut self, name: &str) -> Result<Patient, Failure> {
+        let profile = Profile::parse_for(self.named(name)?, &self.device)?;
+        // It brings its own procedure; the scripted hand must find its way in any.
+        let own = self.procedure.is_some().then(|| profile.procedure.clone());
+        self.ask(profile, own, None)
+    }
+
+    /// Checks an edited patient, key by key as in a profile's file; what to ask of the device, or in one sentence why not.
+    pub fn edit(&mut self, json: &serde_json::Value) -> Result<Patient, Failure> {
+        let profile = self.edited(json)?;
+        self.ask(profile, None, None)
+    }
+
+    /// The same, to be saved under `name`, or a free name like it, once the device has taken it.
+    pub fn save(&mut self, name: &str, json: &serde_json::Value) -> Result<Patient, Failure> {
+        let saved = self.saved.as_ref().ok_or_else(|| {
+            Failure::input("this program keeps no patients; send it to the device without saving")
+        })?;
+        let name = saved.free_name(name)?;
+        let mut json = json.clone();
+        if let Some(key) = json.get_mut("name") {
+            *key = name.as_str().into();
+        }
+        let profile = self.edited(&json)?;
+        self.ask(profile, None, Some(name))
+    }
+
+    fn ask(
+        &mut self,
+        profile: Profile,
+        procedure: Option<String>,
+        save_as: Option<String>,
+    ) -> Result<Patient, Failure> {
         let wanted = procedure.as_ref().or(self.procedure.as_ref());
         wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
@@ -191,19 +203,19 @@ mod tests {
         let mut json = patients.status(None).profile;
         let force_before = patients.scene().layers[0].friction_n_per_mm;
         json["layer"][0]["friction_n_per_mm"] = serde_json::json!(0.03);
-        let patient = patients.ask(&PatientWish::Edited(json)).expect("it may run");
+        let patient = patients.edit(&json).expect("it may run");
         assert!((patient.layers[0].friction.0.to_num::<f64>() - 0.03).abs() < 1e-4);
         assert_eq!(patients.scene().layers[0].friction_n_per_mm, force_before, "not yet");
         assert!(patients.taken().is_some() && patients.taken().is_none(), "once");
         assert!((patients.scene().layers[0].friction_n_per_mm - 0.03).abs() < 1e-4);
         assert!(patients.setup().profile_toml.contains("0.03"), "the recording is told");
-        patients.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        patients.choose("firm-skin").expect("built in");
         patients.refused();
         assert!(patients.taken().is_none(), "what was refused never counts");
-        patients.ask(&PatientWish::Named("firm-skin".into())).expect("built in");
+        patients.choose("firm-skin").expect("built in");
         assert!(patients.taken().is_some());
         assert_eq!(patients.scene().profile, "firm-skin");
-        patients.ask(&PatientWish::Named("shoulder".into())).expect("built in");
+        patients.choose("shoulder").expect("built in");
         assert!(patients.taken().is_some());
         assert_eq!(
             patients.setup().procedure.as_deref(),
@@ -219,21 +231,20 @@ mod tests {
         let mut first = patients();
         let mut json = first.status(None).profile;
         json["layer"][2]["depth_mm"] = serde_json::json!(6.0);
-        let wish = PatientWish::Saved { name: "anna".into(), profile: json };
-        let said = first.ask(&wish).expect_err("there is no folder").to_string();
+        let said = first.save("anna", &json).expect_err("there is no folder").to_string();
         assert!(said.contains("keeps no patients"), "{said}");
         let mut first = patients().saving_in(SavedPatients::new(&folder));
         assert!(first.status(None).can_save);
-        first.ask(&wish).expect("it may run");
+        first.save("anna", &json).expect("it may run");
         assert!(!first.status(None).names.contains(&"anna".into()), "the device has not taken it");
         let file = first.taken().expect("asked").saved.expect("saved");
         assert!(file.ends_with("anna.toml") && first.setup().profile_origin == file);
-        first.ask(&wish).expect("it may run");
+        first.save("anna", &json).expect("it may run");
         let second = first.taken().expect("asked").saved.expect("saved");
         assert!(second.ends_with("anna-2.toml"), "{second}");
         let mut later = patients().saving_in(SavedPatients::new(&folder));
         assert!(later.status(None).names.ends_with(&["anna".into(), "anna-2".into()]));
-        later.ask(&PatientWish::Named("anna-2".into())).expect("in the list");
+        later.choose("anna-2").expect("in the list");
         assert!(later.taken().is_some_and(|answer| answer.saved.is_none()));
         assert_eq!(later.scene().profile, "anna-2");
         assert!((later.scene().layers[2].depth_mm - 6.0).abs() < 1e-4);
@@ -247,19 +258,20 @@ mod tests {
         let with = |pointer: &str, value: serde_json::Value| {
             let mut json = good.clone();
             *json.pointer_mut(pointer).expect("it is there") = value;
-            PatientWish::Edited(json)
+            json
         };
-        for (wish, hint) in [
+        for (edited, hint) in [
             (with("/layer/0/friction_n_per_mm", serde_json::json!("much")), "friction_n_per_mm"),
             (with("/layer/0/friction_n_per_mm", serde_json::json!(-1.0)), "friction_n_per_mm is -1"),
             (with("/name", serde_json::json!(7)), "string"),
             (with("/layer", serde_json::json!([])), "layer"),
-            (PatientWish::Edited(serde_json::json!(null)), "patient"),
-            (PatientWish::Named("giant".into()), "giant"),
+            (serde_json::json!(null), "patient"),
         ] {
-            let said = patients.ask(&wish).expect_err(hint).to_string();
+            let said = patients.edit(&edited).expect_err(hint).to_string();
             assert!(said.contains(hint) && !said.contains('\n'), "{hint}: {said}");
             assert!(patients.taken().is_none());
         }
+        let said = patients.choose("giant").expect_err("unknown").to_string();
+        assert!(said.contains("giant") && !said.contains('\n') && patients.taken().is_none(), "{said}");
     }
 }

@@ -270,7 +270,7 @@ mod tests {
         let batch = looker.drain();
         assert!((batch.poses.last().expect("poses").depth.0.to_num::<f64>() - 7.0).abs() < 0.03);
         assert_eq!(batch.samples.len(), 7_000, "as much as there was before, at 10 kHz");
-        assert_eq!(batch.skipped_samples, 0);
+        assert_eq!(batch.link.skipped_samples, 0);
         assert_eq!(batch.events.len(), 1);
         assert!(batch.events[0].before.is_some(), "with the pose before the drop");
         // Back before the event: it has not happened.

@@ -4,12 +4,13 @@
 use crate::outlets::Outlets;
 use crate::patient_manager::PatientManager;
 use crate::realtime_clock::RealtimeClock;
+use control_core::Patient;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::device::{Port, Wire};
 use device_sim::driver::{Driver, Request};
 use device_sim::failure::Failure;
 use device_sim::lockstep;
-use device_sim::session::{Control, PatientAnswer, PatientWish, Subscription};
+use device_sim::session::{Control, PatientAnswer, Subscription};
 use recording::run_stats::RunStats;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -258,7 +259,7 @@ impl<'a> RunLoop<'a> {
         if let Some(practice) = &mut self.practice {
             match control {
                 Control::Drag { .. } => practice.held(true),
-                Control::Script => practice.held(false),
+                Control::Demo => practice.held(false),
                 _ => {}
             }
         }
@@ -276,7 +277,11 @@ impl<'a> RunLoop<'a> {
                 self.driver.request(Request::Stop);
             }
             Control::Zero => self.driver.request(Request::Zero),
-            Control::Patient(wish) => self.wish_patient(&wish),
+            Control::Choose { patient } => self.ask_patient(|patients| patients.choose(&patient)),
+            Control::Edit { profile } => self.ask_patient(|patients| patients.edit(&profile)),
+            Control::SavePatient { name, profile } => {
+                self.ask_patient(|patients| patients.save(&name, &profile));
+            }
             Control::Compensate { share } => {
                 if let Some(gains) = self.outlets.gains.at(share) {
                     self.driver.request(Request::Compensate(gains));
@@ -294,9 +299,10 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    fn wish_patient(&mut self, wish: &PatientWish) {
+    /// Asks the device for another patient, or says why not.
+    fn ask_patient(&mut self, ask: impl FnOnce(&mut PatientManager) -> Result<Patient, Failure>) {
         let Some(patients) = &mut self.patients else { return };
-        match patients.ask(wish) {
+        match ask(patients) {
             Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
             Err(why) => {
                 let answer = PatientAnswer { reason: why.to_string(), ..PatientAnswer::default() };

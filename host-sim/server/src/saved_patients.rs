@@ -2,7 +2,7 @@
 
 use device_sim::failure::Failure;
 use device_sim::named_files::Text;
-use device_sim::page::messages::is_file_name;
+use device_sim::named_files::is_file_name;
 use device_sim::profile;
 use std::fs;
 use std::io::{self, Write};

@@ -53,7 +53,7 @@ fn a_wild_drag_trips_nothing_and_the_script_resumes() {
         run(&mut device, 0.5);
         assert_eq!(device.tripped(), None, "after a drag to {depth_mm} mm");
     }
-    device.control(Control::Script);
+    device.control(Control::Demo);
     let largest = run(&mut device, 6.0);
     assert!(largest > 0.95, "the skin was punctured again, at {largest} N");
     assert!(device.is_enabled());

@@ -7,7 +7,7 @@ use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
-use device_sim::session::{self, Control, PatientWish, Source, Subscription};
+use device_sim::session::{self, Control, Source, Subscription};
 use recording::messages::Setup;
 use recording::read::Recording;
 use recording::run_stats::RunStats;
@@ -20,8 +20,8 @@ use server::run_loop::RunLoop;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Runs an adult on `device` for `seconds`; at the first progress the wish is uttered. The patients believes in the built-in device.
-fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscription {
+/// Runs an adult on `device` for `seconds`; at the first progress `wanted` is chosen. The patient manager assumes the built-in device.
+fn run(device: &Device, wanted: &str, seconds: u64, file: &Path) -> Subscription {
     let profile = Profile::find_for("adult", device).expect("it is built in");
     let believed = Profile::find("adult").expect("it is built in");
     let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
@@ -42,20 +42,20 @@ fn run(device: &Device, wish: PatientWish, seconds: u64, file: &Path) -> Subscri
     let run_loop = RunLoop::new(Driver::new(profile.config.patient.clone()), outlets, &stop);
     let patients = PatientManager::new(believed, Source::Virtual, Some("venepuncture".into()), setup);
     let device = VirtualDevice::new(&profile, procedure);
-    let mut wish = Some(wish);
-    let utter = |samples: u64| {
+    let mut choice = Some(Control::Choose { patient: wanted.into() });
+    let choose = |samples: u64| {
         if samples > 1_000 {
-            wish.take().into_iter().for_each(|wish| session.control(Control::Patient(wish)));
+            choice.take().into_iter().for_each(|choice| session.control(choice));
         }
     };
-    run_loop.with_patients(patients).run_in_step(device, RealtimeClock::Free, utter).expect("it runs");
+    run_loop.with_patients(patients).run_in_step(device, RealtimeClock::Free, choose).expect("it runs");
     looker
 }
 
 #[test]
 fn another_patient_is_taken_whole_and_the_run_goes_on_with_it() {
     let file = folder("patient-taken").join("a.mcap");
-    let mut looker = run(&Device::commissioned_virtual(), PatientWish::Named("firm-skin".into()), 7, &file);
+    let mut looker = run(&Device::commissioned_virtual(), "firm-skin", 7, &file);
     let batch = looker.drain();
     assert_eq!(batch.scene.expect("another tissue").profile, "firm-skin");
     let patient = batch.patient.expect("an answer");
@@ -81,7 +81,7 @@ fn a_refused_patient_changes_nothing_and_gives_its_reason() {
     // A motor that gives 1.7 N at the roller: enough for an adult, not for firm skin.
     let mut weak = Device::commissioned_virtual();
     weak.limits.torque = MillinewtonMetres(17_i16.into());
-    let mut looker = run(&weak, PatientWish::Named("firm-skin".into()), 7, &file);
+    let mut looker = run(&weak, "firm-skin", 7, &file);
     let batch = looker.drain();
     assert_eq!(batch.scene.expect("the first").profile, "adult");
     let patient = batch.patient.expect("an answer");

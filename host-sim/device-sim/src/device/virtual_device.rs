@@ -236,7 +236,7 @@ impl VirtualDevice {
                 self.hand = Hand::Drag { wanted_mm: depth_mm.clamp(-travel, travel) + self.zero_mm };
             }
             Control::Release => self.hand = Hand::Drag { wanted_mm: self.hand_mm },
-            Control::Script => self.restart_script(),
+            Control::Demo => self.restart_script(),
             Control::Tilt { rad } if rad.is_finite() => {
                 self.plant.set_tilt(rad.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
             }

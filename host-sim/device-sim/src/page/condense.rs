@@ -1,7 +1,7 @@
 //! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure: no clock, no socket.
 
 use super::messages::{self, Bucket, Device, Range, Timing};
-use crate::session::{Batch, Happening, state_name, vessel_name};
+use crate::session::{Batch, Hand, Happening, state_name, vessel_name};
 use link::build::Build;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
@@ -19,7 +19,6 @@ pub struct Condenser {
     last_tick: u64,
     last_motor_n: f64,
     last_torque_mnm: f64,
-    skipped_samples: u64,
     jumps: u64,
 }
 
@@ -46,13 +45,12 @@ impl Condenser {
             ranges.depth.take(fine(pose.depth.0.to_num()));
             self.last_tick = self.last_tick.max(pose.tick);
         }
-        self.skipped_samples += batch.skipped_samples;
         let frame = messages::Frame {
             pose: batch.poses.last().map(|pose| self.pose(pose)),
             trace: self.finished(),
             events,
-            link: messages::Link { status: batch.link, skipped_samples: self.skipped_samples },
-            hand: messages::Hand::default(),
+            link: batch.link,
+            hand: Hand::default(),
             timing: batch.timing.map(timing),
         };
         (device, frame)

@@ -1,4 +1,4 @@
-//! The messages to those who watch a running device, and the requests of a person. Data only: nothing here waits or sends.
+//! The messages to those who watch a running device. Data only: nothing here waits or sends.
 
 use super::Scene;
 use crate::procedure::task::Task;
@@ -79,6 +79,8 @@ pub struct LinkStatus {
     pub replay: Option<ReplayStatus>,
     /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
     pub compensation: Option<f64>,
+    /// Samples that the one who is told this was too slow for; they are in the recording all the same.
+    pub skipped_samples: u64,
 }
 
 /// The position in a recording that is played.
@@ -130,24 +132,6 @@ pub struct Batch {
     pub timing: Option<Timing>,
     /// The present state of the link.
     pub link: LinkStatus,
-    /// Samples that this subscriber was too slow for.
-    pub skipped_samples: u64,
-}
-
-/// Another patient.
-#[derive(Clone, Debug, PartialEq)]
-pub enum PatientWish {
-    /// One that comes with the program or was saved.
-    Named(String),
-    /// An edited profile, key by key as in a profile's file.
-    Edited(serde_json::Value),
-    /// The same, to be saved under a name.
-    Saved {
-        /// Name of the file without folder and ending.
-        name: String,
-        /// Key by key as in a profile's file.
-        profile: serde_json::Value,
-    },
 }
 
 /// The ultrasound probe on the skin and what its image shows of the needle.
@@ -184,55 +168,4 @@ pub struct TaskDone {
     pub tick: u64,
     /// Its name.
     pub name: String,
-}
-
-/// The requests of a person.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Control {
-    /// Power up; torque fades in, a latched fault is cleared.
-    Start,
-    /// Torque off.
-    Stop,
-    /// The needle is at depth 0 now; only while torque is off.
-    Zero,
-    /// The simulated hand goes to this depth in mm; the force decides how far the needle follows.
-    Drag {
-        /// Depth past the zero in mm.
-        depth_mm: f64,
-    },
-    /// The simulated hand stays where it is.
-    Release,
-    /// The simulated hand follows its procedure again, from the beginning.
-    Script,
-    /// Inclination of the simulated device below the horizontal.
-    Tilt {
-        /// In rad.
-        rad: f64,
-    },
-    /// The needle goes into somebody else from now on; torque is off meanwhile.
-    Patient(PatientWish),
-    /// So much of the device's compensation is in force from now on, torque on or off.
-    Compensate {
-        /// Share of the stored gains, 0 to 1.
-        share: f64,
-    },
-    /// Record from now on, into a new file of this name.
-    Record {
-        /// Name without folder and ending.
-        name: String,
-    },
-    /// The recording ends.
-    EndRecording,
-    /// The ultrasound probe is here now, and its image shows this.
-    Probe(ProbeView),
-    /// A task of the procedure has been done.
-    Task {
-        /// Its name.
-        name: String,
-    },
-    /// A recording goes on from here, or stays here where it is paused.
-    Seek {
-        /// Time into the recording, s.
-        at_s: f64,
-    },
 }

@@ -1,14 +1,16 @@
 //! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what arrives, in batches, and
 //! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
 
+mod control;
 mod messages;
 mod scene;
 #[cfg(test)]
 mod tests;
 
+pub use control::{Control, Hand};
 pub use messages::{
-    Batch, Control, Happening, LinkStatus, PatientAnswer, PatientStatus, PatientWish, ProbeView,
-    RecordingStatus, ReplayStatus, TaskDone,
+    Batch, Happening, LinkStatus, PatientAnswer, PatientStatus, ProbeView, RecordingStatus, ReplayStatus,
+    TaskDone,
 };
 pub(crate) use scene::vessel_name;
 pub use scene::{
@@ -151,12 +153,13 @@ impl Subscription {
     pub fn drain(&mut self) -> Batch {
         let taken = {
             let mut buffer = lock(&self.buffer);
-            let jumps = buffer.jumps;
-            std::mem::replace(&mut *buffer, Buffer { jumps, ..Buffer::default() })
+            let Buffer { jumps, skipped_samples, .. } = *buffer;
+            std::mem::replace(&mut *buffer, Buffer { jumps, skipped_samples, ..Buffer::default() })
         };
         let mut link = lock(&self.hub.state).link.clone();
         // With the samples of the new place, not with the last ones of the old.
         link.replay.iter_mut().for_each(|replay| replay.jumps = taken.jumps);
+        link.skipped_samples = taken.skipped_samples;
         Batch {
             scene: taken.scene,
             patient: taken.patient,
@@ -170,7 +173,6 @@ impl Subscription {
             probe: taken.probe,
             timing: taken.timing,
             link,
-            skipped_samples: taken.skipped_samples,
         }
     }
 }
@@ -269,7 +271,7 @@ impl Publisher {
         });
     }
 
-    /// Whom the needle goes into, and what became of the last wish.
+    /// Whom the needle goes into, and the answer to the last request.
     pub fn patient(&self, patient: &PatientStatus) {
         lock(&self.hub.state).patient = Some(patient.clone());
         self.each(|buffer| buffer.patient = Some(patient.clone()));

@@ -36,7 +36,7 @@ pub struct Scene {
     pub beside: Vec<SceneBeside>,
     /// The needle, the same for every picture.
     pub needle: SceneNeedle,
-    /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Script`] have an effect: only with the virtual device.
+    /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Demo`] have an effect: only with the virtual device.
     pub hand: bool,
 }
 

@@ -33,7 +33,7 @@ fn a_slow_looker_loses_the_oldest_and_is_told_how_many() {
     }
     assert_eq!(seen, 32_000);
     let late = slow.drain();
-    assert_eq!((late.samples.len(), late.skipped_samples), (20_000, 12_000));
+    assert_eq!((late.samples.len(), late.link.skipped_samples), (20_000, 12_000));
     assert_eq!(late.samples.first().map(|s| s.0), Some(12_000));
     assert_eq!(slow.drain().samples.len(), 0);
 }

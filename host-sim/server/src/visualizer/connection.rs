@@ -5,8 +5,8 @@ use super::shared::Shared;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use control_core::TICK_HZ;
 use device_sim::page::condense::Condenser;
-use device_sim::page::messages::{FromPage, Hand, ToPage};
-use device_sim::session::TaskDone;
+use device_sim::page::messages::ToPage;
+use device_sim::session::{Control, Hand, TaskDone};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
 use std::sync::atomic::Ordering;
@@ -84,20 +84,20 @@ async fn send(sink: &mut SplitSink<WebSocket, Message>, message: &ToPage) -> boo
 async fn obey(mut stream: SplitStream<WebSocket>, shared: &Shared) -> Option<String> {
     while let Some(Ok(message)) = stream.next().await {
         let Message::Text(text) = message else { continue };
-        match FromPage::parse(&text) {
-            Ok(message) => carry_out(message, shared),
+        match Control::parse(&text) {
+            Ok(control) => carry_out(control, shared),
             Err(why) => return Some(why),
         }
     }
     None
 }
 
-fn carry_out(message: FromPage, shared: &Shared) {
-    if let Some(hand) = message.hand() {
+fn carry_out(control: Control, shared: &Shared) {
+    if let Some(hand) = control.hand() {
         let is_person = hand == Hand::Person && shared.session.scene().hand;
         shared.person.store(is_person, Ordering::Relaxed);
     }
-    shared.session.control(message.into());
+    shared.session.control(control);
 }
 
 fn shortened(mut why: String) -> Utf8Bytes {
