@@ -2,7 +2,7 @@
 //! in a browser has to equal. `device_digest PROFILE TICKS`.
 
 use device_sim::device::virtual_device::VirtualDevice;
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use link::codec::MAX_FRAME;
@@ -22,7 +22,7 @@ fn main() {
     while device.ticks() < ticks {
         let now = Duration::from_micros(device.ticks() * 100);
         if driver.is_ready(now) && !driver.has_started() && !driver.is_starting() {
-            driver.request(Request::Start);
+            driver.start();
         }
         device.receive(driver.transmit(now));
         for _ in 0..10 {

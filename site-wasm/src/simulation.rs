@@ -1,7 +1,7 @@
 //! The virtual device, the PC's side of its link and what the page is told, in one thread and without a clock.
 
 use device_sim::device::virtual_device::VirtualDevice;
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::failure::Failure;
 use device_sim::lockstep;
 use device_sim::page::condense::Condenser;
@@ -61,7 +61,7 @@ impl Simulation {
             }
             let may_start = self.driver.is_ready(now) && !self.person_starts;
             if may_start && !self.driver.has_started() && !self.driver.is_starting() {
-                self.driver.request(Request::Start);
+                self.driver.start();
             }
             self.device.receive(self.driver.transmit(now));
             for _ in 0..lockstep::TICKS {
@@ -81,13 +81,13 @@ impl Simulation {
 
     fn control(&mut self, control: Control) {
         match control {
-            Control::Start => self.driver.request(Request::Start),
+            Control::Start => self.driver.start(),
             Control::Stop => {
                 // Stopped once, only a person starts it again.
                 self.person_starts = true;
-                self.driver.request(Request::Stop);
+                self.driver.stop();
             }
-            Control::Zero => self.driver.request(Request::Zero),
+            Control::Zero => self.driver.zero(),
             other => self.device.control(other),
         }
     }

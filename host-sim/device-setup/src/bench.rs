@@ -5,7 +5,7 @@ use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient, TICK_HZ};
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::failure::Failure;
 use link::commissioning::Record;
 use link::crash::Crash;
@@ -92,25 +92,26 @@ impl<'a> Bench<'a> {
     pub async fn record(&mut self) -> Result<Record, Failure> {
         const SILENT: &str = "the device did not report its configuration; restart it";
         self.record = None;
-        self.driver.request(Request::ReportDevice);
+        self.driver.report_device();
         self.until(SILENT, |bench| bench.record.is_some()).await?;
         self.record.ok_or_else(|| Failure::failed(SILENT))
     }
 
     /// Gives the device its part and sees that it has taken and kept it.
     pub async fn configure(&mut self, device: &Device) -> Result<(), Failure> {
-        self.ask(Request::Device(Box::new(*device)), device).await.map(drop)
+        self.driver.configure_device(*device);
+        self.becomes(device).await.map(drop)
     }
 
     /// Has the device, which `device` is what was found of, take itself for commissioned: it looks at what its own pulses have
     /// shown. Its record.
     pub async fn commission(&mut self, device: &Device) -> Result<Record, Failure> {
-        self.ask(Request::Commission, &Device { commissioned: true, ..*device }).await
+        self.driver.commission();
+        self.becomes(&Device { commissioned: true, ..*device }).await
     }
 
-    /// Asks for something that makes the device `wanted`, and sees that it is and stays so.
-    async fn ask(&mut self, request: Request, wanted: &Device) -> Result<Record, Failure> {
-        self.driver.request(request);
+    /// Checks that what was asked for makes the device `wanted`, and that it stays so.
+    async fn becomes(&mut self, wanted: &Device) -> Result<Record, Failure> {
         let record = self.record().await?;
         if record.device != *wanted {
             return Err(Failure::failed("the device did not accept its new configuration; restart it"));
@@ -124,7 +125,7 @@ impl<'a> Bench<'a> {
 
     /// Tells the device where the rotor's angle is zero, in counts past the zero.
     pub async fn index(&mut self, count: i32) -> Result<(), Failure> {
-        self.driver.request(Request::Index(count));
+        self.driver.index(count);
         let until = self.now + Duration::from_millis(100);
         self.until("the device did not accept the rotor's angle; restart it", |bench| bench.now >= until)
             .await
@@ -160,7 +161,7 @@ impl<'a> Bench<'a> {
     ) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
         self.samples.clear();
         self.fault = None;
-        self.driver.request(Request::Excite(excitation.clone()));
+        self.driver.excite(excitation.clone());
         let is_played = |sample: &Sample| sample.state == State::Excitation as u8;
         self.until("the device did not begin to move; restart it", |bench| {
             bench.fault.is_some() || bench.samples.iter().any(is_played)

@@ -22,33 +22,6 @@ const DOUBT: Duration = Duration::from_millis(50);
 /// A device that sends no samples for this long has started anew or is gone: hello again.
 pub const SILENCE: Duration = Duration::from_secs(1);
 
-/// The requests that a person may make of any device.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Power up.
-    Start,
-    /// Torque off.
-    Stop,
-    /// The needle is at depth 0 now.
-    Zero,
-    /// Play an excitation, with no hand on the needle.
-    Excite(Excitation),
-    /// Play several excitations without a rest between them, with no hand on the needle.
-    Sequence(Vec<Excitation>),
-    /// Another patient; torque goes off for it.
-    Patient(Box<Patient>),
-    /// Another device's part.
-    Device(Box<Device>),
-    /// Mark the device's configuration as found by commissioning.
-    Commission,
-    /// Report the device's part in force.
-    ReportDevice,
-    /// Other gains of the compensation.
-    Compensate(Gains),
-    /// The counts past the zero at which the rotor's angle is zero.
-    Index(i32),
-}
-
 /// The PC's side of a conversation.
 pub struct Driver {
     patient: Patient,
@@ -127,52 +100,81 @@ impl Driver {
         self.pending = None;
     }
 
-    /// Asks for something, once the device is ready. A stop overtakes everything.
-    pub fn request(&mut self, request: Request) {
-        match request {
-            Request::Stop => {
-                self.waiting.retain(|c| {
-                    matches!(
-                        c,
-                        Command::Hello { .. }
-                            | Command::ConfigureDevice(_)
-                            | Command::RestoreDevice(_)
-                            | Command::ConfigurePatient(_)
-                            | Command::Stop
-                    )
-                });
-                self.waiting.push_front(Command::Stop);
-                if self.pending.as_ref().is_some_and(|pending| {
-                    pending.gives_torque()
-                        || matches!(pending.command, Command::Zero | Command::Segment { .. })
-                }) {
-                    self.pending = None;
-                }
-            }
-            Request::Start => self.waiting.push_back(Command::Start),
-            Request::Zero => self.waiting.push_back(Command::Zero),
-            Request::Excite(excitation) => self.waiting.push_back(Command::Excite(excitation)),
-            Request::Sequence(segments) => self.sequence(segments),
-            Request::Patient(patient) => self.waiting.push_back(Command::ConfigurePatient(*patient)),
-            Request::Device(device) => self.waiting.push_back(Command::ConfigureDevice(*device)),
-            Request::Commission => self.waiting.push_back(Command::Commission),
-            Request::ReportDevice => self.waiting.push_back(Command::ReportDevice),
-            Request::Compensate(gains) => {
-                // A slider that is dragged asks faster than a device answers: only its last place counts.
-                self.waiting.retain(|command| !matches!(command, Command::Compensate(_)));
-                self.waiting.push_back(Command::Compensate(gains));
-            }
-            Request::Index(count) => self.waiting.push_back(Command::Index(Some(count))),
+    /// Powers up, once the device is ready; a latched fault is cleared.
+    pub fn start(&mut self) {
+        self.waiting.push_back(Command::Start);
+    }
+
+    /// Takes the torque off. It overtakes everything but the configuration, and what it overtakes is forgotten.
+    pub fn stop(&mut self) {
+        self.waiting.retain(|c| {
+            matches!(
+                c,
+                Command::Hello { .. }
+                    | Command::ConfigureDevice(_)
+                    | Command::RestoreDevice(_)
+                    | Command::ConfigurePatient(_)
+                    | Command::Stop
+            )
+        });
+        self.waiting.push_front(Command::Stop);
+        if self.pending.as_ref().is_some_and(|pending| {
+            pending.gives_torque() || matches!(pending.command, Command::Zero | Command::Segment { .. })
+        }) {
+            self.pending = None;
         }
     }
 
-    /// Uploads segments one by one and has them played; the device checks that it has all of them.
-    fn sequence(&mut self, segments: Vec<Excitation>) {
+    /// Sets depth 0 to where the needle is when the device carries this out.
+    pub fn zero(&mut self) {
+        self.waiting.push_back(Command::Zero);
+    }
+
+    /// Plays an excitation, with no hand on the needle.
+    pub fn excite(&mut self, excitation: Excitation) {
+        self.waiting.push_back(Command::Excite(excitation));
+    }
+
+    /// Plays excitations without a rest between them, with no hand on the needle: uploads them one by one, and the device checks
+    /// that it has all of them.
+    pub fn play(&mut self, segments: Vec<Excitation>) {
         let play = Command::Play { count: segments.len() as u8, checksum: codec::hash(&segments.as_slice()) };
         for (index, excitation) in (0_u8..).zip(segments) {
             self.waiting.push_back(Command::Segment { index, excitation });
         }
         self.waiting.push_back(play);
+    }
+
+    /// Gives the device another patient; torque goes off for it. [`Self::take_change`] returns the answer.
+    pub fn configure_patient(&mut self, patient: Patient) {
+        self.waiting.push_back(Command::ConfigurePatient(patient));
+    }
+
+    /// Gives the device another device's part.
+    pub fn configure_device(&mut self, device: Device) {
+        self.waiting.push_back(Command::ConfigureDevice(device));
+    }
+
+    /// Marks the device's configuration as found by commissioning.
+    pub fn commission(&mut self) {
+        self.waiting.push_back(Command::Commission);
+    }
+
+    /// Has the device report its part of the configuration in force.
+    pub fn report_device(&mut self) {
+        self.waiting.push_back(Command::ReportDevice);
+    }
+
+    /// Sets the gains of the compensation.
+    pub fn compensate(&mut self, gains: Gains) {
+        // A slider that is dragged asks faster than a device answers: only its last place counts.
+        self.waiting.retain(|command| !matches!(command, Command::Compensate(_)));
+        self.waiting.push_back(Command::Compensate(gains));
+    }
+
+    /// Sets the counts past the zero at which the rotor's angle is zero.
+    pub fn index(&mut self, count: i32) {
+        self.waiting.push_back(Command::Index(Some(count)));
     }
 
     /// Takes bytes; gives every whole frame to `see`.
@@ -245,7 +247,7 @@ impl Driver {
         self.refused.as_deref()
     }
 
-    /// Returns once the answer to the request for another patient: taken, or refused for a reason.
+    /// Returns once the answer to [`Self::configure_patient`]: taken, or refused for a reason.
     pub fn take_change(&mut self) -> Option<Result<(), String>> {
         self.changed.take()
     }

@@ -7,7 +7,7 @@ use crate::realtime_clock::RealtimeClock;
 use control_core::Patient;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::device::{Port, Wire};
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::failure::Failure;
 use device_sim::lockstep;
 use device_sim::session::{Control, PatientAnswer, Subscription};
@@ -133,7 +133,7 @@ impl<'a> RunLoop<'a> {
                 });
                 // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
                 if !self.person_starts {
-                    self.driver.request(Request::Start);
+                    self.driver.start();
                 }
             }
             if device.ticks().is_multiple_of(1_000) {
@@ -219,7 +219,7 @@ impl<'a> RunLoop<'a> {
 
     /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms later.
     fn leave(&mut self, wire: &mut dyn Wire, begin: Instant) {
-        self.driver.request(Request::Stop);
+        self.driver.stop();
         for _ in 0..3 {
             if wire.write(self.driver.transmit(begin.elapsed())).is_err() {
                 return;
@@ -237,13 +237,13 @@ impl<'a> RunLoop<'a> {
         }
         self.was_ready = true;
         if !std::mem::replace(&mut self.has_asked, true) {
-            self.driver.request(Request::ReportDevice);
+            self.driver.report_device();
         }
         if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
             if std::mem::take(&mut self.zeroes_first) {
-                self.driver.request(Request::Zero);
+                self.driver.zero();
             }
-            self.driver.request(Request::Start);
+            self.driver.start();
         }
     }
 
@@ -271,12 +271,12 @@ impl<'a> RunLoop<'a> {
             Control::EndRecording => self.outlets.end_recording(&self.driver),
             Control::Probe(view) => self.outlets.probe(view),
             Control::Task { name } => self.task(name),
-            Control::Start => self.driver.request(Request::Start),
+            Control::Start => self.driver.start(),
             Control::Stop => {
                 self.person_starts = true;
-                self.driver.request(Request::Stop);
+                self.driver.stop();
             }
-            Control::Zero => self.driver.request(Request::Zero),
+            Control::Zero => self.driver.zero(),
             Control::Choose { patient } => self.ask_patient(|patients| patients.choose(&patient)),
             Control::Edit { profile } => self.ask_patient(|patients| patients.edit(&profile)),
             Control::SavePatient { name, profile } => {
@@ -284,7 +284,7 @@ impl<'a> RunLoop<'a> {
             }
             Control::Compensate { share } => {
                 if let Some(gains) = self.outlets.gains.at(share) {
-                    self.driver.request(Request::Compensate(gains));
+                    self.driver.compensate(gains);
                 }
             }
             other => hand(other),
@@ -303,7 +303,7 @@ impl<'a> RunLoop<'a> {
     fn ask_patient(&mut self, ask: impl FnOnce(&mut PatientManager) -> Result<Patient, Failure>) {
         let Some(patients) = &mut self.patients else { return };
         match ask(patients) {
-            Ok(patient) => self.driver.request(Request::Patient(Box::new(patient))),
+            Ok(patient) => self.driver.configure_patient(patient),
             Err(why) => {
                 let answer = PatientAnswer { reason: why.to_string(), ..PatientAnswer::default() };
                 self.outlets.publisher.patient(&patients.status(Some(answer)));

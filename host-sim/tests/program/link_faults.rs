@@ -1,7 +1,7 @@
 //! The torque when the link fails: silence, a pulled cable, lost and damaged bytes, a PC that comes back.
 
 use device_sim::device::virtual_device::VirtualDevice;
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use link::codec::MAX_FRAME;
@@ -59,7 +59,7 @@ impl Bench {
     fn start(&mut self) {
         self.run(100, |_| {});
         assert!(self.driver.is_ready(self.now()));
-        self.driver.request(Request::Start);
+        self.driver.start();
         self.run(100, |_| {});
         assert!(self.device.is_enabled());
     }
@@ -76,11 +76,11 @@ fn a_device_stays_off_until_started_and_on_with_heartbeats() {
     let mut bench = Bench::new();
     bench.run(1_000, |_| {});
     assert!(bench.driver.is_ready(bench.now()) && !bench.device.is_enabled());
-    bench.driver.request(Request::Start);
+    bench.driver.start();
     bench.run(5_000, |_| {});
     assert!(bench.device.is_enabled());
     assert_eq!(bench.faults(), 0);
-    bench.driver.request(Request::Stop);
+    bench.driver.stop();
     bench.run(10, |_| {});
     assert!(!bench.device.is_enabled());
 }
@@ -108,7 +108,7 @@ fn torque_ends_with_the_pc_and_does_not_return_with_it() {
     bench.run(2_000, |_| {});
     assert!(bench.driver.is_ready(bench.now()));
     assert!(!bench.device.is_enabled(), "no set point of an earlier connection");
-    bench.driver.request(Request::Start);
+    bench.driver.start();
     bench.run(100, |_| {});
     assert!(bench.device.is_enabled());
 }
@@ -159,7 +159,7 @@ fn commands_get_through_a_bad_cable_and_every_loss_is_counted() {
         }
     };
     bench.run(3_000, &mut spoil);
-    bench.driver.request(Request::Start);
+    bench.driver.start();
     bench.run(1_000, &mut spoil);
     assert!(bench.device.is_enabled(), "the start got through");
     bench.run(20, |_| {});

@@ -8,7 +8,7 @@ use super::written::Track;
 use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::{Config, TICK_HZ};
-use device_sim::driver::{Driver, Request};
+use device_sim::driver::Driver;
 use device_sim::failure::Failure;
 use link::frames::{DeviceFrame, EventKind, SampleBlock};
 use recording::messages::Hello;
@@ -118,7 +118,7 @@ impl<'a> Sequencer<'a> {
 
     /// Torque off now; what to send for it.
     pub fn stop(&mut self, now: Duration) -> &[u8] {
-        self.driver.request(Request::Stop);
+        self.driver.stop();
         self.driver.transmit(now)
     }
 
@@ -163,10 +163,10 @@ impl<'a> Sequencer<'a> {
     fn ask(&mut self, index: usize, begins: &mut impl FnMut(&Step)) {
         let part = self.parts[index];
         part.iter().for_each(begins);
-        self.driver.request(match part {
-            [step] => Request::Excite(step.excitation.clone()),
-            _ => Request::Sequence(part.iter().map(|step| step.excitation.clone()).collect()),
-        });
+        match part {
+            [step] => self.driver.excite(step.excitation.clone()),
+            _ => self.driver.play(part.iter().map(|step| step.excitation.clone()).collect()),
+        }
         self.phase = Phase::Asked { index, since: self.now };
     }
 
