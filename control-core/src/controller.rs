@@ -20,7 +20,7 @@ use crate::stillness::Stillness;
 use crate::thermal::Winding;
 use crate::units::{Counts, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians};
 use core::borrow::BorrowMut;
-pub use exchange::{Order, Sample, TickInput, TickOutput};
+pub use exchange::{AnyOrder, LargeOrder, Order, Sample, TickInput, TickOutput};
 use fixed::types::I16F16;
 pub use whole::Controller;
 
@@ -118,20 +118,6 @@ impl Core {
                 self.insertion.begin();
                 self.power_up(Mode::Running, true);
             }
-            Order::Excite(ref excitation)
-                if !self.mode.is_powered() && (self.plan.device().commissioned || excitation.is_gentle()) =>
-            {
-                let depth = self.plan.scale.depth(self.latest_count());
-                self.player.begin_one(segments, excitation, depth);
-                self.play(excitation.compensated);
-            }
-            Order::Play(ref sequence)
-                if !self.mode.is_powered() && self.plan.device().commissioned && !sequence.is_empty() =>
-            {
-                let depth = self.plan.scale.depth(self.latest_count());
-                self.player.begin(segments, sequence, depth);
-                self.play(sequence.is_compensated());
-            }
             Order::Stop if self.mode.is_powered() => {
                 self.mode = Mode::Idle;
                 segments.forget();
@@ -142,25 +128,38 @@ impl Core {
                 self.speed = SpeedEstimator::new(self.plan.config.device.speed, Counts(0));
             }
             Order::Heartbeat => self.heartbeat(),
-            Order::Configure(plan) if !self.mode.is_powered() => {
+            Order::Trip(fault) => self.trip(fault),
+            Order::Compensate(gains) => self.feedforward.set_gains(gains),
+            Order::Start | Order::Stop | Order::Zero => {}
+        }
+    }
+
+    fn large_order(&mut self, segments: &mut Segments, order: LargeOrder) {
+        if self.mode.is_powered() {
+            return;
+        }
+        let depth = self.plan.scale.depth(self.latest_count());
+        let is_commissioned = self.plan.device().commissioned;
+        match order {
+            LargeOrder::Configure(plan) => {
                 self.speed = SpeedEstimator::new(plan.config.device.speed, self.latest_count());
                 self.feedforward.configure(self.plan.device(), plan.device());
                 self.plan = plan;
                 self.withdraw();
                 self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque);
             }
-            Order::Trip(fault) => self.trip(fault),
-            Order::Compensate(gains) => self.feedforward.set_gains(gains),
-            Order::Index(index) if !self.mode.is_powered() => {
+            LargeOrder::Excite(ref excitation) if is_commissioned || excitation.is_gentle() => {
+                self.player.begin_one(segments, excitation, depth);
+                self.play(excitation.compensated);
+            }
+            LargeOrder::Play(ref sequence) if is_commissioned && !sequence.is_empty() => {
+                self.player.begin(segments, sequence, depth);
+                self.play(sequence.is_compensated());
+            }
+            LargeOrder::Index(index) => {
                 self.feedforward.set_index(index.map(|count| self.origin.0.wrapping_add(count.0)));
             }
-            Order::Start
-            | Order::Stop
-            | Order::Zero
-            | Order::Configure(_)
-            | Order::Excite(_)
-            | Order::Play(_)
-            | Order::Index(_) => {}
+            LargeOrder::Excite(_) | LargeOrder::Play(_) => {}
         }
     }
 

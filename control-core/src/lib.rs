@@ -45,7 +45,7 @@ pub mod units;
 mod wall;
 
 pub use config::{Config, Device, Patient};
-pub use controller::{Controller, Order, TickInput, TickOutput};
+pub use controller::{AnyOrder, Controller, LargeOrder, Order, TickInput, TickOutput};
 pub use plan::{Plan, Refusal};
 pub use stability::stiffest;
 

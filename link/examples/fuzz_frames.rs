@@ -5,7 +5,7 @@ use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;
 use control_core::excitation::{Excitation, MAX_SEGMENTS, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use control_core::{Controller, Order, TickInput};
+use control_core::{AnyOrder, Controller, LargeOrder, TickInput};
 use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
@@ -210,7 +210,7 @@ fn run(
     let mut out = [0; MAX_FRAME];
     for _ in 0..random.u8(0..40) {
         while let Some(order) = device.next_order() {
-            if matches!(order, Order::Play(_)) {
+            if matches!(order, AnyOrder::Large(LargeOrder::Play(_))) {
                 assert!(device.in_session(), "a sequence outlived its session");
                 ticks.sequences += 1;
             }

@@ -17,7 +17,7 @@ use control_core::ceilings::Ceilings;
 use control_core::config::Tissue;
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
-use control_core::{Order, Plan, TICK_HZ, TickOutput};
+use control_core::{AnyOrder, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use heapless::HistoryBuf;
 pub use upload::LATE_TICKS;
@@ -133,7 +133,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     /// The next order for the control law.
-    pub fn next_order(&mut self) -> Option<Order> {
+    pub fn next_order(&mut self) -> Option<AnyOrder> {
         self.waiting.borrow_mut().orders.pop_front()
     }
 
@@ -284,8 +284,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
-    fn order(&mut self, order: Order) -> Result<(), Rejection> {
-        self.waiting.borrow_mut().orders.push_back(order).map_err(|_| Rejection::Full)
+    fn order(&mut self, order: impl Into<AnyOrder>) -> Result<(), Rejection> {
+        self.waiting.borrow_mut().orders.push_back(order.into()).map_err(|_| Rejection::Full)
     }
 
     fn note_events(&mut self, tick: u64, output: &TickOutput) {

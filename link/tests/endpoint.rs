@@ -6,7 +6,7 @@ use control_core::event::Limits;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::interlock::Interlock;
 use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
-use control_core::{Controller, Order, Patient, Plan, Refusal, TickInput};
+use control_core::{AnyOrder, Controller, Order, Patient, Plan, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
 use link::codec::{self, MAX_FRAME, TooLong};
 use link::commissioning::Record;
@@ -170,8 +170,8 @@ fn a_session_lasts_from_the_hello_until_the_pc_is_gone() {
     device.say(Command::Hello { version: PROTOCOL_VERSION });
     assert!(matches!(device.heard().first(), Some(DeviceFrame::Hello(_))), "the first command is whole");
     assert_eq!(device.timing().garbage_frames, 0);
-    let orders: Vec<Order> = std::iter::from_fn(|| device.endpoint.next_order()).collect();
-    assert!(orders.iter().all(|order| matches!(order, Order::Heartbeat)), "{orders:?}");
+    let orders: Vec<AnyOrder> = std::iter::from_fn(|| device.endpoint.next_order()).collect();
+    assert!(orders.iter().all(|order| matches!(order, AnyOrder::Small(Order::Heartbeat))), "{orders:?}");
 }
 
 #[test]

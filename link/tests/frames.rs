@@ -3,7 +3,7 @@
 use control_core::config::{Config, MAX_LAYERS};
 use control_core::controller::Sample;
 use control_core::event::Fault;
-use control_core::{Controller, Device, Order, Patient, TickInput};
+use control_core::{AnyOrder, Controller, Device, Order, Patient, TickInput};
 use link::codec::{self, Decoder, Garbage, MAX_FRAME};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
@@ -236,8 +236,9 @@ fn a_repeated_command_is_answered_again_and_carried_out_once() {
     }
     let acks = bench.drain().iter().filter(|f| matches!(f, DeviceFrame::Ack(_))).count();
     assert_eq!(acks, 3);
-    let orders =
-        std::iter::from_fn(|| bench.device.next_order()).filter(|o| matches!(o, Order::Start)).count();
+    let orders = std::iter::from_fn(|| bench.device.next_order())
+        .filter(|o| matches!(o, AnyOrder::Small(Order::Start)))
+        .count();
     assert_eq!(orders, 1);
 }
 

@@ -1,7 +1,7 @@
 //! The board and the control core beside each other, tick for tick: what the pins show against what the core computes from the same
 //! counts and angles.
 
-use control_core::controller::{Order, Sample, TickInput, TickOutput};
+use control_core::controller::{LargeOrder, Order, Sample, TickInput, TickOutput};
 use control_core::units::{Counts, Milliradians};
 use control_core::{Config, Controller, Plan};
 use link::Command;
@@ -59,7 +59,7 @@ impl Replay<'_> {
     /// One tick of a controller that takes the patient in tick `taken`.
     fn tick(&self, controller: &mut Controller, taken: Option<u64>, tick: u64, count: u32) -> TickOutput {
         if Some(tick) == taken {
-            controller.order(Order::Configure(self.plan.clone()));
+            controller.order(LargeOrder::Configure(self.plan.clone()));
         }
         if tick == self.started {
             controller.order(Order::Start);

@@ -59,9 +59,8 @@ pub struct Sample {
     pub tilt_mrad: i16,
 }
 
-/// An order of a person or the supervisor to the control law, between ticks.
-#[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
+/// An order of a person or the supervisor to the control law, between ticks, in a few bytes.
+#[derive(Clone, Copy, Debug)]
 pub enum Order {
     /// Power up and fade in; clears a latched fault. Only on a device that has been commissioned.
     Start,
@@ -71,19 +70,49 @@ pub enum Order {
     Zero,
     /// The PC is alive.
     Heartbeat,
-    /// Another plan; only while torque is off.
-    Configure(Plan),
     /// Something outside the tick went wrong: torque off, latched.
     Trip(Fault),
-    /// Play an excitation from where the motor is; only while torque is off, and on a device that has not been
-    /// commissioned only where [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
-    Excite(Excitation),
-    /// Play the segments of a sequence one after the other, without a rest between them; only while torque is off, and on a device that
-    /// has been commissioned.
-    Play(Prepared),
-    /// The gains of the compensation from now on, until the next [`Order::Configure`]; they have passed
+    /// The gains of the compensation from now on, until the next [`LargeOrder::Configure`]; they have passed
     /// [`crate::compensation::check::check`].
     Compensate(Gains),
+}
+
+/// An order that takes more memory. Each is rare, and only for a device whose torque is off.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and a plan is rare")]
+pub enum LargeOrder {
+    /// Another plan.
+    Configure(Plan),
+    /// Play an excitation from where the motor is; on a device that has not been commissioned only where
+    /// [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
+    Excite(Excitation),
+    /// Play the segments of a sequence one after the other, without a rest between them; only on a device that has been
+    /// commissioned.
+    Play(Prepared),
     /// The rotor's angle, from which waves are counted, is zero at this many counts past the zero; `None`: it is not known.
     Index(Option<Counts>),
+}
+
+/// An order of either size, as it waits for the tick.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nothing allocates here, and few wait")]
+pub enum AnyOrder {
+    /// One of a few bytes.
+    Small(Order),
+    /// One that takes more memory.
+    Large(LargeOrder),
+}
+
+impl From<Order> for AnyOrder {
+    #[inline]
+    fn from(order: Order) -> Self {
+        Self::Small(order)
+    }
+}
+
+impl From<LargeOrder> for AnyOrder {
+    #[inline]
+    fn from(order: LargeOrder) -> Self {
+        Self::Large(order)
+    }
 }

@@ -1,6 +1,6 @@
 //! The control law as a whole: its core, and the segments that play while it excites.
 
-use super::{Core, Order, TickInput, TickOutput};
+use super::{AnyOrder, Core, TickInput, TickOutput};
 use crate::excitation::Segments;
 use crate::plan::Plan;
 use crate::units::Millimetres;
@@ -43,11 +43,15 @@ impl<S: BorrowMut<Segments>> Controller<S> {
     }
 
     /// Takes an order. What does not fit the mode is ignored: the link has refused it before.
-    pub fn order(&mut self, order: Order) {
-        self.core.order(self.segments.borrow_mut(), order);
+    #[inline]
+    pub fn order(&mut self, order: impl Into<AnyOrder>) {
+        match order.into() {
+            AnyOrder::Small(order) => self.core.order(self.segments.borrow_mut(), order),
+            AnyOrder::Large(order) => self.core.large_order(self.segments.borrow_mut(), order),
+        }
     }
 
-    /// [`Order::Heartbeat`], the one that comes while the needle moves.
+    /// [`super::Order::Heartbeat`], the one that comes while the needle moves.
     pub fn heartbeat(&mut self) {
         self.core.heartbeat();
     }

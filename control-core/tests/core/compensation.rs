@@ -9,7 +9,7 @@ use control_core::plan::Field;
 use control_core::units::{
     Counts, Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Stiffness,
 };
-use control_core::{Controller, Order, Patient, Plan, Refusal, TickInput};
+use control_core::{Controller, LargeOrder, Order, Patient, Plan, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -204,7 +204,7 @@ proptest! {
     ) {
         let plan = Plan::new(&device, &Patient::nobody()).expect("filtered");
         let mut controller = Controller::new(plan);
-        controller.order(Order::Index(Some(Counts(index))));
+        controller.order(LargeOrder::Index(Some(Counts(index))));
         controller.order(Order::Start);
         let mut twin = Twin::new(&device, index);
         let (mut at, mut speed, mut number) = (0.0_f64, 0.0_f64, 0);
@@ -241,8 +241,8 @@ proptest! {
         for (count, shift, order, tilt) in steps {
             match order {
                 0 => controller.order(Order::Zero),
-                1 => controller.order(Order::Configure(plan.clone())),
-                2 => controller.order(Order::Index(Some(Counts(count)))),
+                1 => controller.order(LargeOrder::Configure(plan.clone())),
+                2 => controller.order(LargeOrder::Index(Some(Counts(count)))),
                 3 => controller.order(Order::Compensate(gains(0.7))),
                 4..=6 => controller.order(Order::Start),
                 _ => controller.order(Order::Heartbeat),
@@ -256,7 +256,7 @@ proptest! {
 #[test]
 fn a_device_on_which_nothing_was_found_feeds_nothing_forward() {
     let mut controller = running(Compensation { gains: gains(0.9), ..Compensation::NONE });
-    controller.order(Order::Index(Some(Counts(0))));
+    controller.order(LargeOrder::Index(Some(Counts(0))));
     assert!((0..10_000).all(|step| tick(&mut controller, step / 8, 800).dac.0 == 2_048));
 }
 
@@ -273,10 +273,10 @@ fn weight_needs_no_angle_and_waves_wait_for_it() {
     wave.angle[0] = Wave { order: 3, amplitude: q(1.0), phase: 16_384 };
     let mut controller = running(wave);
     assert_eq!(code_after(&mut controller, 4_000, 0, 0), 0, "the rotor's angle is not known");
-    controller.order(Order::Index(Some(Counts(0))));
+    controller.order(LargeOrder::Index(Some(Counts(0))));
     assert_eq!(code_after(&mut controller, 4_000, 0, 0), 0, "nor taken while torque is on");
     controller.order(Order::Stop);
-    controller.order(Order::Index(Some(Counts(0))));
+    controller.order(LargeOrder::Index(Some(Counts(0))));
     controller.order(Order::Start);
     let here = code_after(&mut controller, 4_000, 0, 0);
     assert!((f64::from(here) + codes(204.0 / 256.0)).abs() < 1.0, "{here}");
@@ -288,7 +288,7 @@ fn weight_needs_no_angle_and_waves_wait_for_it() {
     // Another wave is another rotor.
     wave.angle[0].order = 4;
     controller.order(Order::Stop);
-    controller.order(Order::Configure(plan(wave).expect("it may run")));
+    controller.order(LargeOrder::Configure(plan(wave).expect("it may run")));
     controller.order(Order::Start);
     assert_eq!(code_after(&mut controller, 4_000, 0, 0), 0);
 }
@@ -330,7 +330,7 @@ fn an_excitation_plays_without_compensation_unless_asked() {
         let travel = Millimetres(q(10.0));
         let excitation = Excitation { signal: Signal::Hold, duration_ms: 1_000, servo, travel, compensated };
         let mut controller = Controller::new(plan(weight).expect("it may run"));
-        controller.order(Order::Excite(excitation));
+        controller.order(LargeOrder::Excite(excitation));
         assert_eq!(code_after(&mut controller, 9_000, 0, 1_571) != 0, compensated);
     }
 }

@@ -6,7 +6,7 @@ use control_core::plan::Field;
 use control_core::units::{
     Counts, Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Stiffness,
 };
-use control_core::{Config, Controller, Order, Refusal, TickInput};
+use control_core::{Config, Controller, LargeOrder, Order, Refusal, TickInput};
 use fixed::types::{I8F24, I16F16};
 
 /// A needle straight into the skin: lengths along it are depths.
@@ -195,7 +195,7 @@ fn the_servo_has_its_stiffness_and_damping() {
     for _ in 0..200 {
         c.tick(TickInput { count: Counts(300), tilt: STRAIGHT });
     }
-    c.order(Order::Excite(excitation));
+    c.order(LargeOrder::Excite(excitation));
     // Held where it began until torque has faded in, then moved on at a count every four ticks.
     let mut window = std::collections::VecDeque::from([300; 128]);
     for tick in 0..9_000 {
@@ -224,7 +224,7 @@ fn trips_at(signal: Signal, speed: f64) -> Option<(usize, Fault)> {
     let servo = Servo { stiffness: Stiffness(q(0.01)), damping: Damping(I8F24::from_num(0)) };
     c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
     let travel = Millimetres(q(900.0));
-    c.order(Order::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
+    c.order(LargeOrder::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
     (0..5_000).find_map(|tick| {
         c.order(Order::Heartbeat);
         let count = (speed * f64::from(tick) / TICKS_PER_S / mm_per_count) as i32;
@@ -266,7 +266,7 @@ fn driven(signal: Signal, sign: f64, late: usize) -> Option<(Fault, f64)> {
     c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
     let servo = Servo { stiffness: Stiffness(q(0.035)), damping: Damping(I8F24::from_num(0.001_26)) };
     let travel = Millimetres(q(500.0));
-    c.order(Order::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
+    c.order(LargeOrder::Excite(Excitation { servo, travel, duration_ms: 2_000, ..played(signal) }));
     let (mut at, mut speed) = (0.0_f64, 0.0_f64);
     let mut asked = std::collections::VecDeque::from(vec![0.0; late]);
     (0..20_000).find_map(|_| {
@@ -323,7 +323,7 @@ fn counts_to_and_fro_are_a_dead_channel_unless_sines_shake() {
     let fault_of = |signal: Signal| {
         let mut c = Controller::new(Config::commissioned_virtual().plan().expect("sound"));
         c.tick(TickInput { count: Counts(0), tilt: STRAIGHT });
-        c.order(Order::Excite(played(signal)));
+        c.order(LargeOrder::Excite(played(signal)));
         (0..5_000).find_map(|tick| {
             c.order(Order::Heartbeat);
             c.tick(TickInput { count: Counts(tick / 10 % 2), tilt: STRAIGHT }).tripped

@@ -5,7 +5,7 @@ use control_core::event::{Fault, State};
 use control_core::units::{
     Counts, FrictionPerMillimetre, JogCompliance, Millimetres, Milliradians, Newtons, Stiffness,
 };
-use control_core::{Config, Controller, Device, Order, Patient, TickInput, TickOutput};
+use control_core::{Config, Controller, Device, LargeOrder, Order, Patient, TickInput, TickOutput};
 use fixed::types::I16F16;
 
 /// A needle straight into the skin: lengths along it are depths.
@@ -325,7 +325,7 @@ fn orders_that_do_not_fit_the_mode_change_nothing() {
     travel(&mut c, &mut at, 2.5, 10.0, |_| {});
     let before = hold(&mut c, at, 0.1);
     c.order(Order::Zero);
-    c.order(Order::Configure(Config::commissioned_virtual().plan().expect("sound")));
+    c.order(LargeOrder::Configure(Config::commissioned_virtual().plan().expect("sound")));
     c.order(Order::Start);
     let after = hold(&mut c, at, 0.000_1);
     assert_eq!((before.sample, before.force), (after.sample, after.force));
@@ -345,7 +345,7 @@ fn an_excitation_stays_within_its_travel_and_ends_torque_off() {
     };
     let mut c = Controller::new(Config::commissioned_virtual().plan().expect("sound"));
     c.tick(TickInput { tilt: STRAIGHT, ..TickInput::default() });
-    c.order(Order::Excite(excitation.clone()));
+    c.order(LargeOrder::Excite(excitation.clone()));
     let outputs = (0..11_000).map(|_| tick_at(&mut c, 0)).collect::<Vec<_>>();
     let zero = c.plan().zero_torque_code().0;
     let (most, least) = outputs.iter().fold((0, u16::MAX), |(a, b), o| (o.dac.0.max(a), o.dac.0.min(b)));
@@ -354,7 +354,7 @@ fn an_excitation_stays_within_its_travel_and_ends_torque_off() {
     assert_eq!(outputs.iter().filter(|o| o.enable).count(), 10_000);
     assert!(outputs[10_000..].iter().all(|o| o.dac.0 == zero && o.sample.state == State::Idle as u8));
 
-    c.order(Order::Excite(excitation));
+    c.order(LargeOrder::Excite(excitation));
     let trips = (0..2_000).filter_map(|t| tick_at(&mut c, t * 2).tripped).collect::<Vec<_>>();
     assert_eq!(trips, [Fault::Travel], "4,000 counts are 63 mm");
 }

@@ -4,7 +4,7 @@ use control_core::config::DacWidth;
 use control_core::event::{Fault, Limits, State};
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
-use control_core::{Config, Controller, Order, Plan, TickInput, TickOutput};
+use control_core::{Config, Controller, LargeOrder, Order, Plan, TickInput, TickOutput};
 use fixed::types::{I8F24, I16F16};
 
 /// A needle straight into the skin: lengths along it are depths.
@@ -64,13 +64,13 @@ fn an_uncommissioned_device_plays_only_gentle_excitations() {
     let mut servo = ramps(50);
     servo.servo.stiffness.0 = I16F16::from_num(0.1);
     for refused in [strong, servo] {
-        c.order(Order::Excite(refused));
+        c.order(LargeOrder::Excite(refused));
         assert!(!tick(&mut c, 0).enable, "no excitation that is not gentle");
     }
-    c.order(Order::Excite(ramps(50)));
+    c.order(LargeOrder::Excite(ramps(50)));
     assert!(tick(&mut c, 0).enable, "1 mN·m without a servo");
     c.order(Order::Stop);
-    c.order(Order::Configure(Config::commissioned_virtual().plan().expect("sound")));
+    c.order(LargeOrder::Configure(Config::commissioned_virtual().plan().expect("sound")));
     c.order(Order::Start);
     assert!(tick(&mut c, 0).enable, "a commissioned one starts");
 }
@@ -115,10 +115,10 @@ fn the_zero_moves_to_the_needle_only_while_torque_is_off() {
 #[test]
 fn a_plan_is_taken_only_while_torque_is_off() {
     let mut c = controller();
-    c.order(Order::Configure(other_plan()));
+    c.order(LargeOrder::Configure(other_plan()));
     assert_eq!(c.plan().config().device.dac, DacWidth::BITS_8);
     let mut c = started_at(0);
-    c.order(Order::Configure(other_plan()));
+    c.order(LargeOrder::Configure(other_plan()));
     assert_eq!(c.plan().config().device.dac, DacWidth::BITS_12);
 }
 
@@ -126,7 +126,7 @@ fn a_plan_is_taken_only_while_torque_is_off() {
 fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
     let mut c = controller();
     tick(&mut c, 400);
-    c.order(Order::Configure(other_plan()));
+    c.order(LargeOrder::Configure(other_plan()));
     let output = tick(&mut c, 400);
     assert_eq!(output.speed.0, I16F16::ZERO, "no jump from zero is taken for speed");
     let met = (0..5).fold(output.transitions.contact, |met, _| met | tick(&mut c, 400).transitions.contact);
@@ -137,7 +137,7 @@ fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
 fn an_excitation_begins_at_the_motor_only_while_torque_is_off() {
     let mut c = controller();
     tick(&mut c, 1_000);
-    c.order(Order::Excite(ramps(2)));
+    c.order(LargeOrder::Excite(ramps(2)));
     let output = tick(&mut c, 1_000);
     assert_eq!(
         (output.tripped, state(&output)),
@@ -146,10 +146,10 @@ fn an_excitation_begins_at_the_motor_only_while_torque_is_off() {
     );
 
     let mut c = started_at(0);
-    c.order(Order::Excite(ramps(2)));
+    c.order(LargeOrder::Excite(ramps(2)));
     assert_eq!(state(&tick(&mut c, -100)), Some(State::Fault), "100 counts in a tick, running");
     let mut c = started_at(-100);
-    c.order(Order::Excite(ramps(2)));
+    c.order(LargeOrder::Excite(ramps(2)));
     assert_eq!(state(&tick(&mut c, -100)), Some(State::Approach), "it runs on");
 }
 

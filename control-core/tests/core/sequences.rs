@@ -8,7 +8,7 @@ use control_core::plan::Field;
 use control_core::units::{
     Counts, Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Stiffness,
 };
-use control_core::{Config, Controller, Order, Plan, Refusal, TickInput, TickOutput};
+use control_core::{Config, Controller, LargeOrder, Order, Plan, Refusal, TickInput, TickOutput};
 use fixed::types::I16F16;
 use proptest::prelude::*;
 
@@ -65,7 +65,7 @@ fn ordered(segments: &[Excitation]) -> Controller {
         tick(&mut c, 0);
     }
     let sequence = uploaded(segments).expect("sound");
-    c.order(Order::Play(sequence.prepared(&plan()).expect("sound")));
+    c.order(LargeOrder::Play(sequence.prepared(&plan()).expect("sound")));
     c
 }
 
@@ -259,12 +259,12 @@ fn nothing_is_left_of_a_sequence_that_was_cut_short() {
 fn a_sequence_needs_a_commissioned_device_with_torque_off() {
     let prepared = || uploaded(&[segment(ramps(1.0), 500)]).expect("sound").prepared(&plan()).expect("sound");
     let mut unknown = Controller::new(Config::default().plan().expect("the default is sound"));
-    unknown.order(Order::Play(prepared()));
+    unknown.order(LargeOrder::Play(prepared()));
     assert!(!tick(&mut unknown, 0).enable);
     let mut running = Controller::new(plan());
     running.order(Order::Start);
     tick(&mut running, 0);
-    running.order(Order::Play(prepared()));
+    running.order(LargeOrder::Play(prepared()));
     assert!(!plays(&tick(&mut running, 0)), "it runs on as it was");
 }
 

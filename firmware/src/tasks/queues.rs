@@ -1,8 +1,7 @@
 //! The queues between tasks: one writer and one reader each, no lock.
 
-use control_core::compensation::Gains;
 use control_core::excitation::Segments;
-use control_core::{Order, TickOutput};
+use control_core::{LargeOrder, Order, TickOutput};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
 use link::device::Waiting;
@@ -13,22 +12,13 @@ pub const PACKET_BYTES: usize = 64;
 /// Bytes on their way to or from the PC.
 pub type Packet = Vec<u8, PACKET_BYTES>;
 
-/// An order in a few bytes: what a tick moves without noticing.
+/// An order on its way to the tick in a few bytes, which a tick moves without noticing.
 #[derive(Clone, Copy)]
-pub enum SmallOrder {
-    /// In the session of this number.
-    Start(u8),
-    /// Torque off.
-    Stop,
-    /// Depth 0 is here.
-    Zero,
-    /// The PC is alive.
-    Heartbeat,
-    /// Other gains of the compensation.
-    Compensate(Gains),
-    /// Take the large one that waits: a plan, an excitation, a sequence or the rotor's angle, which are rare and only for a device whose torque is off;
-    /// in the session of this number.
-    Large(u8),
+pub struct Queued {
+    /// The number of the session that it is from: only the PC that is there now is given torque.
+    pub session: u8,
+    /// The order; `None`: the large one that waits, which is rare and only for a device whose torque is off.
+    pub order: Option<Order>,
 }
 
 /// The outputs of a tick, with its number.
@@ -41,8 +31,8 @@ pub struct Ticked {
 
 /// Memory of all queues, and what is too large for the tasks' own.
 pub struct Queues {
-    orders: Queue<SmallOrder, 16>,
-    large_orders: Queue<Order, 2>,
+    orders: Queue<Queued, 16>,
+    large_orders: Queue<LargeOrder, 2>,
     // 25 ms of samples: as long as telemetry may hang before it is found out.
     outputs: Queue<Ticked, 256>,
     // 1 KiB: more than any command; where it is full, USB tells the PC to wait.
@@ -56,9 +46,9 @@ pub struct Queues {
 /// The tick's ends.
 pub struct TickEnds {
     /// From telemetry.
-    pub orders: Consumer<'static, SmallOrder>,
-    /// The order behind [`SmallOrder::Large`].
-    pub large_orders: Consumer<'static, Order>,
+    pub orders: Consumer<'static, Queued>,
+    /// The large orders.
+    pub large_orders: Consumer<'static, LargeOrder>,
     /// To telemetry.
     pub outputs: Producer<'static, Ticked>,
 }
@@ -74,9 +64,9 @@ pub struct UsbEnds {
 /// Telemetry's ends.
 pub struct TelemetryEnds {
     /// To the tick.
-    pub orders: Producer<'static, SmallOrder>,
-    /// The order behind [`SmallOrder::Large`].
-    pub large_orders: Producer<'static, Order>,
+    pub orders: Producer<'static, Queued>,
+    /// The large orders.
+    pub large_orders: Producer<'static, LargeOrder>,
     /// From the tick.
     pub outputs: Consumer<'static, Ticked>,
     /// From the USB task.

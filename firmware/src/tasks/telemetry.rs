@@ -1,7 +1,7 @@
 //! Telemetry: the device's end of the link between the USB queues and the tick's queues, and the configuration's way into
 //! flash. It decides nothing about torque; it only passes orders on.
 
-use super::queues::{Packet, SmallOrder, TelemetryEnds};
+use super::queues::{Packet, Queued, TelemetryEnds};
 use super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use crate::log;
 use crate::port::{Board, Lamps};
@@ -11,7 +11,7 @@ use crate::supervision::Task;
 use crate::timing;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
-use control_core::{Order, Plan};
+use control_core::{AnyOrder, LargeOrder, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity, Waiting};
@@ -36,7 +36,7 @@ pub struct Telemetry<B: Board> {
     ends: TelemetryEnds,
     lamps: B::Lamps,
     /// An order that the tick had no room for.
-    held: Option<Order>,
+    held: Option<AnyOrder>,
     next_tick: u64,
     filling: Packet,
     was_open: bool,
@@ -100,7 +100,7 @@ impl<B: Board> Telemetry<B> {
             self.filling.clear();
             self.shared.discard.store(true, Relaxed);
             self.shared.session.store(self.session().wrapping_add(1), Relaxed);
-            self.held = Some(Order::Stop);
+            self.held = Some(Order::Stop.into());
             self.forward_orders();
             if self.shared.is_powered() {
                 self.shared.trips.raise(Fault::LinkLost);
@@ -135,42 +135,32 @@ impl<B: Board> Telemetry<B> {
     /// Passes orders on until there are no more or the tick has no room.
     fn forward_orders(&mut self) {
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
-            let small = match order {
-                Order::Start => SmallOrder::Start(self.session()),
-                Order::Stop => SmallOrder::Stop,
-                Order::Zero => SmallOrder::Zero,
-                Order::Heartbeat => SmallOrder::Heartbeat,
-                Order::Compensate(gains) => SmallOrder::Compensate(gains),
-                Order::Trip(fault) => {
+            let order = match order {
+                AnyOrder::Small(Order::Trip(fault)) => {
                     self.shared.trips.raise(fault);
                     continue;
                 }
-                large @ (Order::Configure(_) | Order::Excite(_) | Order::Play(_) | Order::Index(_)) => {
+                AnyOrder::Small(order) => Some(order),
+                AnyOrder::Large(large) => {
                     if !self.ends.orders.ready() || !self.ends.large_orders.ready() {
-                        self.held = Some(large);
+                        self.held = Some(AnyOrder::Large(large));
                         return;
                     }
-                    if let Order::Configure(plan) = &large
+                    if let LargeOrder::Configure(plan) = &large
                         && self.save(plan).is_err()
                     {
-                        self.held = Some(large);
+                        self.held = Some(AnyOrder::Large(large));
                         return;
                     }
                     // There is room: just seen.
                     let _ = self.ends.large_orders.enqueue(large);
-                    SmallOrder::Large(self.session())
+                    None
                 }
             };
-            if let Err(small) = self.ends.orders.enqueue(small) {
-                self.held = match small {
-                    SmallOrder::Start(_) => Some(Order::Start),
-                    SmallOrder::Stop => Some(Order::Stop),
-                    SmallOrder::Zero => Some(Order::Zero),
-                    SmallOrder::Heartbeat => Some(Order::Heartbeat),
-                    SmallOrder::Compensate(gains) => Some(Order::Compensate(gains)),
-                    // Its room was seen above.
-                    SmallOrder::Large(_) => None,
-                };
+            let queued = Queued { session: self.session(), order };
+            if self.ends.orders.enqueue(queued).is_err() {
+                // The room of a large one was seen above.
+                self.held = order.map(AnyOrder::Small);
                 return;
             }
         }

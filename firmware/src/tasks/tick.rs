@@ -1,6 +1,6 @@
 //! The control tick: count in, code out, then everything that can wait for the code to be out.
 
-use super::queues::{SmallOrder, TickEnds, Ticked};
+use super::queues::{Queued, TickEnds, Ticked};
 use super::shared::Shared;
 use crate::drive::Drive;
 use crate::port::{Board, Encoder, TickTimer};
@@ -11,7 +11,7 @@ use control_core::controller::TickInput;
 use control_core::event::Fault;
 use control_core::excitation::Segments;
 use control_core::interlock::Interlock;
-use control_core::{Controller, Order, Plan};
+use control_core::{Controller, LargeOrder, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use link::frames::Stage;
 
@@ -116,14 +116,12 @@ impl<B: Board> Tick<B> {
 
     /// At most one order a tick, so that a storm of them costs no more than one.
     fn take_order(&mut self) {
-        let Some(order) = self.ends.orders.dequeue() else { return };
+        let Some(Queued { session, order }) = self.ends.orders.dequeue() else { return };
         match order {
-            SmallOrder::Start(session) => self.power_up(session, Order::Start),
-            SmallOrder::Stop => self.controller.order(Order::Stop),
-            SmallOrder::Zero => self.controller.order(Order::Zero),
-            SmallOrder::Heartbeat => self.controller.heartbeat(),
-            SmallOrder::Compensate(gains) => self.controller.order(Order::Compensate(gains)),
-            SmallOrder::Large(session) => self.take_large_order(session),
+            Some(Order::Start) => self.power_up(session),
+            Some(Order::Heartbeat) => self.controller.heartbeat(),
+            Some(order) => self.controller.order(order),
+            None => self.take_large_order(session),
         }
     }
 
@@ -132,7 +130,7 @@ impl<B: Board> Tick<B> {
     #[inline(never)]
     fn take_large_order(&mut self, session: u8) {
         let Some(order) = self.ends.large_orders.dequeue() else { return };
-        if matches!(order, Order::Excite(_) | Order::Play(_)) && !self.may_power_up(session) {
+        if matches!(order, LargeOrder::Excite(_) | LargeOrder::Play(_)) && !self.may_power_up(session) {
             return;
         }
         self.controller.order(order);
@@ -155,12 +153,12 @@ impl<B: Board> Tick<B> {
     }
 
     /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before where it could know.
-    fn power_up(&mut self, session: u8, order: Order) {
+    fn power_up(&mut self, session: u8) {
         if session != self.shared.session.load(Relaxed) {
             return;
         }
         match self.shared.conditions.get().first() {
-            None => self.controller.order(order),
+            None => self.controller.order(Order::Start),
             Some(interlock) => self.controller.order(Order::Trip(interlock.fault())),
         }
     }

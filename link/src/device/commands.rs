@@ -8,7 +8,7 @@ use control_core::config::Device;
 use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
 use control_core::units::Counts;
-use control_core::{Order, Patient, Plan};
+use control_core::{LargeOrder, Order, Patient, Plan};
 use core::borrow::BorrowMut;
 
 /// True if the command is only for a device whose torque is off.
@@ -88,7 +88,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 check(self.plan.device(), gains).map_err(Rejection::Config)?;
                 self.order(Order::Compensate(gains))
             }
-            Command::Index(index) => self.order(Order::Index(index.map(Counts))),
+            Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
             Command::Segment { index, excitation } => self.upload(index, excitation),
             Command::Play { count, checksum } => self.play(count, checksum),
         }
@@ -134,7 +134,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if !is_gentle {
             self.is_commissioned()?;
         }
-        self.order(Order::Excite(excitation))?;
+        self.order(LargeOrder::Excite(excitation))?;
         self.proof = if is_gentle { Proof::Ordered } else { Proof::None };
         self.will_power_up();
         Ok(())
@@ -178,7 +178,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     fn configure(&mut self, plan: Plan) -> Result<(), Rejection> {
-        self.order(Order::Configure(plan.clone()))?;
+        self.order(LargeOrder::Configure(plan.clone()))?;
         self.plan = plan;
         self.upload.forget();
         self.hello_due = true;

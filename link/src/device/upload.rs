@@ -5,7 +5,7 @@ use crate::codec;
 use crate::commissioning::Proof;
 use crate::frames::Rejection;
 use control_core::excitation::{Excitation, Prepared, Sequence, SequenceRefusal};
-use control_core::{Order, Plan, TICK_HZ};
+use control_core::{LargeOrder, Plan, TICK_HZ};
 use core::borrow::BorrowMut;
 
 /// A sequence is played at once or not at all: this many ticks after its first segment it is forgotten.
@@ -74,7 +74,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.may_give_torque()?;
         self.is_commissioned()?;
         match self.upload.prepared(self.now, count, checksum, &self.plan) {
-            Ok(prepared) => self.order(Order::Play(prepared))?,
+            Ok(prepared) => self.order(LargeOrder::Play(prepared))?,
             Err(refusal) => {
                 self.upload.forget();
                 return Err(Rejection::Sequence(refusal));

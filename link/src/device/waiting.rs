@@ -1,7 +1,7 @@
 //! The queues at the device's end of the link.
 
 use crate::frames::{Ack, Event, SampleBlock};
-use control_core::Order;
+use control_core::AnyOrder;
 use heapless::Deque;
 
 /// Blocks that wait for the PC: 77 ms of samples.
@@ -15,7 +15,7 @@ pub struct Waiting {
     pub(super) acks: Deque<Ack, WAITING_ACKS>,
     pub(super) events: Deque<Event, WAITING_EVENTS>,
     pub(super) blocks: Deque<SampleBlock, WAITING_BLOCKS>,
-    pub(super) orders: Deque<Order, WAITING_ORDERS>,
+    pub(super) orders: Deque<AnyOrder, WAITING_ORDERS>,
 }
 
 impl Default for Waiting {

@@ -8,7 +8,7 @@ use control_core::compensation::Compensation;
 use control_core::controller::TickInput;
 use control_core::excitation::{Excitation, Signal};
 use control_core::units::{Counts, Millimetres, MillimetresPerSecond, Milliradians};
-use control_core::{Config, Controller, Device, Order, Patient};
+use control_core::{Config, Controller, Device, LargeOrder, Order, Patient};
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
 use lab::compensate::angle;
@@ -169,7 +169,7 @@ fn at_rest(patient: Patient, way: Option<Way>, seconds: u32) -> (Vec<i32>, Vec<u
     let mut mechanism = Mechanism::new(ROTOR, TILT);
     let mut controller = Controller::new(config.plan().expect("it may run"));
     let index = -(ROTOR / std::f64::consts::TAU * 4_000.0).round() as i32;
-    controller.order(Order::Index(Some(Counts(index))));
+    controller.order(LargeOrder::Index(Some(Counts(index))));
     controller.order(Order::Start);
     mechanism.lead(way);
     let (mut counts, mut codes) = (Vec::new(), Vec::new());

@@ -12,7 +12,7 @@ use control_core::units::{
     Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
     Newtons, Stiffness,
 };
-use control_core::{Controller, Order, Patient, Plan, TickInput};
+use control_core::{Controller, LargeOrder, Order, Patient, Plan, TickInput};
 use fixed::types::{I8F24, I16F16};
 use proptest::prelude::*;
 
@@ -248,7 +248,7 @@ proptest! {
             match order {
                 0 => controller.order(Order::Stop),
                 1 => controller.order(Order::Zero),
-                2 => controller.order(Order::Configure(plan.clone())),
+                2 => controller.order(LargeOrder::Configure(plan.clone())),
                 3 => controller.order(Order::Trip(Fault::Tilt)),
                 4..=7 => controller.order(Order::Start),
                 _ => controller.order(Order::Heartbeat),

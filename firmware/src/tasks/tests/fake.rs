@@ -1,6 +1,6 @@
 //! A board made of memory, and the tasks' ends on it.
 
-use super::super::queues::{Queues, SmallOrder, TelemetryEnds, TickEnds, UsbEnds};
+use super::super::queues::{Queued, Queues, TelemetryEnds, TickEnds, UsbEnds};
 use super::super::shared::Shared;
 use super::super::tick::Tick;
 use crate::drive::{Drive, MotorDac, Two};
@@ -14,7 +14,7 @@ use crate::wire_check::{Pull, PulledLines};
 use control_core::config::DacWidth;
 use control_core::excitation::Segments;
 use control_core::units::{Counts, DacCode};
-use control_core::{Device, Patient, Plan};
+use control_core::{Device, Order, Patient, Plan};
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use core::sync::atomic::Ordering::Relaxed;
@@ -290,6 +290,7 @@ pub(super) fn run(tick: &mut Tick<Fake>, shared: &Shared, ticks: u32) {
     }
 }
 
-pub(super) fn order(telemetry: &mut TelemetryEnds, order: SmallOrder) {
-    assert!(telemetry.orders.enqueue(order).is_ok());
+/// As telemetry passes on an order of the session of this number.
+pub(super) fn order(telemetry: &mut TelemetryEnds, session: u8, order: Order) {
+    assert!(telemetry.orders.enqueue(Queued { session, order: Some(order) }).is_ok());
 }

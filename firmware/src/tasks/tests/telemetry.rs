@@ -1,6 +1,6 @@
 //! Telemetry.
 
-use super::super::queues::{Packet, SmallOrder, TickEnds, Ticked, UsbEnds};
+use super::super::queues::{Packet, Queued, TickEnds, Ticked, UsbEnds};
 use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use super::super::telemetry::Telemetry;
 use super::fake::{Fake, Part, Words, ends, plan, shared, world};
@@ -8,7 +8,7 @@ use crate::store::{CELL_WORDS, ConfigFlash, Store};
 use control_core::controller::TickInput;
 use control_core::event::{Fault, State};
 use control_core::interlock::Interlock;
-use control_core::{Controller, Device};
+use control_core::{Controller, Device, Order};
 use core::sync::atomic::Ordering::Relaxed;
 use link::Command;
 use link::codec::MAX_FRAME;
@@ -82,9 +82,9 @@ fn a_start_reaches_the_tick_with_its_session() {
     let unknown = Err(Rejection::Interlocked(Interlock::NotZeroed));
     assert_eq!(desk.answer(Command::Start), unknown, "nobody has said where depth 0 is");
     assert_eq!(desk.answer(Command::Zero), Ok(()));
-    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Zero)));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: Some(Order::Zero), .. })));
     assert_eq!(desk.answer(Command::Start), Ok(()));
-    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Start(3))));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { session: 3, order: Some(Order::Start) })));
     desk.shared.conditions.set(Interlock::AmplifierNotReady, true);
     let refused = Err(Rejection::Interlocked(Interlock::AmplifierNotReady));
     assert_eq!(desk.answer(Command::Start), refused);
@@ -101,7 +101,7 @@ fn what_was_under_way_when_the_pc_went_is_thrown_away() {
         desk.say(Command::Start);
         desk.shared.link.store(gone, Relaxed);
         assert!(desk.turn().is_empty(), "nobody listens");
-        assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Stop)));
+        assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: Some(Order::Stop), .. })));
         assert!(desk.tick.orders.dequeue().is_none(), "the start is gone");
         assert_eq!(desk.shared.session.load(Relaxed), session.wrapping_add(1));
         assert_eq!(desk.shared.trips.take(), Some(Fault::LinkLost));
@@ -120,7 +120,7 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
     assert!(desk.tick.orders.dequeue().is_none(), "it waits");
     desk.shared.powered.store(false, Relaxed);
     desk.turn();
-    assert!(matches!(desk.tick.orders.dequeue(), Some(SmallOrder::Large(_))));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: None, .. })));
     assert!(desk.tick.large_orders.dequeue().is_some());
     assert!(!desk.shared.conditions.get().contains(Interlock::Saving));
     world().flash_fails.set(true);

@@ -1,12 +1,12 @@
 //! The control tick.
 
-use super::super::queues::{SmallOrder, TelemetryEnds, Ticked};
+use super::super::queues::{Queued, TelemetryEnds, Ticked};
 use super::fake::{order, run, tick, world};
 use crate::timing;
 use control_core::config::DacWidth;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
-use control_core::{Device, Patient, Plan};
+use control_core::{Device, LargeOrder, Order, Patient, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use std::vec::Vec;
 
@@ -14,13 +14,13 @@ use std::vec::Vec;
 fn the_tick_starts_only_for_the_current_session() {
     let (mut tick, shared, mut telemetry) = tick();
     shared.session.store(7, Relaxed);
-    order(&mut telemetry, SmallOrder::Start(6));
+    order(&mut telemetry, 6, Order::Start);
     run(&mut tick, shared, 3);
     assert!(!world().enabled.get() && !shared.is_powered(), "of a PC that is gone");
-    order(&mut telemetry, SmallOrder::Start(7));
+    order(&mut telemetry, 7, Order::Start);
     run(&mut tick, shared, 2);
     assert!(world().enabled.get() && shared.is_powered());
-    order(&mut telemetry, SmallOrder::Stop);
+    order(&mut telemetry, 0, Order::Stop);
     run(&mut tick, shared, 2);
     assert!(!world().enabled.get() && !shared.is_powered());
     assert_eq!(world().codes.borrow().last(), Some(&2048));
@@ -30,7 +30,7 @@ fn the_tick_starts_only_for_the_current_session() {
 fn the_tick_does_not_start_under_an_interlock_and_says_why() {
     let (mut tick, shared, mut telemetry) = tick();
     shared.conditions.set(Interlock::EmergencyStop, true);
-    order(&mut telemetry, SmallOrder::Start(0));
+    order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);
     assert!(!world().enabled.get());
     let tripped = core::iter::from_fn(|| telemetry.outputs.dequeue()).find_map(|t: Ticked| t.output.tripped);
@@ -43,10 +43,10 @@ fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let eight = Device { dac: DacWidth::BITS_8, ..Device::commissioned_virtual() };
     let eight = Plan::new(&eight, &Patient::default()).unwrap();
     let configure = |telemetry: &mut TelemetryEnds| {
-        assert!(telemetry.large_orders.enqueue(control_core::Order::Configure(eight.clone())).is_ok());
-        order(telemetry, SmallOrder::Large(0));
+        assert!(telemetry.large_orders.enqueue(LargeOrder::Configure(eight.clone())).is_ok());
+        assert!(telemetry.orders.enqueue(Queued { session: 0, order: None }).is_ok());
     };
-    order(&mut telemetry, SmallOrder::Start(0));
+    order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);
     configure(&mut telemetry);
     run(&mut tick, shared, 2);
@@ -62,7 +62,7 @@ fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
 #[test]
 fn the_tick_misses_its_supervisor() {
     let (mut tick, shared, mut telemetry) = tick();
-    order(&mut telemetry, SmallOrder::Start(0));
+    order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);
     for silent in 1..=timing::SUPERVISOR_SILENCE_TICKS {
         assert!(world().enabled.get(), "after {silent} ticks");
@@ -82,7 +82,7 @@ fn a_tick_that_comes_late_is_counted_and_takes_torque_away() {
     world().cycles.set(world().cycles.get() + 2 * timing::TICK_CYCLES);
     run(&mut tick, shared, 1);
     assert_eq!((shared.missed_ticks.load(Relaxed), shared.trips.is_empty()), (2, true), "torque is off");
-    order(&mut telemetry, SmallOrder::Start(0));
+    order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);
     world().cycles.set(world().cycles.get() + timing::TICK_CYCLES);
     run(&mut tick, shared, 1);
@@ -125,10 +125,10 @@ fn the_tick_leaves_word_of_its_torque_and_of_the_motors_heat() {
     let (mut tick, shared, mut telemetry) = tick();
     // A needle 2 mm deep, that a wall pushes out.
     world().count.set(127);
-    order(&mut telemetry, SmallOrder::Start(0));
+    order(&mut telemetry, 0, Order::Start);
     for second in 0..20_000 {
         world().count.set(127 + [0, 1, 2, 1][second / 250 % 4]);
-        order(&mut telemetry, SmallOrder::Heartbeat);
+        order(&mut telemetry, 0, Order::Heartbeat);
         run(&mut tick, shared, 1);
         let _ = telemetry.outputs.dequeue();
     }

@@ -4,7 +4,7 @@
 //! Where the device feeds forward as well, its torque is not the servo's alone. The servo's is computed again by the control
 //! core itself, from the same counts.
 
-use control_core::controller::{Order, Sample, TickInput};
+use control_core::controller::{LargeOrder, Sample, TickInput};
 use control_core::excitation::{Excitation, Reference};
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Plan};
@@ -115,7 +115,7 @@ fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Ve
         let input = TickInput { count: Counts(sample.count), tilt: Milliradians(sample.tilt_mrad) };
         if std::mem::take(&mut first) {
             controller.tick(input);
-            controller.order(Order::Excite(Excitation { compensated: false, ..excitation.clone() }));
+            controller.order(LargeOrder::Excite(Excitation { compensated: false, ..excitation.clone() }));
         }
         controller.heartbeat();
         let output = controller.tick(input);

@@ -11,7 +11,7 @@ use crate::profile::Profile;
 use crate::session::Control;
 use control_core::event::Fault;
 use control_core::units::{Counts, DacCode, Milliradians};
-use control_core::{Controller, Order, Patient, Plan, TICK_HZ, TickInput};
+use control_core::{AnyOrder, Controller, Order, Patient, Plan, TICK_HZ, TickInput};
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use link::frames::{Stage, StageTime, Timing};
@@ -244,8 +244,8 @@ impl VirtualDevice {
         }
     }
 
-    fn order(&mut self, order: Order) {
-        if matches!(order, Order::Zero) && !self.enable {
+    fn order(&mut self, order: AnyOrder) {
+        if matches!(order, AnyOrder::Small(Order::Zero)) && !self.enable {
             self.zero_mm = self.plant.tip() * 1e3;
             if matches!(self.hand, Hand::Script { .. }) {
                 self.hand = Hand::Rest;
