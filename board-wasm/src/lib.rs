@@ -34,7 +34,7 @@ fn say(bytes: &[u8]) -> u32 {
     })
 }
 
-fn say_failure(done: Result<(), String>) -> u32 {
+fn say_error(done: Result<(), String>) -> u32 {
     say(done.err().unwrap_or_default().as_bytes())
 }
 
@@ -80,9 +80,9 @@ pub extern "C" fn board_tell(now_ms: f64) -> u32 {
 pub extern "C" fn board_begin(count: u32) -> u32 {
     let task = heard(count, |bytes| serde_json::from_slice::<Task>(bytes));
     let done = task.map_err(|why| why.to_string()).and_then(|task| {
-        SESSION.with_borrow_mut(|session| session.begin(task)).map_err(|failure| failure.to_string())
+        SESSION.with_borrow_mut(|session| session.begin(task)).map_err(|error| error.to_string())
     });
-    say_failure(done)
+    say_error(done)
 }
 
 /// Takes the guide's answer in `count` bytes of JSON. Returns the length of what is wrong with it, or 0.
@@ -90,7 +90,7 @@ pub extern "C" fn board_begin(count: u32) -> u32 {
 pub extern "C" fn board_answer(count: u32) -> u32 {
     let answer = heard(count, |bytes| serde_json::from_slice::<GuideAnswer>(bytes));
     let done = answer.map(|answer| SESSION.with_borrow_mut(|session| session.answer(answer)));
-    say_failure(done.map_err(|why| why.to_string()))
+    say_error(done.map_err(|why| why.to_string()))
 }
 
 /// Returns the length of the device's part as a file, or 0 before a work has ended well.
@@ -107,12 +107,12 @@ pub extern "C" fn dfu_begin(count: u32) -> u32 {
         let (memory, file) = bytes.split_at(bytes.iter().position(|byte| *byte == 0).unwrap_or(0));
         Update::new(file.get(1..).unwrap_or_default(), &String::from_utf8_lossy(memory))
     });
-    say_failure(
+    say_error(
         update
             .map(|update| {
                 UPDATE.replace(Some(update));
             })
-            .map_err(|failure| failure.to_string()),
+            .map_err(|error| error.to_string()),
     )
 }
 

@@ -6,10 +6,10 @@
 
 use crate::view::View;
 use crate::work::{Task, Work};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::page::guide::GuideAnswer;
 use link::codec::MAX_FRAME;
-use link::frames::{Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
+use link::frames::{Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
 use link::host::Commands;
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ impl Session {
         let refused = &mut self.refused;
         self.view.take(now, bytes, |frame| {
             if let DeviceFrame::Ack(ack) = frame
-                && let Err(why @ Rejection::Version) = ack.result
+                && let Err(why @ CommandRefusal::Version) = ack.result
             {
                 *refused = Some(why.to_string());
             }
@@ -62,9 +62,9 @@ impl Session {
     }
 
     /// Begins a task; why not where it cannot be.
-    pub fn begin(&mut self, task: Task) -> Result<(), Failure> {
+    pub fn begin(&mut self, task: Task) -> Result<(), Error> {
         if self.work.as_ref().is_some_and(Work::is_running) {
-            return Err(Failure::failed("another guide is open; end it first"));
+            return Err(Error::failed("another guide is open; end it first"));
         }
         self.work = Some(Work::new(task)?);
         Ok(())

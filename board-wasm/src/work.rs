@@ -5,7 +5,7 @@ use device_setup::commission::{self, Wish};
 use device_setup::compensate;
 use device_setup::pause::pause;
 use device_sim::device::device_config;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::page::guide::{GuideAnswer, GuideState, Reading};
 use diagnosis::rig::Rig;
 use serde::Deserialize;
@@ -52,7 +52,7 @@ struct Finding {
     file: String,
 }
 
-type Dialogue = Pin<Box<dyn Future<Output = Result<Finding, Failure>>>>;
+type Dialogue = Pin<Box<dyn Future<Output = Result<Finding, Error>>>>;
 
 /// A work that is being done.
 pub struct Work {
@@ -71,7 +71,7 @@ struct Shared {
 
 impl Work {
     /// Prepares a task; what is wrong with its numbers where something is. Nothing is sent before the first step is begun.
-    pub fn new(task: Task) -> Result<Self, Failure> {
+    pub fn new(task: Task) -> Result<Self, Error> {
         let title = match task {
             Task::Commission { .. } => "Commissioning",
             Task::Compensate { .. } => "Compensation",
@@ -112,7 +112,7 @@ impl Work {
     /// Ends it early, for this reason: nothing more is sent.
     pub fn fail(&mut self, why: &str) {
         if self.dialogue.is_some() {
-            self.end(Err(Failure::failed(why)));
+            self.end(Err(Error::failed(why)));
             self.shared.borrow_mut().out.clear();
         }
     }
@@ -132,18 +132,18 @@ impl Work {
         self.file.as_deref()
     }
 
-    fn end(&mut self, outcome: Result<Finding, Failure>) {
+    fn end(&mut self, outcome: Result<Finding, Error>) {
         self.dialogue = None;
         let lines = outcome.map(|finding| {
             self.file = Some(finding.file);
             finding.lines
         });
-        self.shared.borrow_mut().guide.end(lines.map_err(|failure| failure.to_string()));
+        self.shared.borrow_mut().guide.end(lines.map_err(|error| error.to_string()));
     }
 }
 
 /// The dialogue of a task.
-fn dialogue(task: Task, shared: Rc<RefCell<Shared>>) -> Result<Dialogue, Failure> {
+fn dialogue(task: Task, shared: Rc<RefCell<Shared>>) -> Result<Dialogue, Error> {
     Ok(match task {
         Task::Commission { turns, pull_mm, counts_per_turn } => {
             within("the length of the pull in mm", pull_mm, 10.0, 1_000.0)?;
@@ -155,20 +155,20 @@ fn dialogue(task: Task, shared: Rc<RefCell<Shared>>) -> Result<Dialogue, Failure
         }
         Task::Compensate { rig, share } => {
             within("the share of the gains", share, 0.0, 1.0)?;
-            let rig = Rig::parse(&rig, "patched-rig.toml").map_err(Failure::input)?;
+            let rig = Rig::parse(&rig, "patched-rig.toml").map_err(Error::input)?;
             Box::pin(compensation(rig, share, shared))
         }
     })
 }
 
-fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), Failure> {
+fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(Failure::input(format_args!("{what} is {value}; it must be from {least} to {most}")))
+    Err(Error::input(format_args!("{what} is {value}; it must be from {least} to {most}")))
 }
 
-async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, Failure> {
+async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
     let mut line = BrowserLine(Rc::clone(&shared));
     let asks = async |step: commission::Step| ask(&shared, &step, step.moves()).await;
@@ -176,7 +176,7 @@ async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, 
     Ok(Finding { lines: outcome.lines(), file: outcome.to_toml("board")? })
 }
 
-async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Result<Finding, Failure> {
+async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
     let mut line = BrowserLine(Rc::clone(&shared));
     let asks = async |step: compensate::Step| ask(&shared, &step, step.moves()).await;
@@ -186,7 +186,7 @@ async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Resu
 }
 
 /// Shows a step and waits until a person begins it.
-async fn ask(shared: &RefCell<Shared>, step: &dyn Display, moves: bool) -> Result<(), Failure> {
+async fn ask(shared: &RefCell<Shared>, step: &dyn Display, moves: bool) -> Result<(), Error> {
     let number = shared.borrow_mut().guide.ask(step.to_string(), moves);
     loop {
         {
@@ -194,7 +194,7 @@ async fn ask(shared: &RefCell<Shared>, step: &dyn Display, moves: bool) -> Resul
             // What came while a person read is old.
             shared.heard.clear();
             if shared.guide.is_left() {
-                return Err(Failure::failed(LEFT));
+                return Err(Error::failed(LEFT));
             }
             if shared.guide.is_agreed(number) {
                 shared.guide.run_last();
@@ -209,10 +209,10 @@ async fn ask(shared: &RefCell<Shared>, step: &dyn Display, moves: bool) -> Resul
 struct BrowserLine(Rc<RefCell<Shared>>);
 
 impl Line for BrowserLine {
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         let mut shared = self.0.borrow_mut();
         if shared.guide.is_left() {
-            return Err(Failure::failed(LEFT));
+            return Err(Error::failed(LEFT));
         }
         shared.out.extend(out);
         into.append(&mut shared.heard);

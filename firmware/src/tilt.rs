@@ -19,9 +19,9 @@ pub trait TiltSource {
     fn read(&mut self) -> Reading;
 }
 
-/// The trouble that one reading shows.
+/// The error that one reading shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TiltTrouble {
+pub enum TiltError {
     /// Nothing answers, or something else does.
     Absent,
     /// It answers and does not measure.

@@ -1,4 +1,4 @@
-//! The command line of the needle device's PC side. It parses, calls the library, prints, and turns failures into one line
+//! The command line of the needle device's PC side. It parses, calls the library, prints, and turns errors into one line
 //! and an exit status.
 
 mod cli;

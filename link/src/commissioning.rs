@@ -3,7 +3,7 @@
 //! [`crate::Command::Commission`]. From then on a command may lower its ceilings and not raise them
 //! ([`control_core::ceilings`]). A record that the device has sent carries its seal ([`Record`]) and is taken back.
 
-use crate::frames::Rejection;
+use crate::frames::CommandRefusal;
 use control_core::Device;
 use control_core::ceilings;
 use control_core::controller::Sample;
@@ -17,14 +17,14 @@ const LEAST_COUNTS: u32 = 20;
 const CLEARLY: i64 = 4;
 
 /// Checks that a command may replace `before` by `after`.
-pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), Rejection> {
+pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), CommandRefusal> {
     if !after.commissioned {
         return Ok(());
     }
     if !before.commissioned {
-        return Err(Rejection::NotShown);
+        return Err(CommandRefusal::NotShown);
     }
-    ceilings::changed(before, after).map_or(Ok(()), |field| Err(Rejection::Commissioned(field)))
+    ceilings::changed(before, after).map_or(Ok(()), |field| Err(CommandRefusal::Commissioned(field)))
 }
 
 /// The evidence that the device has gathered about itself while it played.

@@ -10,8 +10,8 @@ use crate::codec::{self, Decoder, MAX_FRAME};
 use crate::commissioning::{Proof, Record};
 use crate::crash::Crash;
 use crate::frames::{
-    Ack, BLOCK_SAMPLES, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ, PROTOCOL_VERSION,
-    Pose, Rejection, SampleBlock, SaveFailure, Timing,
+    Ack, BLOCK_SAMPLES, CommandRefusal, DeviceFrame, Event, EventKind, Hello, HostFrame, Numbered, POSE_HZ,
+    PROTOCOL_VERSION, Pose, SampleBlock, SaveError, Timing,
 };
 use control_core::ceilings::Ceilings;
 use control_core::config::Tissue;
@@ -169,7 +169,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     /// The configuration in force was not saved.
-    pub fn not_saved(&mut self, tick: u64, cause: SaveFailure) {
+    pub fn not_saved(&mut self, tick: u64, cause: SaveError) {
         self.event(tick, EventKind::NotSaved { cause });
     }
 
@@ -284,8 +284,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
-    fn order(&mut self, order: impl Into<AnyOrder>) -> Result<(), Rejection> {
-        self.waiting.borrow_mut().orders.push_back(order.into()).map_err(|_| Rejection::Full)
+    fn order(&mut self, order: impl Into<AnyOrder>) -> Result<(), CommandRefusal> {
+        self.waiting.borrow_mut().orders.push_back(order.into()).map_err(|_| CommandRefusal::Full)
     }
 
     fn note_events(&mut self, tick: u64, output: &TickOutput) {

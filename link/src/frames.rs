@@ -149,7 +149,7 @@ pub enum EventKind {
     /// Torque off at a person's wish.
     Stopped,
     /// The configuration is in force, but will be lost at the next reset.
-    NotSaved { cause: SaveFailure },
+    NotSaved { cause: SaveError },
     /// The tip has come into the lumen of a vessel, through its near wall or drawn back through its far one: blood shows.
     Flashback { layer: u8 },
     /// A vessel's far wall has given way: the needle has gone through.
@@ -165,7 +165,7 @@ pub enum EventKind {
 
 /// The reason why a configuration was not saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SaveFailure {
+pub enum SaveError {
     /// The flash did not take what it was given, or did not keep it.
     Flash,
     /// No room was left, and none could be made.
@@ -174,16 +174,16 @@ pub enum SaveFailure {
     TooLong,
 }
 
-impl core::fmt::Display for SaveFailure {
+impl core::fmt::Display for SaveError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            SaveFailure::Flash => {
+            SaveError::Flash => {
                 "the configuration was not saved because the flash did not keep it: send it again, or replace the board"
             }
-            SaveFailure::Full => {
+            SaveError::Full => {
                 "the configuration was not saved because there is no room: restart the device and send it again"
             }
-            SaveFailure::TooLong => "the configuration was not saved because it is too long: use fewer layers",
+            SaveError::TooLong => "the configuration was not saved because it is too long: use fewer layers",
         })
     }
 }
@@ -238,12 +238,12 @@ pub struct Ack {
     /// The command's.
     pub id: u32,
     /// Done, or why not.
-    pub result: Result<(), Rejection>,
+    pub result: Result<(), CommandRefusal>,
 }
 
 /// The reason why a command was not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Rejection {
+pub enum CommandRefusal {
     /// The configuration or the excitation may not run.
     Config(Refusal),
     /// Not while torque is on: stop first.
@@ -264,26 +264,26 @@ pub enum Rejection {
     Sequence(SequenceRefusal),
 }
 
-impl core::fmt::Display for Rejection {
+impl core::fmt::Display for CommandRefusal {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Rejection::Config(refusal) => refusal.fmt(f),
-            Rejection::Powered => f.write_str("torque is on; stop the device first"),
-            Rejection::Version => write!(
+            CommandRefusal::Config(refusal) => refusal.fmt(f),
+            CommandRefusal::Powered => f.write_str("torque is on; stop the device first"),
+            CommandRefusal::Version => write!(
                 f,
                 "this program speaks protocol {PROTOCOL_VERSION} and the device another; flash the firmware that belongs to this program, or run the program that belongs to the firmware"
             ),
-            Rejection::Full => f.write_str("the device is busy with earlier commands; send it again"),
-            Rejection::NoSession => f.write_str("no program is connected to the device; connect first"),
-            Rejection::Interlocked(interlock) => interlock.fmt(f),
-            Rejection::Commissioned(field) => write!(
+            CommandRefusal::Full => f.write_str("the device is busy with earlier commands; send it again"),
+            CommandRefusal::NoSession => f.write_str("no program is connected to the device; connect first"),
+            CommandRefusal::Interlocked(interlock) => interlock.fmt(f),
+            CommandRefusal::Commissioned(field) => write!(
                 f,
                 "{field} of a commissioned device cannot be changed or raised; run host-sim commission again, or restore the file that it wrote, unchanged"
             ),
-            Rejection::NotShown => f.write_str(
+            CommandRefusal::NotShown => f.write_str(
                 "the device was not commissioned with this configuration, and its own pulses have not shown that motor and encoder match; run host-sim commission",
             ),
-            Rejection::Sequence(refusal) => refusal.fmt(f),
+            CommandRefusal::Sequence(refusal) => refusal.fmt(f),
         }
     }
 }

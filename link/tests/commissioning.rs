@@ -9,7 +9,7 @@ use fixed::types::I16F16;
 use link::codec::MAX_FRAME;
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
-use link::frames::{Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
+use link::frames::{Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
 use link::host::{Commands, Reception};
 
 const IDENTITY: Identity =
@@ -47,7 +47,7 @@ impl Bench {
         bench
     }
 
-    fn ask(&mut self, command: Command) -> Result<(), Rejection> {
+    fn ask(&mut self, command: Command) -> Result<(), CommandRefusal> {
         let mut out = [0; MAX_FRAME];
         let (_, length) = self.commands.encode(command, &mut out).expect("it fits");
         self.endpoint.receive(&out[..length]);
@@ -117,18 +117,21 @@ fn with(change: impl Fn(&mut Device)) -> Device {
 #[test]
 fn only_pulses_that_the_device_has_played_commission_it() {
     let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
-    assert_eq!(bench.ask(Command::ConfigureDevice(Device::commissioned_virtual())), Err(Rejection::NotShown));
+    assert_eq!(
+        bench.ask(Command::ConfigureDevice(Device::commissioned_virtual())),
+        Err(CommandRefusal::NotShown)
+    );
     let forged = Record { device: Device::commissioned_virtual(), seal: 1 };
-    assert_eq!(bench.ask(Command::RestoreDevice(forged)), Err(Rejection::NotShown));
-    assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown));
+    assert_eq!(bench.ask(Command::RestoreDevice(forged)), Err(CommandRefusal::NotShown));
+    assert_eq!(bench.ask(Command::Commission), Err(CommandRefusal::NotShown));
     bench.pulse(600);
     assert_eq!(bench.ask(Command::Stop), Ok(()));
     bench.run(10);
-    assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown), "they were cut short");
+    assert_eq!(bench.ask(Command::Commission), Err(CommandRefusal::NotShown), "they were cut short");
     bench.pulse(1_300);
     let otherwise = Device { roller_radius: Millimetres(I16F16::from_num(12)), ..Device::default() };
     assert_eq!(bench.ask(Command::ConfigureDevice(otherwise)), Ok(()));
-    assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown), "of another device");
+    assert_eq!(bench.ask(Command::Commission), Err(CommandRefusal::NotShown), "of another device");
     bench.run(10);
     bench.pulse(1_300);
     // The converter's zero is what the pulses give.
@@ -139,7 +142,7 @@ fn only_pulses_that_the_device_has_played_commission_it() {
     assert_eq!(bench.record().device, wanted);
     // What was shown counts once.
     assert_eq!(bench.ask(Command::ConfigureDevice(Device { commissioned: false, ..wanted })), Ok(()));
-    assert_eq!(bench.ask(Command::Commission), Err(Rejection::NotShown));
+    assert_eq!(bench.ask(Command::Commission), Err(CommandRefusal::NotShown));
 }
 
 #[test]
@@ -149,7 +152,7 @@ fn a_motor_that_drives_the_other_way_is_not_commissioned() {
         bench.pulse(1_300);
         let goes_together = motor * encoder > 0.0;
         let answer = bench.ask(Command::Commission);
-        assert_eq!(answer, if goes_together { Ok(()) } else { Err(Rejection::NotShown) });
+        assert_eq!(answer, if goes_together { Ok(()) } else { Err(CommandRefusal::NotShown) });
     }
 }
 
@@ -158,7 +161,7 @@ fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
     let mut bench = Bench::new(&Device::commissioned_virtual(), (1.0, 1.0));
     let whole = bench.record();
     let half = with(|device| device.limits.torque.0 /= 2);
-    let raised = |field| Err(Rejection::Commissioned(field));
+    let raised = |field| Err(CommandRefusal::Commissioned(field));
     let stronger = with(|device| {
         device.full_scale_torque.0 += I16F16::ONE;
         device.limits.torque.0 += I16F16::ONE;
@@ -198,7 +201,7 @@ fn no_command_passes_the_boards_ceilings() {
         for command in [Command::ConfigureDevice(unknown), Command::RestoreDevice(record)] {
             let answer = bench.ask(command);
             assert!(
-                matches!(answer, Err(Rejection::Config(Refusal::OutOfRange { field, .. })) if field == wanted),
+                matches!(answer, Err(CommandRefusal::Config(Refusal::OutOfRange { field, .. })) if field == wanted),
                 "{answer:?}"
             );
         }

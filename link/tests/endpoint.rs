@@ -12,7 +12,7 @@ use link::codec::{self, MAX_FRAME, TooLong};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{
-    Command, DeviceFrame, EventKind, Numbered, PROTOCOL_VERSION, Rejection, SampleBlock, Timing,
+    Command, CommandRefusal, DeviceFrame, EventKind, Numbered, PROTOCOL_VERSION, SampleBlock, Timing,
 };
 use link::host::{Commands, Reception};
 
@@ -54,7 +54,7 @@ impl Device {
         self.endpoint.receive(&bytes);
     }
 
-    fn answer(&mut self, command: Command) -> Result<(), Rejection> {
+    fn answer(&mut self, command: Command) -> Result<(), CommandRefusal> {
         self.say(command);
         let mut acks = self.heard().into_iter().filter_map(|frame| match frame {
             DeviceFrame::Ack(ack) => Some(ack.result),
@@ -101,7 +101,7 @@ fn another_version_is_turned_away() {
     device.say(Command::Hello { version: PROTOCOL_VERSION + 1 });
     let frames = device.heard();
     assert!(
-        matches!(frames[..], [DeviceFrame::Ack(ack)] if ack.result == Err(Rejection::Version)),
+        matches!(frames[..], [DeviceFrame::Ack(ack)] if ack.result == Err(CommandRefusal::Version)),
         "{frames:?}"
     );
     assert!(!device.endpoint.in_session());
@@ -113,7 +113,7 @@ fn a_device_starts_once_it_is_commissioned_and_knows_its_depth() {
     let plan = Plan::new(&config::Device::default(), &Patient::default()).expect("as sound as the default");
     device.endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
     assert_eq!(device.answer(Command::Hello { version: PROTOCOL_VERSION }), Ok(()));
-    let interlocked = |interlock| Err(Rejection::Interlocked(interlock));
+    let interlocked = |interlock| Err(CommandRefusal::Interlocked(interlock));
     assert_eq!(device.answer(Command::Start), interlocked(Interlock::NotCommissioned));
     let excitation = |signal, damping: f64| {
         let servo = Servo { stiffness: Stiffness::default(), damping: Damping(I8F24::from_num(damping)) };
@@ -306,9 +306,14 @@ fn waiting_messages_are_forgotten_when_the_pc_leaves() {
 }
 
 #[test]
-fn each_rejection_has_words_of_its_own() {
-    let texts = [Rejection::Version, Rejection::Powered, Rejection::Full, Rejection::Config(Refusal::Empty)]
-        .map(|rejection| rejection.to_string());
+fn each_refusal_has_words_of_its_own() {
+    let texts = [
+        CommandRefusal::Version,
+        CommandRefusal::Powered,
+        CommandRefusal::Full,
+        CommandRefusal::Config(Refusal::Empty),
+    ]
+    .map(|refusal| refusal.to_string());
     assert!(texts.iter().all(|text| text.len() > 5), "{texts:?}");
     assert_eq!(texts.iter().collect::<std::collections::BTreeSet<_>>().len(), texts.len());
 }

@@ -8,7 +8,7 @@ use link::codec::{self, Decoder, Garbage, MAX_FRAME};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{
-    BLOCK_SAMPLES, Command, DeviceFrame, EventKind, HostFrame, Numbered, PROTOCOL_VERSION, Rejection,
+    BLOCK_SAMPLES, Command, CommandRefusal, DeviceFrame, EventKind, HostFrame, Numbered, PROTOCOL_VERSION,
     SampleBlock,
 };
 use link::host::{Commands, Reception};
@@ -151,7 +151,7 @@ impl Bench {
         out[..length].to_vec()
     }
 
-    fn send(&mut self, command: Command) -> Result<(), Rejection> {
+    fn send(&mut self, command: Command) -> Result<(), CommandRefusal> {
         let bytes = self.bytes(command);
         self.device.receive(&bytes);
         let mut acks = self.drain().into_iter().filter_map(|f| match f {
@@ -248,14 +248,14 @@ fn torque_and_configuration_exclude_each_other() {
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Ok(()));
     assert_eq!(bench.send(Command::Start), Ok(()));
-    assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Err(Rejection::Powered));
+    assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Err(CommandRefusal::Powered));
     bench.run(10, |_| 0);
-    assert_eq!(bench.send(Command::Zero), Err(Rejection::Powered));
+    assert_eq!(bench.send(Command::Zero), Err(CommandRefusal::Powered));
     assert_eq!(bench.send(Command::Stop), Ok(()));
     bench.run(10, |_| 0);
     assert_eq!(bench.send(Command::Zero), Ok(()));
     let empty = Patient { layers: heapless::Vec::new(), ..Patient::default() };
-    assert!(matches!(bench.send(Command::ConfigurePatient(empty)), Err(Rejection::Config(_))));
+    assert!(matches!(bench.send(Command::ConfigurePatient(empty)), Err(CommandRefusal::Config(_))));
 }
 
 #[test]
@@ -287,13 +287,16 @@ fn a_patient_never_changes_the_device_but_may_be_dismissed() {
 
     // Refused whole: neither part changes.
     let refused = Device { counts_per_turn: 3, commissioned: false, ..device };
-    assert!(matches!(bench.send(Command::ConfigureDevice(refused)), Err(Rejection::Config(_))));
+    assert!(matches!(bench.send(Command::ConfigureDevice(refused)), Err(CommandRefusal::Config(_))));
     assert_eq!(bench.device.hello().config_hash, hash(device, patient));
     // A ceiling of 0.2 N bears no adult.
     device.limits.torque.0 = fixed::types::I16F16::from_num(2);
     let told = hello(&ask(&mut bench, Command::ConfigureDevice(device)));
     assert_eq!(told.config_hash, hash(device, Patient::nobody()));
-    assert!(matches!(bench.send(Command::ConfigurePatient(Patient::default())), Err(Rejection::Config(_))));
+    assert!(matches!(
+        bench.send(Command::ConfigurePatient(Patient::default())),
+        Err(CommandRefusal::Config(_))
+    ));
 }
 
 #[test]

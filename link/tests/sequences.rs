@@ -11,7 +11,7 @@ use control_core::{Controller, Device, Order, TickInput};
 use fixed::types::{I8F24, I16F16};
 use link::codec::{self, MAX_FRAME};
 use link::device::{Endpoint, Identity, LATE_TICKS};
-use link::frames::{Command, DeviceFrame, HostFrame, PROTOCOL_VERSION, Rejection};
+use link::frames::{Command, CommandRefusal, DeviceFrame, HostFrame, PROTOCOL_VERSION};
 use link::host::Reception;
 
 /// A device with its control law, a motor that is held, and the PC's end.
@@ -46,7 +46,7 @@ impl Bench {
         Self::new(&Device::commissioned_virtual())
     }
 
-    fn ask_as(&mut self, id: u32, command: Command) -> Result<(), Rejection> {
+    fn ask_as(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
         let mut out = [0; MAX_FRAME];
         let length = codec::encode(&HostFrame { id, command }, &mut out).expect("it fits");
         self.endpoint.receive(&out[..length]);
@@ -65,7 +65,7 @@ impl Bench {
         }
     }
 
-    fn ask(&mut self, command: Command) -> Result<(), Rejection> {
+    fn ask(&mut self, command: Command) -> Result<(), CommandRefusal> {
         self.id += 1;
         self.ask_as(self.id, command)
     }
@@ -88,13 +88,13 @@ impl Bench {
         }
     }
 
-    fn upload(&mut self, segments: &[Excitation]) -> Result<(), Rejection> {
+    fn upload(&mut self, segments: &[Excitation]) -> Result<(), CommandRefusal> {
         (0_u8..).zip(segments).try_for_each(|(index, segment)| {
             self.ask(Command::Segment { index, excitation: segment.clone() })
         })
     }
 
-    fn play(&mut self, segments: &[Excitation]) -> Result<(), Rejection> {
+    fn play(&mut self, segments: &[Excitation]) -> Result<(), CommandRefusal> {
         self.ask(play(segments))
     }
 }
@@ -121,11 +121,11 @@ fn sound() -> Vec<Excitation> {
     vec![ramps(1.0, 60), ramps(2.0, 40)]
 }
 
-const fn refused(refusal: SequenceRefusal) -> Result<(), Rejection> {
-    Err(Rejection::Sequence(refusal))
+const fn refused(refusal: SequenceRefusal) -> Result<(), CommandRefusal> {
+    Err(CommandRefusal::Sequence(refusal))
 }
 
-const NOTHING: Result<(), Rejection> = refused(SequenceRefusal::Nothing);
+const NOTHING: Result<(), CommandRefusal> = refused(SequenceRefusal::Nothing);
 
 #[test]
 fn an_upload_gives_no_torque_and_a_play_command_does() {
@@ -180,7 +180,7 @@ fn a_segment_that_is_refused_takes_the_sequence_along() {
         let mut bench = Bench::commissioned();
         bench.must(Command::Segment { index: 0, excitation: ramps(1.0, 60) });
         let answer = bench.ask(Command::Segment { index, excitation: bad });
-        let Err(Rejection::Sequence(refusal)) = answer else { panic!("{what}: {answer:?}") };
+        let Err(CommandRefusal::Sequence(refusal)) = answer else { panic!("{what}: {answer:?}") };
         let sentence = refusal.to_string();
         assert!(sentence.contains("sequence") && sentence.contains(';'), "what, and what to do: {sentence}");
         assert_eq!(bench.play(&[ramps(1.0, 60)]), NOTHING, "{what}");
@@ -261,8 +261,8 @@ fn nothing_is_uploaded_or_played_while_torque_is_on() {
     assert_eq!(bench.play(&sound()), Ok(()));
     for _ in 0..2 {
         // On its way to the tick, and then playing.
-        assert_eq!(bench.upload(&sound()), Err(Rejection::Powered));
-        assert_eq!(bench.play(&sound()), Err(Rejection::Powered));
+        assert_eq!(bench.upload(&sound()), Err(CommandRefusal::Powered));
+        assert_eq!(bench.play(&sound()), Err(CommandRefusal::Powered));
         bench.run(100);
     }
     bench.must(Command::Stop);
@@ -274,13 +274,13 @@ fn nothing_is_uploaded_or_played_while_torque_is_on() {
 fn a_sequence_plays_in_a_session_without_interlocks_only() {
     let mut bench = Bench::commissioned();
     bench.endpoint.disconnect();
-    assert_eq!(bench.upload(&sound()), Err(Rejection::NoSession));
-    assert_eq!(bench.play(&sound()), Err(Rejection::NoSession));
+    assert_eq!(bench.upload(&sound()), Err(CommandRefusal::NoSession));
+    assert_eq!(bench.play(&sound()), Err(CommandRefusal::NoSession));
 
     let mut bench = Bench::commissioned();
     assert_eq!(bench.upload(&sound()), Ok(()));
     bench.endpoint.set_interlocks(Interlocks::of(Interlock::EmergencyStop));
-    assert_eq!(bench.play(&sound()), Err(Rejection::Interlocked(Interlock::EmergencyStop)));
+    assert_eq!(bench.play(&sound()), Err(CommandRefusal::Interlocked(Interlock::EmergencyStop)));
 
     let mut unknown = Bench::new(&Device::default());
     let gentle = [Excitation {
@@ -288,7 +288,7 @@ fn a_sequence_plays_in_a_session_without_interlocks_only() {
         ..ramps(1.0, 60)
     }];
     assert_eq!(unknown.upload(&gentle), Ok(()));
-    let not_commissioned = Err(Rejection::Interlocked(Interlock::NotCommissioned));
+    let not_commissioned = Err(CommandRefusal::Interlocked(Interlock::NotCommissioned));
     assert_eq!(unknown.play(&gentle), not_commissioned, "its own pulses come one by one");
     unknown.run(1_000);
     assert_eq!(unknown.powered + bench.powered, 0);

@@ -52,7 +52,7 @@ pub extern "C" fn start(count: u32) -> u32 {
             SIMULATION.with_borrow_mut(|simulation| *simulation = Some(new));
             say(String::new())
         }
-        Err(failure) => say(failure.to_string()),
+        Err(error) => say(error.to_string()),
     }
 }
 

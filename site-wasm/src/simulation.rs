@@ -2,7 +2,7 @@
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::lockstep;
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages::ToPage;
@@ -30,7 +30,7 @@ pub struct Simulation {
 
 impl Simulation {
     /// With a built-in profile.
-    pub fn new(profile: &str) -> Result<Self, Failure> {
+    pub fn new(profile: &str) -> Result<Self, Error> {
         let profile = Profile::find(profile)?;
         let procedure = Procedure::find(PROCEDURE, &profile)?;
         let scene = profile.scene(Source::Virtual, Some(PROCEDURE.to_owned()));

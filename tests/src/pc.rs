@@ -13,7 +13,7 @@ use control_core::interlock::Interlock;
 use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
 use link::crash::Crash;
-use link::frames::{Ack, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Rejection, Timing};
+use link::frames::{Ack, CommandRefusal, Event, EventKind, Hello, PROTOCOL_VERSION, Pose, Timing};
 use link::host::{Commands, Counts, Reception};
 use link::{Command, DeviceFrame};
 
@@ -145,7 +145,7 @@ impl Pc {
     /// # Panics
     ///
     /// When it does not refuse or does not answer.
-    pub fn must_not(&mut self, board: &mut Board, command: Command) -> Rejection {
+    pub fn must_not(&mut self, board: &mut Board, command: Command) -> CommandRefusal {
         self.command(board, command).result.expect_err("the device refuses")
     }
 
@@ -157,7 +157,7 @@ impl Pc {
     /// When it refuses or does not answer.
     pub fn must(&mut self, board: &mut Board, command: Command) {
         let mut ack = self.command(board, command.clone());
-        if ack.result == Err(Rejection::Interlocked(Interlock::NotZeroed)) {
+        if ack.result == Err(CommandRefusal::Interlocked(Interlock::NotZeroed)) {
             assert_eq!(self.command(board, Command::Zero).result, Ok(()), "the device refuses a zero");
             ack = self.command(board, command);
         }

@@ -7,7 +7,7 @@
 mod krate;
 mod source;
 
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use krate::Crate;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,8 +23,8 @@ const FEWEST_USES: usize = 1000;
 type Uses = BTreeMap<String, BTreeMap<String, String>>;
 
 /// Checks every crate of the repository, prints each circle, and fails if there is one.
-pub(crate) fn check() -> Result<(), Failure> {
-    let unreadable = |error: io::Error| Failure::new(format!("the sources could not be read: {error}"));
+pub(crate) fn check() -> Result<(), Error> {
+    let unreadable = |error: io::Error| Error::new(format!("the sources could not be read: {error}"));
     let mut count = 0;
     let mut circles = Vec::new();
     for folder in crates(&shell::top()).map_err(unreadable)? {
@@ -35,12 +35,12 @@ pub(crate) fn check() -> Result<(), Failure> {
     }
     circles.iter().for_each(|circle| eprintln!("{circle}"));
     if count < FEWEST_USES {
-        return Err(Failure::new(format!("only {count} uses were seen: the reader of sources is blind")));
+        return Err(Error::new(format!("only {count} uses were seen: the reader of sources is blind")));
     }
     if circles.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(format!(
+    Err(Error::new(format!(
         "{} circles, each printed above: move what both files need into a file below them",
         circles.len()
     )))

@@ -12,7 +12,7 @@ mod whole;
 mod work;
 
 use crate::rows::ROWS;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use programs::{EXAMPLES, PEERS};
 use std::fs;
 use std::process::{Command, Stdio};
@@ -20,19 +20,19 @@ use table::Measured;
 use values::{Values, peer};
 
 /// Measures, prints the tables, writes `target/bench.json`. Where `names` has any, only what gives these rows is run.
-pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
+pub(crate) fn run(names: &[String]) -> Result<(), Error> {
     if let Some(unknown) = names.iter().find(|name| ROWS.iter().all(|row| row.name != **name)) {
         let all: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
-        return Err(Failure::usage(format!(
+        return Err(Error::usage(format!(
             "`{unknown}` is not a row of the bench; the rows are: {}",
             all.join(" ")
         )));
     }
-    let mut bench = Bench { names, values: Values::new(), board_lines: vec![], troubles: vec![] };
+    let mut bench = Bench { names, values: Values::new(), board_lines: vec![], errors: vec![] };
     bench.measure_programs();
     bench.measure_whole();
     bench.measure_tests()?;
-    let Bench { mut values, board_lines, troubles, .. } = bench;
+    let Bench { mut values, board_lines, errors, .. } = bench;
     let works = work::works(&values);
     values.extend(work::growths(&works));
     let rows: Vec<Measured> = ROWS
@@ -45,9 +45,9 @@ pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
     board_lines.iter().for_each(|line| println!("{line}"));
     let path = shell::target().join("bench.json");
     fs::write(&path, table::json(&commit(), &rows))
-        .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be written: {error}", path.display())))?;
     println!("written to {}", path.display());
-    if troubles.is_empty() { Ok(()) } else { Err(Failure::new(troubles.join("; "))) }
+    if errors.is_empty() { Ok(()) } else { Err(Error::new(errors.join("; "))) }
 }
 
 /// A run of the bench: the rows that are wanted, and what has been measured.
@@ -56,7 +56,7 @@ struct Bench<'a> {
     names: &'a [String],
     values: Values,
     board_lines: Vec<String>,
-    troubles: Vec<String>,
+    errors: Vec<String>,
 }
 
 impl Bench<'_> {
@@ -65,14 +65,14 @@ impl Bench<'_> {
         self.names.is_empty() || self.names.iter().any(|name| name.starts_with(rows))
     }
 
-    /// Measures where one of these rows is wanted; a failure is reported at the end.
-    fn measure(&mut self, rows: &[&str], what: &str, measured: impl FnOnce() -> Result<Values, Failure>) {
+    /// Measures where one of these rows is wanted; an error is reported at the end.
+    fn measure(&mut self, rows: &[&str], what: &str, measured: impl FnOnce() -> Result<Values, Error>) {
         if !rows.iter().any(|rows| self.wants(rows)) {
             return;
         }
         match measured() {
             Ok(new) => self.values.extend(new),
-            Err(failure) => self.troubles.push(format!("{what}: {failure}")),
+            Err(error) => self.errors.push(format!("{what}: {error}")),
         }
     }
 
@@ -96,12 +96,12 @@ impl Bench<'_> {
         self.measure(&["diagnose_60s_", "diagnose_peak_"], "diagnosis", whole::diagnosis);
     }
 
-    fn measure_tests(&mut self) -> Result<(), Failure> {
+    fn measure_tests(&mut self) -> Result<(), Error> {
         for module in programs::test_modules()? {
             if module.measures(|rows| self.wants(rows)) {
                 match module.run(&mut self.board_lines) {
                     Ok(new) => self.values.extend(new),
-                    Err(failure) => self.troubles.push(format!("{}: {failure}", module.name)),
+                    Err(error) => self.errors.push(format!("{}: {error}", module.name)),
                 }
             }
         }

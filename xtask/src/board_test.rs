@@ -1,12 +1,12 @@
 //! `cargo xtask board-test`: the tests of `firmware/tests/board.rs` on a real board, or the plain word that they did not run.
 
 use crate::boards::Board;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::{firmware, setup};
 use std::process::Command;
 
 /// Runs them where a debug probe is plugged in.
-pub(crate) fn run(board: &Board) -> Result<(), Failure> {
+pub(crate) fn run(board: &Board) -> Result<(), Error> {
     if let Some(why) = missing() {
         println!("board-test: DID NOT RUN: {why}");
         println!(
@@ -22,7 +22,7 @@ pub(crate) fn run(board: &Board) -> Result<(), Failure> {
 }
 
 /// Compiles them: what no machine without the board can do more of.
-pub(crate) fn check(board: &Board) -> Result<(), Failure> {
+pub(crate) fn check(board: &Board) -> Result<(), Error> {
     shell::run(&mut command("check", board, &[]))
 }
 

@@ -1,6 +1,6 @@
 //! The boards that there are images for: what the chores have to know of each. Its pins are in `firmware/src/board`.
 
-use crate::shell::Failure;
+use crate::shell::Error;
 use std::ops::Range;
 
 /// A board.
@@ -46,7 +46,7 @@ impl Board {
 }
 
 /// The board that `--board NAME` asks for, else the default one, and the other arguments.
-pub(crate) fn chosen(arguments: &[String]) -> Result<(&'static Board, Vec<String>), Failure> {
+pub(crate) fn chosen(arguments: &[String]) -> Result<(&'static Board, Vec<String>), Error> {
     let mut rest = arguments.to_vec();
     let Some(place) = rest.iter().position(|argument| argument == "--board") else {
         return Ok((DEFAULT, rest));
@@ -55,7 +55,7 @@ pub(crate) fn chosen(arguments: &[String]) -> Result<(&'static Board, Vec<String
     let name = if place < rest.len() { rest.remove(place) } else { String::new() };
     let board = ALL.iter().find(|board| board.name == name).ok_or_else(|| {
         let all: Vec<&str> = ALL.iter().map(|board| board.name).collect();
-        Failure::usage(format!("--board takes one of {}, not `{name}`", all.join(", ")))
+        Error::usage(format!("--board takes one of {}, not `{name}`", all.join(", ")))
     })?;
     Ok((board, rest))
 }

@@ -4,7 +4,7 @@
 mod shares;
 
 use crate::setup;
-use crate::shell::{self, Failure, cargo};
+use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, built};
 use std::collections::BTreeMap;
 use std::fs;
@@ -48,25 +48,25 @@ const PRINTED: usize = 8;
 type Counts = BTreeMap<String, f64>;
 
 /// Counts, prints, and compares with the file, or writes it.
-pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
     match arguments {
         [] => compare(&counted()?, &written()?),
         [option] if option == RENEW => {
             let file = file();
             fs::write(&file, text(&counted()?))
-                .map_err(|error| Failure::new(format!("{} cannot be written: {error}", file.display())))?;
+                .map_err(|error| Error::new(format!("{} cannot be written: {error}", file.display())))?;
             println!("written to {}", file.display());
             Ok(())
         }
         [option] if option == SHARES => print_shares(),
         [other, ..] => {
-            Err(Failure::usage(format!("`{other}` is not an option of counts; it takes {RENEW} or {SHARES}")))
+            Err(Error::usage(format!("`{other}` is not an option of counts; it takes {RENEW} or {SHARES}")))
         }
     }
 }
 
 /// The step of `cargo xtask nightly`.
-pub(crate) fn check() -> Result<(), Failure> {
+pub(crate) fn check() -> Result<(), Error> {
     run(&[])
 }
 
@@ -77,7 +77,7 @@ fn file() -> PathBuf {
 /// The example that runs the hot paths.
 const EXAMPLE: [&str; 2] = ["--example", "hot_paths"];
 
-fn valgrind() -> Result<(), Failure> {
+fn valgrind() -> Result<(), Error> {
     if shell::is_on_path("valgrind") {
         Ok(())
     } else {
@@ -86,7 +86,7 @@ fn valgrind() -> Result<(), Failure> {
 }
 
 /// Builds the example with line numbers, which the one build does not have, in a folder of its own.
-fn with_lines() -> Result<PathBuf, Failure> {
+fn with_lines() -> Result<PathBuf, Error> {
     let folder = shell::target().join("with-lines");
     let mut build = cargo();
     build.env("CARGO_PROFILE_RELEASE_DEBUG", "line-tables-only").env("CARGO_TARGET_DIR", &folder);
@@ -96,7 +96,7 @@ fn with_lines() -> Result<PathBuf, Failure> {
     Ok(folder.join("release/examples/hot_paths"))
 }
 
-fn counted() -> Result<Counts, Failure> {
+fn counted() -> Result<Counts, Error> {
     valgrind()?;
     let program = built(&EXAMPLE, "examples/hot_paths")?;
     let mut counts = Counts::new();
@@ -109,7 +109,7 @@ fn counted() -> Result<Counts, Failure> {
 }
 
 /// The files of whose code each path spends its instructions; of the diagnosis all of it, and not the filter alone.
-fn print_shares() -> Result<(), Failure> {
+fn print_shares() -> Result<(), Error> {
     valgrind()?;
     let program = with_lines()?;
     for path in &PATHS {
@@ -128,11 +128,7 @@ fn print_shares() -> Result<(), Failure> {
 }
 
 /// Runs a path under callgrind, counting in one function or all over; the profile, and what the program printed.
-fn profiled(
-    program: &Path,
-    arguments: &[&str],
-    function: Option<&str>,
-) -> Result<(PathBuf, String), Failure> {
+fn profiled(program: &Path, arguments: &[&str], function: Option<&str>) -> Result<(PathBuf, String), Error> {
     let profile = shell::target().join(format!("callgrind.{}", arguments.join("-")));
     let mut valgrind = Command::new("valgrind");
     valgrind.args(["--tool=callgrind", "--quiet"]);
@@ -144,16 +140,16 @@ fn profiled(
 }
 
 /// Instructions of one time that a path is gone.
-fn count(program: &Path, path: &HotPath) -> Result<f64, Failure> {
+fn count(program: &Path, path: &HotPath) -> Result<f64, Error> {
     let (profile, printed) = profiled(program, &[path.name], Some(path.function))?;
     let text = fs::read_to_string(&profile)
-        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", profile.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be read: {error}", profile.display())))?;
     let times = times(&printed).unwrap_or_else(|| calls(&text, path.function));
     let total = total(&text).unwrap_or(0.0);
     if total > 0.0 && times > 0.0 {
         return Ok(total / times);
     }
-    Err(Failure::new(format!(
+    Err(Error::new(format!(
         "callgrind saw no call of {}: if it has another name now, write that in xtask/src/counts.rs",
         path.function
     )))
@@ -189,10 +185,10 @@ fn calls(profile: &str, function: &str) -> f64 {
 }
 
 /// The counts that are written down.
-fn written() -> Result<Counts, Failure> {
+fn written() -> Result<Counts, Error> {
     let file = file();
     let text = fs::read_to_string(&file)
-        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", file.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be read: {error}", file.display())))?;
     Ok(read(&text))
 }
 
@@ -210,7 +206,7 @@ fn text(counts: &Counts) -> String {
 }
 
 /// Fails where a count is over its own by more than [`MORE`], or is not written down.
-fn compare(counted: &Counts, written: &Counts) -> Result<(), Failure> {
+fn compare(counted: &Counts, written: &Counts) -> Result<(), Error> {
     let mut wrong = vec![];
     for (name, now) in counted {
         match written.get(name) {
@@ -228,7 +224,7 @@ fn compare(counted: &Counts, written: &Counts) -> Result<(), Failure> {
     if wrong.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(format!(
+    Err(Error::new(format!(
         "{}; find what it pays for, or accept it with `cargo xtask counts {RENEW}`",
         wrong.join("; ")
     )))

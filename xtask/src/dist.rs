@@ -2,7 +2,7 @@
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::{dfu, firmware, python, setup};
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use std::process::Command;
 const BUILD: &str = "NEEDLE_BUILD";
 
 /// `cargo xtask dist`.
-pub(crate) fn run() -> Result<(), Failure> {
+pub(crate) fn run() -> Result<(), Error> {
     let build = commit()?;
     let folder = shell::target().join("dist");
     fs::create_dir_all(&folder).map_err(|error| unwritable(&folder, &error))?;
@@ -35,18 +35,16 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 /// The first eight digits of the commit's hash, with a `+` if the sources differ from it.
-fn commit() -> Result<String, Failure> {
+fn commit() -> Result<String, Error> {
     let git = |arguments: &[&str]| {
         Command::new("git").args(arguments).current_dir(shell::top()).output().map_err(|error| {
-            Failure::new(format!(
-                "git could not be started: {error}; install it, the images name their commit"
-            ))
+            Error::new(format!("git could not be started: {error}; install it, the images name their commit"))
         })
     };
     let hash = git(&["rev-parse", "HEAD"])?;
     let text = String::from_utf8_lossy(&hash.stdout);
     let Some(hash) = text.get(..8).filter(|_| hash.status.success()) else {
-        return Err(Failure::new(
+        return Err(Error::new(
             "this is not a git checkout: clone the repository, the images name their commit",
         ));
     };
@@ -55,7 +53,7 @@ fn commit() -> Result<String, Failure> {
 }
 
 /// Writes the images of a board. Returns their names and sizes.
-fn images(board: &Board, folder: &Path) -> Result<Vec<(String, usize)>, Failure> {
+fn images(board: &Board, folder: &Path) -> Result<Vec<(String, usize)>, Error> {
     let built = firmware::build(board)?;
     let elf = fs::read(&built).map_err(|error| unreadable(&built, &error))?;
     let (start, bin) = Elf::read(&built)?.flash_image()?;
@@ -66,7 +64,7 @@ fn images(board: &Board, folder: &Path) -> Result<Vec<(String, usize)>, Failure>
 }
 
 /// Builds the Python package. Returns its name and size.
-fn wheel(folder: &Path) -> Result<(String, usize), Failure> {
+fn wheel(folder: &Path) -> Result<(String, usize), Error> {
     let python = setup::python(&["maturin==1.16.0"])?;
     let wheel = python::wheel(&python, folder)?;
     let bytes = fs::metadata(&wheel).map_err(|error| unreadable(&wheel, &error))?.len();
@@ -75,7 +73,7 @@ fn wheel(folder: &Path) -> Result<(String, usize), Failure> {
 }
 
 /// Builds the program for the PC and writes it without its symbols. Returns its name and size.
-fn program(folder: &Path) -> Result<(String, usize), Failure> {
+fn program(folder: &Path) -> Result<(String, usize), Error> {
     let name = format!("host-sim{}", std::env::consts::EXE_SUFFIX);
     shell::run(
         shell::cargo()
@@ -89,16 +87,16 @@ fn program(folder: &Path) -> Result<(String, usize), Failure> {
     Ok((name, bytes.len()))
 }
 
-fn write(folder: &Path, name: String, bytes: &[u8]) -> Result<(String, usize), Failure> {
+fn write(folder: &Path, name: String, bytes: &[u8]) -> Result<(String, usize), Error> {
     let path = folder.join(&name);
     fs::write(&path, bytes).map_err(|error| unwritable(&path, &error))?;
     Ok((name, bytes.len()))
 }
 
-fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(format!("{} cannot be written: {error}", path.display()))
+fn unwritable(path: &Path, error: &std::io::Error) -> Error {
+    Error::new(format!("{} cannot be written: {error}", path.display()))
 }
 
-fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(format!("{} cannot be read: {error}", path.display()))
+fn unreadable(path: &Path, error: &std::io::Error) -> Error {
+    Error::new(format!("{} cannot be read: {error}", path.display()))
 }

@@ -1,6 +1,6 @@
 //! As much of a 32-bit little-endian ELF file as flashing and measuring need.
 
-use crate::shell::Failure;
+use crate::shell::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -38,9 +38,9 @@ const FUNCTION: u8 = 2;
 
 impl Elf {
     /// Reads `path`.
-    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         let bytes = fs::read(path).map_err(|error| {
-            Failure::new(format!(
+            Error::new(format!(
                 "{} cannot be read: {error}; `cargo xtask firmware` builds it",
                 path.display()
             ))
@@ -50,27 +50,27 @@ impl Elf {
         if elf.bytes.get(..6) == Some(&[0x7F, b'E', b'L', b'F', 1, 1]) { Ok(elf) } else { Err(elf.broken()) }
     }
 
-    fn broken(&self) -> Failure {
-        Failure::new(format!("{} is not an image for the board; build it again", self.path.display()))
+    fn broken(&self) -> Error {
+        Error::new(format!("{} is not an image for the board; build it again", self.path.display()))
     }
 
-    fn slice(&self, offset: u32, size: u32) -> Result<&[u8], Failure> {
+    fn slice(&self, offset: u32, size: u32) -> Result<&[u8], Error> {
         let (offset, size) = (offset as usize, size as usize);
         self.bytes.get(offset..offset.saturating_add(size)).ok_or_else(|| self.broken())
     }
 
-    fn word(&self, offset: u32) -> Result<u32, Failure> {
+    fn word(&self, offset: u32) -> Result<u32, Error> {
         let bytes = self.slice(offset, 4)?;
         bytes.try_into().map(u32::from_le_bytes).map_err(|_| self.broken())
     }
 
-    fn half(&self, offset: u32) -> Result<u32, Failure> {
+    fn half(&self, offset: u32) -> Result<u32, Error> {
         let bytes = self.slice(offset, 2)?;
         bytes.try_into().map(|bytes| u16::from_le_bytes(bytes).into()).map_err(|_| self.broken())
     }
 
     /// Returns the segments that are loaded.
-    pub(crate) fn segments(&self) -> Result<Vec<Segment>, Failure> {
+    pub(crate) fn segments(&self) -> Result<Vec<Segment>, Error> {
         let (table, size, count) = (self.word(28)?, self.half(42)?, self.half(44)?);
         let mut segments = vec![];
         for index in 0..count {
@@ -89,12 +89,12 @@ impl Elf {
     }
 
     /// Returns the bytes of `segment`.
-    pub(crate) fn contents(&self, segment: &Segment) -> Result<&[u8], Failure> {
+    pub(crate) fn contents(&self, segment: &Segment) -> Result<&[u8], Error> {
         self.slice(segment.offset, segment.file_size)
     }
 
     /// Every symbol that has a name.
-    pub(crate) fn symbols(&self) -> Result<Vec<Symbol>, Failure> {
+    pub(crate) fn symbols(&self) -> Result<Vec<Symbol>, Error> {
         let (table, size, count) = (self.word(32)?, self.half(46)?, self.half(48)?);
         let mut symbols = vec![];
         for index in 0..count {
@@ -123,14 +123,14 @@ impl Elf {
         Ok(symbols)
     }
 
-    fn text(&self, offset: u32) -> Result<String, Failure> {
+    fn text(&self, offset: u32) -> Result<String, Error> {
         let rest = self.bytes.get(offset as usize..).ok_or_else(|| self.broken())?;
         let text = rest.split(|&byte| byte == 0).next().unwrap_or_default();
         Ok(String::from_utf8_lossy(text).into_owned())
     }
 
     /// The image as it lies in flash, from its first byte to its last; gaps are as erased flash.
-    pub(crate) fn flash_image(&self) -> Result<(u32, Vec<u8>), Failure> {
+    pub(crate) fn flash_image(&self) -> Result<(u32, Vec<u8>), Error> {
         let segments: Vec<Segment> =
             self.segments()?.into_iter().filter(|segment| segment.file_size > 0).collect();
         let start = segments.iter().map(|segment| segment.load_address).min().ok_or_else(|| self.broken())?;

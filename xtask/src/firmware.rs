@@ -3,7 +3,7 @@
 use crate::boards::{self, Board};
 use crate::elf::Elf;
 use crate::setup::{self, TARGET};
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::stack;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ pub(crate) fn arguments(board: &Board) -> [&str; 9] {
 }
 
 /// Builds the image; its path.
-pub(crate) fn build(board: &Board) -> Result<PathBuf, Failure> {
+pub(crate) fn build(board: &Board) -> Result<PathBuf, Error> {
     let cargo = || shell::run(setup::cargo_for_board(setup::toolchain()?, "build").args(arguments(board)));
     let image = path(board);
     if board.is_default() {
@@ -51,14 +51,14 @@ pub(crate) fn build(board: &Board) -> Result<PathBuf, Failure> {
     built.map(|()| image)
 }
 
-fn moved(from: &Path, to: &Path) -> Result<(), Failure> {
+fn moved(from: &Path, to: &Path) -> Result<(), Error> {
     fs::rename(from, to).map_err(|error| {
-        Failure::new(format!("{} cannot be moved to {}: {error}", from.display(), to.display()))
+        Error::new(format!("{} cannot be moved to {}: {error}", from.display(), to.display()))
     })
 }
 
 /// Prints path, flash, RAM and worst stack use; refuses an image that is too large or whose stack may not suffice.
-pub(crate) fn report(board: &Board, path: &Path) -> Result<(), Failure> {
+pub(crate) fn report(board: &Board, path: &Path) -> Result<(), Error> {
     let elf = Elf::read(path)?;
     let (_, image) = elf.flash_image()?;
     let flash = image.len() as u32;
@@ -73,12 +73,12 @@ pub(crate) fn report(board: &Board, path: &Path) -> Result<(), Failure> {
     );
     print!("{stack}");
     if flash > LARGEST_FLASH {
-        return Err(Failure::new(format!(
+        return Err(Error::new(format!(
             "the image takes {flash} bytes of flash and may take {LARGEST_FLASH}; make it smaller"
         )));
     }
     if stack.worst() > stack.room {
-        return Err(Failure::new(format!(
+        return Err(Error::new(format!(
             "the stack may need {} bytes and has {}; make it larger in the board's memory.x",
             stack.worst(),
             stack.room

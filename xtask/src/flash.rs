@@ -2,7 +2,7 @@
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::{firmware, setup};
 use std::fs;
 use std::process::Command;
@@ -11,25 +11,25 @@ use std::process::Command;
 const BOOTLOADER: &str = "0483:df11";
 
 /// `cargo xtask flash [--board NAME] [--dfu]`.
-pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
     let (board, rest) = boards::chosen(arguments)?;
     match &rest[..] {
         [] => by_probe(board),
         [flag] if flag == "--dfu" && board.has_dfu => by_usb(board),
-        [flag] if flag == "--dfu" => Err(Failure::usage(format!(
+        [flag] if flag == "--dfu" => Err(Error::usage(format!(
             "the {} is flashed through the debug probe on it; leave --dfu out",
             board.title
         ))),
-        [other, ..] => Err(Failure::usage(format!(
+        [other, ..] => Err(Error::usage(format!(
             "`{other}` is not understood; `cargo xtask flash` takes only --board NAME and --dfu"
         ))),
     }
 }
 
-fn by_probe(board: &Board) -> Result<(), Failure> {
+fn by_probe(board: &Board) -> Result<(), Error> {
     let image = firmware::build(board)?;
     if !shell::is_on_path("probe-rs") {
-        return Err(Failure::new(
+        return Err(Error::new(
             "flashing needs probe-rs, which is not on the PATH; install it with `cargo install probe-rs-tools --locked`, or \
              flash without a probe with `cargo xtask flash --dfu`",
         ));
@@ -38,12 +38,12 @@ fn by_probe(board: &Board) -> Result<(), Failure> {
     shell::run(Command::new("probe-rs").args(["reset", "--chip", board.chip]))
 }
 
-fn by_usb(board: &Board) -> Result<(), Failure> {
+fn by_usb(board: &Board) -> Result<(), Error> {
     let elf = firmware::build(board)?;
     let (start, bytes) = Elf::read(&elf)?.flash_image()?;
     let image = elf.with_extension("bin");
     fs::write(&image, bytes)
-        .map_err(|error| Failure::new(format!("{} cannot be written: {error}", image.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be written: {error}", image.display())))?;
     println!(
         "Flashing over USB, without a probe (torque is off as long as the bootloader runs):\n\
          1. connect BOOT0 to VDD (two pins side by side on header P2) and press the black reset button;\n\
@@ -58,6 +58,6 @@ fn by_usb(board: &Board) -> Result<(), Failure> {
     let place = format!("{start:#010x}:leave");
     shell::run(Command::new("dfu-util").args(["-a", "0", "-d", BOOTLOADER, "-s", &place, "-D"]).arg(&image))
         .map_err(|_| {
-            Failure::new("dfu-util did not reach the bootloader; check the BOOT0 connection, the cable and step 1, and run it again")
+            Error::new("dfu-util did not reach the bootloader; check the BOOT0 connection, the cable and step 1, and run it again")
         })
 }

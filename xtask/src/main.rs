@@ -28,7 +28,7 @@ mod words;
 mod workspace_build;
 
 use boards::Board;
-use shell::Failure;
+use shell::Error;
 use std::process::ExitCode;
 
 const HELP: &str = "\
@@ -80,48 +80,48 @@ fn main() -> ExitCode {
         "bench" => bench::run(rest),
         "counts" => counts::run(rest),
         other => {
-            Err(Failure::usage(format!("`{other}` is not a command of xtask; `cargo xtask help` lists them")))
+            Err(Error::usage(format!("`{other}` is not a command of xtask; `cargo xtask help` lists them")))
         }
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("error: {failure}");
-            ExitCode::from(failure.status)
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.status)
         }
     }
 }
 
-fn help() -> Result<(), Failure> {
+fn help() -> Result<(), Error> {
     println!("{HELP}");
     Ok(())
 }
 
 /// Refuses arguments that a chore does not take.
-fn no_more(rest: &[String]) -> Result<(), Failure> {
+fn no_more(rest: &[String]) -> Result<(), Error> {
     match rest.first() {
         None => Ok(()),
-        Some(extra) => Err(Failure::usage(format!("unexpected argument `{extra}`; see `cargo xtask help`"))),
+        Some(extra) => Err(Error::usage(format!("unexpected argument `{extra}`; see `cargo xtask help`"))),
     }
 }
 
 /// Does a chore that takes a board and nothing else.
-fn for_board(rest: &[String], chore: impl Fn(&Board) -> Result<(), Failure>) -> Result<(), Failure> {
+fn for_board(rest: &[String], chore: impl Fn(&Board) -> Result<(), Error>) -> Result<(), Error> {
     let (board, rest) = boards::chosen(rest)?;
     no_more(&rest)?;
     chore(board)
 }
 
-fn prove(rest: &[String]) -> Result<(), Failure> {
+fn prove(rest: &[String]) -> Result<(), Error> {
     let status = shell::cargo()
         .args(["run", "--release", "--ignore-rust-version", "--quiet", "-p", "proof", "--bin", "prove", "--"])
         .args(rest)
         .status()
-        .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
+        .map_err(|error| Error::new(format!("cargo could not be started: {error}")))?;
     match status.code() {
         Some(0) => Ok(()),
         // The proof has said why; 2 is unusable input.
-        Some(2) => Err(Failure::usage("the proof did not understand its flags")),
-        _ => Err(Failure::new("the proof did not pass")),
+        Some(2) => Err(Error::usage("the proof did not understand its flags")),
+        _ => Err(Error::new("the proof did not pass")),
     }
 }

@@ -1,7 +1,7 @@
 //! `cargo xtask mutants`: changes the code a thousand times in small ways and sees that the tests notice. By hand, for it takes
 //! about half an hour; what may survive, and why, stands in `tests/mutants.md`.
 
-use crate::shell::{self, Failure, cargo};
+use crate::shell::{self, Error, cargo};
 use std::fs;
 use std::path::Path;
 
@@ -34,15 +34,15 @@ struct Tally {
 }
 
 /// Mutates the crates named, or all of them.
-pub(crate) fn run(names: &[String]) -> Result<(), Failure> {
+pub(crate) fn run(names: &[String]) -> Result<(), Error> {
     if let Some(unknown) = names.iter().find(|name| CRATES.iter().all(|(known, _)| known != name)) {
-        return Err(Failure::usage(format!(
+        return Err(Error::usage(format!(
             "`{unknown}` is not mutated; these are: {}",
             CRATES.map(|(name, _)| name).join(" ")
         )));
     }
     if !shell::is_on_path("cargo-mutants") {
-        return Err(Failure::new(
+        return Err(Error::new(
             "cargo-mutants is not on the PATH; install it with `cargo install cargo-mutants --locked`",
         ));
     }
@@ -66,10 +66,10 @@ fn said(tally: &Tally) -> String {
     format!("{caught} caught, {} survived, {unviable} did not build: {share:.1} % caught", survivors.len())
 }
 
-fn mutate(name: &str, board_only: &[&str]) -> Result<Tally, Failure> {
+fn mutate(name: &str, board_only: &[&str]) -> Result<Tally, Error> {
     let folder = shell::target().join("mutants").join(name);
     fs::create_dir_all(&folder)
-        .map_err(|error| Failure::new(format!("{} cannot be made: {error}", folder.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be made: {error}", folder.display())))?;
     let mut command = cargo();
     command.args(["mutants", "--package", name, "--profile", "mutants", "--baseline", "skip"]);
     command.args(["--timeout", LIMIT_S, "--no-shuffle", "--output"]).arg(&folder);
@@ -87,9 +87,9 @@ fn mutate(name: &str, board_only: &[&str]) -> Result<Tally, Failure> {
     Ok(Tally { caught, unviable: list("unviable")?.len(), survivors })
 }
 
-fn lines(path: &Path) -> Result<Vec<String>, Failure> {
+fn lines(path: &Path) -> Result<Vec<String>, Error> {
     let text = fs::read_to_string(path)
-        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be read: {error}", path.display())))?;
     Ok(text.lines().map(str::to_string).collect())
 }
 
@@ -103,18 +103,18 @@ fn without_place(mutant: &str) -> String {
 }
 
 /// Enough are caught, and every survivor has its reason.
-fn judge(all: &Tally) -> Result<(), Failure> {
+fn judge(all: &Tally) -> Result<(), Error> {
     let reasons = lines(&shell::top().join("tests/mutants.md"))?.join("\n");
     let unexplained: Vec<&String> =
         all.survivors.iter().filter(|survivor| !reasons.contains(&format!("`{survivor}`"))).collect();
     unexplained.iter().for_each(|survivor| println!("no reason given for: {survivor}"));
     if 100 * all.caught < CAUGHT_AT_LEAST * (all.caught + all.survivors.len()) {
-        return Err(Failure::new(format!("fewer than {CAUGHT_AT_LEAST} % of the mutants were caught")));
+        return Err(Error::new(format!("fewer than {CAUGHT_AT_LEAST} % of the mutants were caught")));
     }
     if unexplained.is_empty() {
         Ok(())
     } else {
-        Err(Failure::new(format!("{} survivors have no reason in tests/mutants.md", unexplained.len())))
+        Err(Error::new(format!("{} survivors have no reason in tests/mutants.md", unexplained.len())))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The programs that a machine needs beyond Rust: named, then installed where that is allowed, else the one command that does it.
 
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,7 +19,7 @@ fn is_root() -> bool {
 
 /// Fails where the disk that cargo builds on has less than `needed_mib` left beside what the target folder holds already. A machine
 /// without `df` passes.
-pub(crate) fn disk(needed_mib: u64) -> Result<(), Failure> {
+pub(crate) fn disk(needed_mib: u64) -> Result<(), Error> {
     let target = shell::target();
     let folder = if target.is_dir() { target.clone() } else { shell::top() };
     let mib = |program: &str, flags: &[&str], row: usize, column: usize| -> Option<u64> {
@@ -32,17 +32,17 @@ pub(crate) fn disk(needed_mib: u64) -> Result<(), Failure> {
     if free + built >= needed_mib {
         return Ok(());
     }
-    Err(Failure::new(format!(
+    Err(Error::new(format!(
         "{} has {free} MiB free and the tests write {needed_mib} MiB; free some, or set CARGO_TARGET_DIR to a folder on another disk",
         folder.display()
     )))
 }
 
 /// Installs Debian packages, or says the command that does.
-pub(crate) fn install(packages: &[&str], what_for: &str) -> Result<(), Failure> {
+pub(crate) fn install(packages: &[&str], what_for: &str) -> Result<(), Error> {
     let list = packages.join(" ");
     if !is_root() || !shell::is_on_path("apt-get") {
-        return Err(Failure::new(format!(
+        return Err(Error::new(format!(
             "{what_for} needs {list}; install it with `sudo apt-get update && sudo apt-get install -y {list}`"
         )));
     }
@@ -58,7 +58,7 @@ pub(crate) fn install(packages: &[&str], what_for: &str) -> Result<(), Failure> 
 }
 
 /// The browser that the page is tested in.
-pub(crate) fn browser() -> Result<(), Failure> {
+pub(crate) fn browser() -> Result<(), Error> {
     if ["chromium", "chromium-browser", "google-chrome"].into_iter().any(shell::is_on_path) {
         return Ok(());
     }
@@ -66,7 +66,7 @@ pub(crate) fn browser() -> Result<(), Failure> {
 }
 
 /// A Python of our own in `target/`, with exactly these packages (`name==version`) beside what it already has; its interpreter.
-pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Failure> {
+pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Error> {
     let folder = shell::target().join("python");
     let interpreter = folder.join("bin/python");
     if !interpreter.exists() {
@@ -94,7 +94,7 @@ pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Failure> {
 }
 
 /// Packages for node in `target/node`, exactly these (`name@version`) and what they need; the folder for `NODE_PATH`.
-pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Failure> {
+pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Error> {
     node()?;
     let folder = shell::target().join("node");
     let modules = folder.join("node_modules");
@@ -116,7 +116,7 @@ pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Failure> {
 }
 
 /// Makes sure of Node.js, which runs WebAssembly without a browser.
-pub(crate) fn node() -> Result<(), Failure> {
+pub(crate) fn node() -> Result<(), Error> {
     if shell::is_on_path("node") {
         Ok(())
     } else {
@@ -125,7 +125,7 @@ pub(crate) fn node() -> Result<(), Failure> {
 }
 
 /// Makes sure of Mono, which compiles and runs C#: Debian has it, and no registry that CI reaches has .NET.
-pub(crate) fn mono() -> Result<(), Failure> {
+pub(crate) fn mono() -> Result<(), Error> {
     if ["mcs", "mono"].into_iter().all(shell::is_on_path) {
         return Ok(());
     }
@@ -152,12 +152,12 @@ const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "r
 const DEBIAN_LINKER: &str = "/usr/bin/rust-lld";
 
 /// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's compiler.
-pub(crate) fn toolchain() -> Result<Toolchain, Failure> {
+pub(crate) fn toolchain() -> Result<Toolchain, Error> {
     toolchain_for(TARGET, "the image for the board")
 }
 
 /// The same for any `target`; `what_for` says who needs it.
-pub(crate) fn toolchain_for(target: &str, what_for: &str) -> Result<Toolchain, Failure> {
+pub(crate) fn toolchain_for(target: &str, what_for: &str) -> Result<Toolchain, Error> {
     if has_target(target) {
         return Ok(Toolchain::Installed);
     }
@@ -179,7 +179,7 @@ pub(crate) fn toolchain_for(target: &str, what_for: &str) -> Result<Toolchain, F
     if has_debian_compiler() {
         Ok(Toolchain::Debian)
     } else {
-        Err(Failure::new(format!(
+        Err(Error::new(format!(
             "there is no way to build {what_for} on this machine; install the target with `rustup target add {target}`"
         )))
     }

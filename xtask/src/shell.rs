@@ -6,15 +6,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A chore's failure: its reason in one sentence, and the exit status.
+/// A chore's error: its reason in one sentence, and the exit status.
 #[derive(Debug)]
-pub(crate) struct Failure {
+pub(crate) struct Error {
     what: String,
     /// 1: what was to be done failed; 2: unusable input.
     pub(crate) status: u8,
 }
 
-impl Failure {
+impl Error {
     /// Something did not work out.
     pub(crate) fn new(what: impl Into<String>) -> Self {
         Self { what: what.into(), status: 1 }
@@ -26,7 +26,7 @@ impl Failure {
     }
 }
 
-impl fmt::Display for Failure {
+impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)
     }
@@ -68,28 +68,24 @@ pub(crate) fn is_on_path(program: &str) -> bool {
 }
 
 /// Runs `command`, says it first, and fails where it fails.
-pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
+pub(crate) fn run(command: &mut Command) -> Result<(), Error> {
     eprintln!("$ {}", said(command));
     let status = command.status().map_err(|error| could_not_start(command, &error))?;
-    if status.success() {
-        Ok(())
-    } else {
-        Err(Failure::new(format!("`{}` failed ({status})", said(command))))
-    }
+    if status.success() { Ok(()) } else { Err(Error::new(format!("`{}` failed ({status})", said(command)))) }
 }
 
 /// Runs `command` and gives what it printed; its standard error goes to ours.
-pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
+pub(crate) fn output(command: &mut Command) -> Result<String, Error> {
     let output =
         command.stderr(Stdio::inherit()).output().map_err(|error| could_not_start(command, &error))?;
     if !output.status.success() {
-        return Err(Failure::new(format!("`{}` failed ({})", said(command), output.status)));
+        return Err(Error::new(format!("`{}` failed ({})", said(command), output.status)));
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-fn could_not_start(command: &Command, error: &std::io::Error) -> Failure {
-    Failure::new(format!("`{}` could not be started: {error}", command.get_program().display()))
+fn could_not_start(command: &Command, error: &std::io::Error) -> Error {
+    Error::new(format!("`{}` could not be started: {error}", command.get_program().display()))
 }
 
 /// The command as a person would type it.

@@ -3,7 +3,7 @@
 //! both lie in the page as text. `board.html` beside it is the page of a real board, over WebSerial.
 
 use crate::setup;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::wasm;
 use crate::workspace_build::built;
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ const BOARD_SHARES: [&str; 2] = ["guide_steps.js", "bytes.js"];
 const COMPARED: [(&str, &str); 2] = [("adult", "80000"), ("firm-skin", "80000")];
 
 /// Builds the site into `target/site`; its page.
-pub(crate) fn build() -> Result<PathBuf, Failure> {
+pub(crate) fn build() -> Result<PathBuf, Error> {
     let device = wasm::build_crate("site-wasm")?;
     let board = wasm::build_crate("board-wasm")?;
     let top = shell::top();
@@ -54,7 +54,7 @@ pub(crate) fn build() -> Result<PathBuf, Failure> {
 }
 
 /// A module that holds binary files as text.
-fn binaries(files: &[(&str, &Path)]) -> Result<String, Failure> {
+fn binaries(files: &[(&str, &Path)]) -> Result<String, Error> {
     let mut module = String::from("export const files = {\n");
     for (name, path) in files {
         let _ = writeln!(module, "  \"{name}\": \"{}\",", base64(&read(path)?));
@@ -69,18 +69,18 @@ fn write_page(
     page: &Path,
     first: &str,
     modules: &BTreeMap<String, String>,
-) -> Result<(), Failure> {
+) -> Result<(), Error> {
     let line = format!(r#"<script type="module" src="{first}"></script>"#);
     let text = String::from_utf8_lossy(&read(page)?).into_owned();
     if !text.contains(&line) {
-        return Err(Failure::new(format!("{} does not start {first} by `{line}`", page.display())));
+        return Err(Error::new(format!("{} does not start {first} by `{line}`", page.display())));
     }
     let name = page.file_name().unwrap_or_default().to_string_lossy();
     write(site, &name, text.replacen(&line, &starts(modules, first), 1).as_bytes())
 }
 
 /// Builds it and says where it is.
-pub(crate) fn run() -> Result<(), Failure> {
+pub(crate) fn run() -> Result<(), Error> {
     let page = build()?;
     println!("{} opens in a browser as it is, or from any web server", page.display());
     println!("another patient: add ?profile=firm-skin to its address");
@@ -92,7 +92,7 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 /// Checks that the device in the browser gives the same bits as host-sim's.
-pub(crate) fn check() -> Result<(), Failure> {
+pub(crate) fn check() -> Result<(), Error> {
     setup::node()?;
     let device = wasm::build_crate("site-wasm")?;
     let program = built(&["--example", "device_digest"], "examples/device_digest")?;
@@ -104,7 +104,7 @@ pub(crate) fn check() -> Result<(), Failure> {
         )?;
         eprintln!("{profile}: {} natively, {} as WebAssembly", native.trim(), browser.trim());
         if native.trim() != browser.trim() {
-            return Err(Failure::new(format!(
+            return Err(Error::new(format!(
                 "profile {profile}: the device in a browser sends other bytes within {ticks} ticks than host-sim's"
             )));
         }
@@ -113,9 +113,9 @@ pub(crate) fn check() -> Result<(), Failure> {
 }
 
 /// The modules of a folder by their names, importing each other by name alone.
-fn scripts(folder: &Path) -> Result<BTreeMap<String, String>, Failure> {
+fn scripts(folder: &Path) -> Result<BTreeMap<String, String>, Error> {
     let cannot =
-        |error: &dyn std::fmt::Display| Failure::new(format!("{} cannot be read: {error}", folder.display()));
+        |error: &dyn std::fmt::Display| Error::new(format!("{} cannot be read: {error}", folder.display()));
     let mut modules = BTreeMap::new();
     for entry in fs::read_dir(folder).map_err(|error| cannot(&error))?.flatten() {
         let path = entry.path();
@@ -159,13 +159,13 @@ fn base64(bytes: &[u8]) -> String {
     text
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|error| Error::new(format!("{} cannot be read: {error}", path.display())))
 }
 
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
     let cannot = |error: std::io::Error| {
-        Failure::new(format!("{name} cannot be written to {}: {error}", folder.display()))
+        Error::new(format!("{name} cannot be written to {}: {error}", folder.display()))
     };
     fs::create_dir_all(folder).map_err(cannot)?;
     fs::write(folder.join(name), bytes).map_err(cannot)

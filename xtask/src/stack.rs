@@ -8,7 +8,7 @@
 mod thumb;
 
 use crate::elf::Elf;
-use crate::shell::Failure;
+use crate::shell::Error;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use thumb::{Body, Code};
@@ -64,11 +64,11 @@ impl fmt::Display for Stack {
 }
 
 /// Analyses the image.
-pub(crate) fn analyse(elf: &Elf) -> Result<Stack, Failure> {
+pub(crate) fn analyse(elf: &Elf) -> Result<Stack, Error> {
     let symbols = elf.symbols()?;
     let place = |name: &str| {
         symbols.iter().find(|symbol| symbol.name == name).map(|symbol| symbol.value).ok_or_else(|| {
-            Failure::new(format!("the image has no symbol {name}; build it with `cargo xtask firmware`"))
+            Error::new(format!("the image has no symbol {name}; build it with `cargo xtask firmware`"))
         })
     };
     let room = place("_stack_start")? - place("_stack_end")?;

@@ -2,7 +2,7 @@
 
 use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
-use crate::shell::{self, Failure, cargo};
+use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, built};
 use crate::{arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub(crate) struct Step {
     pub(crate) shows: &'static str,
     /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
     pub(crate) bound_s: f64,
-    pub(crate) run: fn() -> Result<(), Failure>,
+    pub(crate) run: fn() -> Result<(), Error>,
 }
 
 /// In the order that finds the most for the least time.
@@ -65,31 +65,26 @@ pub(crate) const NIGHTLY: [Step; 8] = [
     step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),
 ];
 
-const fn step(
-    name: &'static str,
-    shows: &'static str,
-    bound_s: f64,
-    run: fn() -> Result<(), Failure>,
-) -> Step {
+const fn step(name: &'static str, shows: &'static str, bound_s: f64, run: fn() -> Result<(), Error>) -> Step {
     Step { name, shows, bound_s, run }
 }
 
-fn fmt() -> Result<(), Failure> {
+fn fmt() -> Result<(), Error> {
     shell::run(cargo().args(["fmt", "--all", "--check"]))
 }
 
-fn clippy() -> Result<(), Failure> {
+fn clippy() -> Result<(), Error> {
     shell::run(cargo().arg("clippy").args(BUILD).args(["--all-targets", "--", "-D", "warnings"]))
 }
 
-fn doc() -> Result<(), Failure> {
+fn doc() -> Result<(), Error> {
     let mut build = cargo();
     build.env("RUSTDOCFLAGS", "-D warnings");
     shell::run(build.arg("doc").args(BUILD).arg("--no-deps"))?;
     shell::run(cargo().arg("test").args(BUILD).args(["--doc", "--quiet"]))
 }
 
-fn unit() -> Result<(), Failure> {
+fn unit() -> Result<(), Error> {
     if has_nextest() {
         // Built with what the other steps run, so that they find it.
         return shell::run(tests().args(["-E", "not package(tests)"]));
@@ -97,12 +92,12 @@ fn unit() -> Result<(), Failure> {
     shell::run(tests().args(["--exclude", "tests"]))
 }
 
-fn libraries() -> Result<(), Failure> {
+fn libraries() -> Result<(), Error> {
     shell::run(tests().arg("--lib"))
 }
 
 /// The tests that say why they run at night.
-fn slow() -> Result<(), Failure> {
+fn slow() -> Result<(), Error> {
     for board in &boards::ALL {
         firmware::build(board)?;
     }
@@ -113,11 +108,11 @@ fn slow() -> Result<(), Failure> {
 }
 
 /// The image of every board, and the same warnings for it as for everything else.
-fn image() -> Result<(), Failure> {
+fn image() -> Result<(), Error> {
     boards::ALL.iter().try_for_each(image_of)
 }
 
-fn image_of(board: &Board) -> Result<(), Failure> {
+fn image_of(board: &Board) -> Result<(), Error> {
     firmware::report(board, &firmware::build(board)?)?;
     let toolchain = setup::toolchain()?;
     if toolchain == Toolchain::Debian {
@@ -129,16 +124,16 @@ fn image_of(board: &Board) -> Result<(), Failure> {
     shell::run(clippy.args(["--", "-D", "warnings"]))
 }
 
-fn page_wasm() -> Result<(), Failure> {
+fn page_wasm() -> Result<(), Error> {
     eprintln!("checked {}", wasm::check()?);
     Ok(())
 }
 
-fn same_bits() -> Result<(), Failure> {
+fn same_bits() -> Result<(), Error> {
     site::check()
 }
 
-fn board() -> Result<(), Failure> {
+fn board() -> Result<(), Error> {
     // The tests find the other boards' beside the default one's.
     for board in &boards::ALL {
         firmware::build(board)?;
@@ -157,7 +152,7 @@ fn board() -> Result<(), Failure> {
 /// used by the tests only and are no part of any product.
 const IN_PAGES: [&str; 2] = ["axe-core@4.14.1", "iwer@2.5.0"];
 
-fn browser() -> Result<(), Failure> {
+fn browser() -> Result<(), Error> {
     setup::browser()?;
     setup::node_packages(&IN_PAGES)?;
     site::build()?;
@@ -179,7 +174,7 @@ const CLIENTS: [&str; 11] = [
     "maturin==1.16.0",
 ];
 
-fn clients() -> Result<(), Failure> {
+fn clients() -> Result<(), Error> {
     let python = setup::python(&CLIENTS)?;
     setup::mono()?;
     let program = built(&["--bin", "host-sim"], "host-sim")?;
@@ -198,38 +193,38 @@ fn clients() -> Result<(), Failure> {
     shell::run(Command::new(&python).args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(tests))
 }
 
-fn fuzz() -> Result<(), Failure> {
+fn fuzz() -> Result<(), Error> {
     fuzz_for(FUZZ_SECONDS)
 }
 
-fn soak() -> Result<(), Failure> {
+fn soak() -> Result<(), Error> {
     fuzz_for(LONG_FUZZ_SECONDS)
 }
 
-fn fuzz_for(seconds: &str) -> Result<(), Failure> {
+fn fuzz_for(seconds: &str) -> Result<(), Error> {
     let program = built(&["--example", "fuzz_frames"], "examples/fuzz_frames")?;
     shell::run(Command::new(program).args(["--seconds", seconds]))
 }
 
-fn prove() -> Result<(), Failure> {
+fn prove() -> Result<(), Error> {
     proof(&["--quick"])
 }
 
-fn whole_proof() -> Result<(), Failure> {
+fn whole_proof() -> Result<(), Error> {
     proof(&[])
 }
 
-fn proof(flags: &[&str]) -> Result<(), Failure> {
+fn proof(flags: &[&str]) -> Result<(), Error> {
     let program = built(&["--bin", "prove"], "prove")?;
     shell::run(Command::new(program).args(flags).current_dir(shell::top()))
 }
 
-fn mutated() -> Result<(), Failure> {
+fn mutated() -> Result<(), Error> {
     mutants::run(&[])
 }
 
 /// Separate from `unit`: fifty packages more.
-fn parquet() -> Result<(), Failure> {
+fn parquet() -> Result<(), Error> {
     let mut import = cargo();
     import.arg("test").args(BUILD).args([
         "--quiet",
@@ -244,7 +239,7 @@ fn parquet() -> Result<(), Failure> {
 }
 
 /// The tests of a class, which need a build of their own, and the measurement of thirty devices.
-fn class() -> Result<(), Failure> {
+fn class() -> Result<(), Error> {
     let features = ["--features", "host-sim/class"];
     let mut clippy = cargo();
     clippy.arg("clippy").args(BUILD).arg("--all-targets").args(features);
@@ -267,7 +262,7 @@ fn class() -> Result<(), Failure> {
 const FOXGLOVE_CLIENT: [&str; 3] = ["@foxglove/ws-protocol@0.8.0", "ws@8.23.0", "protobufjs@8.8.1"];
 
 /// Foxglove's live stream read by Foxglove's own client; needs a build of its own.
-fn foxglove() -> Result<(), Failure> {
+fn foxglove() -> Result<(), Error> {
     let modules = setup::node_packages(&FOXGLOVE_CLIENT)?;
     shell::run(cargo().args(["build", "--release", "-p", "host-sim", "--features", "foxglove", ANY_RUST]))?;
     let mut node = Command::new("node");

@@ -2,7 +2,7 @@
 //! `cargo xtask nightly`, the checks that take longer than the tests may.
 
 use crate::setup;
-use crate::shell::Failure;
+use crate::shell::Error;
 use crate::steps::{NIGHTLY, QUICK, STEPS, Step};
 use std::time::Instant;
 
@@ -20,11 +20,11 @@ const NEVER_HERE: [(&str, &str); 1] = [(
 )];
 
 /// Runs the steps named, all of them, or those of the inner loop, and reports how each ended.
-pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
     let quick = arguments.iter().any(|argument| argument == QUICK_OPTION);
     let names: Vec<&String> = arguments.iter().filter(|argument| *argument != QUICK_OPTION).collect();
     if quick && !names.is_empty() {
-        return Err(Failure::usage(format!("{QUICK_OPTION} chooses the steps itself; do not name any")));
+        return Err(Error::usage(format!("{QUICK_OPTION} chooses the steps itself; do not name any")));
     }
     let all: &[Step] = if quick { &QUICK } else { &STEPS };
     let chosen = choose(all, &names, "step of the tests")?;
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Failure> {
 }
 
 /// Runs the nightly checks named, or all of them.
-pub(crate) fn nightly(arguments: &[String]) -> Result<(), Failure> {
+pub(crate) fn nightly(arguments: &[String]) -> Result<(), Error> {
     let chosen = choose(&NIGHTLY, &arguments.iter().collect::<Vec<_>>(), "nightly check")?;
     setup::disk(NEEDED_MIB)?;
     let mut summary = Summary::default();
@@ -52,10 +52,10 @@ pub(crate) fn nightly(arguments: &[String]) -> Result<(), Failure> {
 }
 
 /// The steps of `all` that `names` lists, in their own order; all of them where it lists none.
-fn choose<'a>(all: &'a [Step], names: &[&String], what: &str) -> Result<Vec<&'a Step>, Failure> {
+fn choose<'a>(all: &'a [Step], names: &[&String], what: &str) -> Result<Vec<&'a Step>, Error> {
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|step| step.name != name.as_str())) {
         let known: Vec<&str> = all.iter().map(|step| step.name).collect();
-        return Err(Failure::usage(format!(
+        return Err(Error::usage(format!(
             "`{unknown}` is not a {what}; the known ones are: {}",
             known.join(" ")
         )));
@@ -85,16 +85,16 @@ impl Summary {
         }
     }
 
-    fn verdict(&mut self, ended: Result<(), Failure>, is_late: bool) -> String {
+    fn verdict(&mut self, ended: Result<(), Error>, is_late: bool) -> String {
         match ended {
             Ok(()) => {
                 self.passed += 1;
                 if is_late { "pass (slower than two idle cores should be)".into() } else { "pass".into() }
             }
-            Err(failure) => {
+            Err(error) => {
                 self.failed += 1;
-                eprintln!("error: {failure}");
-                format!("FAIL: {failure}")
+                eprintln!("error: {error}");
+                format!("FAIL: {error}")
             }
         }
     }
@@ -103,7 +103,7 @@ impl Summary {
         self.lines.push(format!("{name:<9}      -          not run: {why}"));
     }
 
-    fn print(&self) -> Result<(), Failure> {
+    fn print(&self) -> Result<(), Error> {
         println!("\nSummary");
         self.lines.iter().for_each(|line| println!("  {line}"));
         println!("{:.0} s in all", self.seconds);
@@ -111,7 +111,7 @@ impl Summary {
         if self.failed == 0 {
             Ok(())
         } else {
-            Err(Failure::new(format!("{} steps failed; see the summary", self.failed)))
+            Err(Error::new(format!("{} steps failed; see the summary", self.failed)))
         }
     }
 }

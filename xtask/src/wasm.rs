@@ -2,7 +2,7 @@
 //! sources it is from. `cargo xtask test wasm` checks that it is theirs.
 
 use crate::setup;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ const NOTE: &str = "host-sim/page/picture.wasm.from";
 const FEATURES: &str = "-Ctarget-feature=+simd128";
 
 /// Builds a crate for the browser; the file.
-pub(crate) fn build_crate(package: &str) -> Result<PathBuf, Failure> {
+pub(crate) fn build_crate(package: &str) -> Result<PathBuf, Error> {
     let toolchain = setup::toolchain_for(TARGET, "the page's own computing")?;
     let mut cargo = setup::cargo_with(toolchain, "build", "std,panic_abort");
     cargo.env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS", FEATURES);
@@ -29,7 +29,7 @@ pub(crate) fn build_crate(package: &str) -> Result<PathBuf, Failure> {
 }
 
 /// Builds the product anew and writes it with its note.
-pub(crate) fn run() -> Result<(), Failure> {
+pub(crate) fn run() -> Result<(), Error> {
     let built = read(&build_crate("page-wasm")?)?;
     let top = shell::top();
     write(&top.join(PRODUCT), &built)?;
@@ -41,13 +41,13 @@ pub(crate) fn run() -> Result<(), Failure> {
 /// Checks that the product is built from the sources: by its note everywhere, byte for byte where the same compiler is at hand.
 ///
 /// Returns what was checked.
-pub(crate) fn check() -> Result<&'static str, Failure> {
+pub(crate) fn check() -> Result<&'static str, Error> {
     let top = shell::top();
     let product = read(&top.join(PRODUCT))?;
     let said = String::from_utf8_lossy(&read(&top.join(NOTE))?).into_owned();
     let line = |name: &str| said.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
     if line("sources") != Some(&sources()?) || line("wasm") != Some(&hex(digest([product.as_slice()]))) {
-        return Err(Failure::new(format!(
+        return Err(Error::new(format!(
             "{PRODUCT} is not built from the sources as they are; run `cargo xtask wasm` and commit what it writes"
         )));
     }
@@ -55,30 +55,30 @@ pub(crate) fn check() -> Result<&'static str, Failure> {
         return Ok("by the hashes of its sources; there is no compiler of the same version here");
     }
     if read(&build_crate("page-wasm")?)? != product {
-        return Err(Failure::new(format!(
+        return Err(Error::new(format!(
             "{PRODUCT} differs from what its sources give here; run `cargo xtask wasm` and commit what it writes"
         )));
     }
     Ok("byte for byte")
 }
 
-fn note(built: &[u8]) -> Result<String, Failure> {
+fn note(built: &[u8]) -> Result<String, Error> {
     Ok(format!("sources {}\nwasm {}\ncompiler {}\n", sources()?, hex(digest([built])), compiler()?))
 }
 
-fn compiler() -> Result<String, Failure> {
+fn compiler() -> Result<String, Error> {
     let said = shell::output(Command::new("rustc").current_dir(shell::top()).arg("--version"))?;
     Ok(said.trim().to_string())
 }
 
 /// A hash of all that is built from, the same on every machine.
-fn sources() -> Result<String, Failure> {
+fn sources() -> Result<String, Error> {
     let top = shell::top();
     let mut files = vec![];
     for package in CRATES {
         files.push(top.join(package).join("Cargo.toml"));
         collect(&top.join(package).join("src"), &mut files)
-            .map_err(|error| Failure::new(format!("the sources of {package} cannot be read: {error}")))?;
+            .map_err(|error| Error::new(format!("the sources of {package} cannot be read: {error}")))?;
     }
     files.sort();
     let mut texts = vec![];
@@ -116,13 +116,13 @@ fn hex(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|error| Error::new(format!("{} cannot be read: {error}", path.display())))
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     fs::write(path, bytes)
-        .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))
+        .map_err(|error| Error::new(format!("{} cannot be written: {error}", path.display())))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! `tests/tests/board/wiring.rs` compares the same table with the pins that the emulated board drives, and so with the image.
 
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -23,26 +23,26 @@ const WORDS: usize = 400;
 const LINE: usize = 88;
 
 /// `cargo xtask wiring`.
-pub(crate) fn run() -> Result<(), Failure> {
+pub(crate) fn run() -> Result<(), Error> {
     for (path, svg) in drawn()? {
         fs::write(&path, svg)
-            .map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())))?;
+            .map_err(|error| Error::new(format!("{} cannot be written: {error}", path.display())))?;
         println!("{}", path.display());
     }
     Ok(())
 }
 
 /// The pictures with their paths.
-fn drawn() -> Result<Vec<(PathBuf, String)>, Failure> {
+fn drawn() -> Result<Vec<(PathBuf, String)>, Error> {
     let page = shell::top().join(PAGE);
     let text = fs::read_to_string(&page)
-        .map_err(|error| Failure::new(format!("{} cannot be read: {error}", page.display())))?;
+        .map_err(|error| Error::new(format!("{} cannot be read: {error}", page.display())))?;
     PICTURES
         .iter()
         .map(|(section, title, path)| {
             let rows = table(&text, section);
             if rows.is_empty() {
-                return Err(Failure::new(format!("{PAGE} has no table of pins under \"{section}\"")));
+                return Err(Error::new(format!("{PAGE} has no table of pins under \"{section}\"")));
             }
             Ok((shell::top().join(path), draw(title, &rows)))
         })

@@ -6,7 +6,7 @@
 mod list;
 mod prose;
 
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use list::{OPENINGS, Phrase};
 use prose::Word;
 pub(crate) use prose::code;
@@ -23,15 +23,15 @@ const LONGEST_NAME: usize = 60;
 const LIST: &str = "xtask/src/words/list.rs";
 
 /// Checks every file of the repository, prints each finding, and fails if there is one.
-pub(crate) fn check() -> Result<(), Failure> {
+pub(crate) fn check() -> Result<(), Error> {
     let mut findings = Vec::new();
     visit(&shell::top(), "", &mut findings)
-        .map_err(|error| Failure::new(format!("the sources could not be read: {error}")))?;
+        .map_err(|error| Error::new(format!("the sources could not be read: {error}")))?;
     findings.iter().for_each(|finding| eprintln!("{finding}"));
     if findings.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(format!(
+    Err(Error::new(format!(
         "{} phrases to rewrite, each printed above with what to write instead; {LIST} lists them with reasons",
         findings.len()
     )))

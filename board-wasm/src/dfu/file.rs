@@ -1,6 +1,6 @@
 //! ST's DfuSe file (UM0391), as `cargo xtask dist` writes it: one image with its address, under a checksum.
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 const PREFIX: usize = 11;
 const TARGET: usize = 274;
@@ -23,9 +23,9 @@ pub struct Image {
 
 impl Image {
     /// Reads a file of one target with one element; what is wrong with it where something is.
-    pub fn parse(file: &[u8]) -> Result<Self, Failure> {
+    pub fn parse(file: &[u8]) -> Result<Self, Error> {
         let refuse = |what: &str| {
-            Err(Failure::input(format_args!(
+            Err(Error::input(format_args!(
                 "the file is not one that cargo xtask dist writes: {what}; choose a .dfu file"
             )))
         };

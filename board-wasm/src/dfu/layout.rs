@@ -2,7 +2,7 @@
 //! `@Internal Flash  /0x08000000/04*016Kg,01*064Kg,07*128Kg`.
 
 use super::file::Image;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::ops::Range;
 
 /// The letter behind a size is 0x40 and these: erasable, writable.
@@ -23,9 +23,9 @@ struct Sector {
 
 impl Layout {
     /// Reads the name of an interface.
-    pub fn parse(name: &str) -> Result<Self, Failure> {
+    pub fn parse(name: &str) -> Result<Self, Error> {
         let refuse = || {
-            Failure::input(format_args!(
+            Error::input(format_args!(
                 "the device describes its memory as {name:?}, which is no STM32 in DFU mode; choose \"STM32 BOOTLOADER\""
             ))
         };
@@ -46,7 +46,7 @@ impl Layout {
     }
 
     /// Returns the addresses of the sectors that an image lies in, which are erased for it: no other is touched.
-    pub fn sectors_of(&self, image: &Image) -> Result<Vec<u32>, Failure> {
+    pub fn sectors_of(&self, image: &Image) -> Result<Vec<u32>, Error> {
         let start = u64::from(image.start);
         let end = start + image.bytes.len() as u64;
         let touched =
@@ -58,7 +58,7 @@ impl Layout {
             .map(|sector| sector.range.end.min(end) - sector.range.start.max(start))
             .sum();
         if held != end - start {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "the image from {start:#010x} to {end:#010x} does not fit the memory of this device; choose the file of your board"
             )));
         }

@@ -5,7 +5,7 @@ pub mod file;
 pub mod layout;
 
 use device_setup::pause::pause;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use file::Image;
 use layout::Layout;
 use serde::Serialize;
@@ -75,7 +75,7 @@ pub enum Next {
     },
 }
 
-type Dialogue = Pin<Box<dyn Future<Output = Result<(), Failure>>>>;
+type Dialogue = Pin<Box<dyn Future<Output = Result<(), Error>>>>;
 
 /// An update that is under way.
 pub struct Update {
@@ -86,7 +86,7 @@ pub struct Update {
 impl Update {
     /// Prepares to write `file`, a DfuSe file, to a bootloader that describes its memory as `memory`. Refuses what does not fit
     /// before anything is erased.
-    pub fn new(file: &[u8], memory: &str) -> Result<Self, Failure> {
+    pub fn new(file: &[u8], memory: &str) -> Result<Self, Error> {
         let image = Image::parse(file)?.in_blocks_of(BLOCK);
         let layout = Layout::parse(memory)?;
         let sectors = layout.sectors_of(&image)?;
@@ -99,7 +99,7 @@ impl Update {
     pub fn advance(&mut self) -> Next {
         match self.dialogue.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(Ok(())) => Next::Done,
-            Poll::Ready(Err(failure)) => Next::Failed { why: failure.to_string() },
+            Poll::Ready(Err(error)) => Next::Failed { why: error.to_string() },
             Poll::Pending => self.usb.0.borrow_mut().asked.take().unwrap_or(Next::Wait { ms: 1 }),
         }
     }
@@ -127,7 +127,7 @@ struct Exchange {
 }
 
 /// Erases the sectors, writes the image, reads it back, and starts it.
-async fn update(usb: Usb, image: Image, sectors: Vec<u32>) -> Result<(), Failure> {
+async fn update(usb: Usb, image: Image, sectors: Vec<u32>) -> Result<(), Error> {
     usb.to_idle().await?;
     for (done, address) in sectors.iter().enumerate() {
         usb.shows("erasing", done, sectors.len());
@@ -147,7 +147,7 @@ async fn update(usb: Usb, image: Image, sectors: Vec<u32>) -> Result<(), Failure
         usb.shows("reading back", done, total);
         if usb.upload(block).await? != bytes {
             let at = image.start as usize + done * BLOCK;
-            return Err(Failure::failed(format_args!(
+            return Err(Error::failed(format_args!(
                 "the flash at {at:#010x} does not hold what was written to it; update again, and replace the board if it stays so"
             )));
         }
@@ -163,13 +163,13 @@ impl Usb {
         self.0.borrow_mut().progress = (what, done as f64 / total.max(1) as f64);
     }
 
-    async fn transfer(&self, next: Next) -> Result<Vec<u8>, Failure> {
+    async fn transfer(&self, next: Next) -> Result<Vec<u8>, Error> {
         self.0.borrow_mut().asked = Some(next);
         loop {
             pause().await;
             if let Some(answer) = self.0.borrow_mut().answer.take() {
                 return answer.map_err(|why| {
-                    Failure::failed(format_args!(
+                    Error::failed(format_args!(
                         "the bootloader did not answer ({why}); plug it in again in its DFU mode and update again"
                     ))
                 });
@@ -177,25 +177,23 @@ impl Usb {
         }
     }
 
-    async fn out(&self, request: u8, value: u16, data: Vec<u8>) -> Result<(), Failure> {
+    async fn out(&self, request: u8, value: u16, data: Vec<u8>) -> Result<(), Error> {
         self.transfer(Next::Out { request, value, data }).await.map(drop)
     }
 
     /// Its status (USB DFU 1.1, 6.1.2): status, how long to wait in ms, state.
-    async fn status(&self) -> Result<(u8, u32, u8), Failure> {
+    async fn status(&self) -> Result<(u8, u32, u8), Error> {
         let next = Next::In { request: GETSTATUS, value: 0, length: STATUS_BYTES };
         match self.transfer(next).await?[..] {
             [status, low, middle, high, state, _] => {
                 Ok((status, u32::from_le_bytes([low, middle, high, 0]), state))
             }
-            _ => {
-                Err(Failure::failed("the bootloader's status is not six bytes; this is no STM32 in DFU mode"))
-            }
+            _ => Err(Error::failed("the bootloader's status is not six bytes; this is no STM32 in DFU mode")),
         }
     }
 
     /// Brings it to dfuIDLE from wherever an earlier update left it.
-    async fn to_idle(&self) -> Result<(), Failure> {
+    async fn to_idle(&self) -> Result<(), Error> {
         let (_, _, state) = self.status().await?;
         match state {
             IDLE => return Ok(()),
@@ -204,20 +202,20 @@ impl Usb {
         }
         match self.status().await? {
             (_, _, IDLE) => Ok(()),
-            (_, _, state) => Err(Failure::failed(format_args!(
+            (_, _, state) => Err(Error::failed(format_args!(
                 "the bootloader stays in state {state}; plug it in again in its DFU mode and update again"
             ))),
         }
     }
 
-    async fn command(&self, command: u8, address: u32) -> Result<(), Failure> {
+    async fn command(&self, command: u8, address: u32) -> Result<(), Error> {
         let mut data = vec![command];
         data.extend(address.to_le_bytes());
         self.download(0, data).await
     }
 
     /// Gives it a block and waits until it has done what that asks for: the first look starts it (AN3156 5).
-    async fn download(&self, block: u16, data: Vec<u8>) -> Result<(), Failure> {
+    async fn download(&self, block: u16, data: Vec<u8>) -> Result<(), Error> {
         self.out(DNLOAD, block, data).await?;
         for _ in 0..LOOKS {
             match self.status().await? {
@@ -225,26 +223,26 @@ impl Usb {
                 (_, _, DOWNLOAD_IDLE) => return Ok(()),
                 (status, _, _) => {
                     self.out(CLRSTATUS, 0, Vec::new()).await?;
-                    return Err(Failure::failed(format_args!(
+                    return Err(Error::failed(format_args!(
                         "the bootloader refused a block: {}; update again",
                         reason(status)
                     )));
                 }
             }
         }
-        Err(Failure::failed("the bootloader stays busy; plug it in again in its DFU mode and update again"))
+        Err(Error::failed("the bootloader stays busy; plug it in again in its DFU mode and update again"))
     }
 
-    async fn upload(&self, block: u16) -> Result<Vec<u8>, Failure> {
+    async fn upload(&self, block: u16) -> Result<Vec<u8>, Error> {
         self.transfer(Next::In { request: UPLOAD, value: block, length: BLOCK as u16 }).await
     }
 
     /// An empty block ends the update; the bootloader goes to the image with the look that follows (AN3156 5.5), and is gone from the bus.
-    async fn leave(&self) -> Result<(), Failure> {
+    async fn leave(&self) -> Result<(), Error> {
         self.out(DNLOAD, FIRST_BLOCK, Vec::new()).await?;
         match self.status().await {
             Ok((_, _, MANIFEST)) | Err(_) => Ok(()),
-            Ok((status, _, _)) => Err(Failure::failed(format_args!(
+            Ok((status, _, _)) => Err(Error::failed(format_args!(
                 "the image was written and the bootloader does not start it: {}; reset the board",
                 reason(status)
             ))),

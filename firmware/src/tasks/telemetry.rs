@@ -15,7 +15,7 @@ use control_core::{AnyOrder, LargeOrder, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity, Waiting};
-use link::frames::{SaveFailure, Stage, Timing};
+use link::frames::{SaveError, Stage, Timing};
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
 const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
@@ -174,14 +174,14 @@ impl<B: Board> Telemetry<B> {
         let is_off = !self.shared.is_powered();
         let saved = if is_off { self.save_parts(plan) } else { Ok(()) };
         self.shared.conditions.set(Interlock::Saving, false);
-        let failure = match saved {
+        let error = match saved {
             Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
-            Err(StoreError::Full) => SaveFailure::Full,
-            Err(StoreError::Flash) => SaveFailure::Flash,
-            Err(StoreError::TooLong) => SaveFailure::TooLong,
+            Err(StoreError::Full) => SaveError::Full,
+            Err(StoreError::Flash) => SaveError::Flash,
+            Err(StoreError::TooLong) => SaveError::TooLong,
         };
-        log::warn!("the configuration was not saved: {}", failure as u8);
-        self.endpoint.not_saved(self.next_tick, failure);
+        log::warn!("the configuration was not saved: {}", error as u8);
+        self.endpoint.not_saved(self.next_tick, error);
         Ok(())
     }
 

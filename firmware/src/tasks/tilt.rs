@@ -4,7 +4,7 @@ use super::shared::Shared;
 use crate::log;
 use crate::port::Board;
 use crate::supervision::Task;
-use crate::tilt::{Reading, TiltSource, TiltTrouble, TiltWatch};
+use crate::tilt::{Reading, TiltError, TiltSource, TiltWatch};
 use control_core::event::Fault;
 use link::frames::Stage;
 
@@ -13,13 +13,13 @@ pub struct Tilt<B: Board> {
     shared: &'static Shared,
     source: B::Tilt,
     watch: TiltWatch,
-    trouble: Option<TiltTrouble>,
+    error: Option<TiltError>,
 }
 
 impl<B: Board> Tilt<B> {
     /// Reads `source`.
     pub fn new(shared: &'static Shared, source: B::Tilt) -> Self {
-        Self { shared, source, watch: TiltWatch::default(), trouble: None }
+        Self { shared, source, watch: TiltWatch::default(), error: None }
     }
 
     /// One reading.
@@ -29,18 +29,18 @@ impl<B: Board> Tilt<B> {
         if let Reading::New(tilt) = reading {
             self.shared.set_tilt(tilt);
         }
-        let trouble = self.watch.judge(reading).err();
-        if trouble.is_some() && self.shared.is_powered() {
+        let error = self.watch.judge(reading).err();
+        if error.is_some() && self.shared.is_powered() {
             self.shared.trips.raise(Fault::Tilt);
         }
-        if trouble != self.trouble {
-            match trouble {
-                Some(TiltTrouble::Absent) => log::error!("the tilt sensor does not answer"),
-                Some(TiltTrouble::Stuck) => log::error!("the tilt sensor is stuck"),
-                Some(TiltTrouble::Nonsense) => log::error!("the tilt sensor answers nonsense"),
+        if error != self.error {
+            match error {
+                Some(TiltError::Absent) => log::error!("the tilt sensor does not answer"),
+                Some(TiltError::Stuck) => log::error!("the tilt sensor is stuck"),
+                Some(TiltError::Nonsense) => log::error!("the tilt sensor answers nonsense"),
                 None => log::info!("the tilt sensor measures"),
             }
-            self.trouble = trouble;
+            self.error = error;
         }
         self.shared.reports.alive(Task::Tilt);
         self.shared.stages.note(Stage::Tilt, B::cycles().wrapping_sub(entered));

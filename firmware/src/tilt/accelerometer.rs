@@ -2,7 +2,7 @@
 //! They share connector, SPI mode and the place of the identity, and little else. Found by its identity, found again
 //! after it was gone.
 
-use super::{Acceleration, Reading, Smoother, TiltSource, TiltTrouble, angle::below_horizontal};
+use super::{Acceleration, Reading, Smoother, TiltError, TiltSource, angle::below_horizontal};
 use crate::timing;
 use embedded_hal::spi::SpiDevice;
 
@@ -81,13 +81,13 @@ impl<D: SpiDevice> Accelerometer<D> {
         Self { device, model: None, smoother: Smoother::default(), last: [0; 7], repeats: 0 }
     }
 
-    fn transfer(&mut self, bytes: &mut [u8]) -> Result<(), TiltTrouble> {
-        self.device.transfer_in_place(bytes).map_err(|_| TiltTrouble::Absent)
+    fn transfer(&mut self, bytes: &mut [u8]) -> Result<(), TiltError> {
+        self.device.transfer_in_place(bytes).map_err(|_| TiltError::Absent)
     }
 
     /// Looks for the sensor and sets it up if it has just appeared, or has forgotten what it was told: one that loses its power
     /// alone comes back with its own registers, in power-down, under the identity that it had before.
-    fn find(&mut self) -> Result<Model, TiltTrouble> {
+    fn find(&mut self) -> Result<Model, TiltError> {
         let mut identity = [READ | WHO_AM_I, 0];
         self.transfer(&mut identity)?;
         let found = Model::from_identity(identity[1]);
@@ -106,10 +106,10 @@ impl<D: SpiDevice> Accelerometer<D> {
             self.smoother = Smoother::default();
             self.model = found;
         }
-        found.ok_or(TiltTrouble::Absent)
+        found.ok_or(TiltError::Absent)
     }
 
-    fn measure(&mut self) -> Result<Reading, TiltTrouble> {
+    fn measure(&mut self) -> Result<Reading, TiltError> {
         let model = self.find()?;
         let mut bytes = [0; 8];
         bytes[0] = READ | STATUS | if model == Model::Lis302dl { INCREMENT } else { 0 };
@@ -121,11 +121,11 @@ impl<D: SpiDevice> Accelerometer<D> {
         self.repeats = if registers[1..] == self.last[1..] { self.repeats.saturating_add(1) } else { 0 };
         self.last = registers;
         if model.shows_noise() && self.repeats >= timing::TILT_FROZEN_MEASUREMENTS {
-            return Err(TiltTrouble::Stuck);
+            return Err(TiltError::Stuck);
         }
         let acceleration = model.acceleration(registers);
         if !is_plausible(acceleration) {
-            return Err(TiltTrouble::Nonsense);
+            return Err(TiltError::Nonsense);
         }
         Ok(Reading::New(self.smoother.take(below_horizontal(acceleration))))
     }
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(accelerometer.read(), Reading::New(Milliradians(0)));
         accelerometer.device.present = false;
         accelerometer.device.registers[0x20] = 0;
-        assert_eq!(accelerometer.read(), Reading::Failed(TiltTrouble::Absent));
+        assert_eq!(accelerometer.read(), Reading::Failed(TiltError::Absent));
         accelerometer.device.present = true;
         assert_eq!(accelerometer.read(), Reading::New(Milliradians(0)));
         assert_eq!(accelerometer.device.registers[0x20], 0x6F);
@@ -262,7 +262,7 @@ mod tests {
     fn what_cannot_be_is_nonsense() {
         for sensor in [Sensor::lis302dl(127, 127, 127), Sensor::lis302dl(0, 0, 0), Sensor::lis3dsh([0; 3])] {
             let reading = Accelerometer::new(sensor).read();
-            assert_eq!(reading, Reading::Failed(TiltTrouble::Nonsense));
+            assert_eq!(reading, Reading::Failed(TiltError::Nonsense));
         }
     }
 
@@ -273,7 +273,7 @@ mod tests {
             let mut watch = TiltWatch::default();
             (0..1000).map(|_| watch.judge(accelerometer.read())).last().unwrap()
         };
-        assert_eq!(verdict(Sensor::lis3dsh([0, 0, 16_667])), Err(TiltTrouble::Stuck));
+        assert_eq!(verdict(Sensor::lis3dsh([0, 0, 16_667])), Err(TiltError::Stuck));
         assert_eq!(verdict(Sensor::lis302dl(0, 0, 55)), Ok(()));
     }
 }

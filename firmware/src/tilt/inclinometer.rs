@@ -1,6 +1,6 @@
 //! An analogue inclinometer of the kind whose voltage is proportional to the sine of its tilt.
 
-use super::{Reading, Smoother, TiltSource, TiltTrouble, angle::from_sine};
+use super::{Reading, Smoother, TiltError, TiltSource, angle::from_sine};
 
 /// A 12-bit converter on the sensor's output.
 pub trait ReadCode {
@@ -32,7 +32,7 @@ impl<C: ReadCode> TiltSource for Inclinometer<C> {
     fn read(&mut self) -> Reading {
         let codes = i32::from(self.converter.read_code()) - LEVEL_CODE;
         if codes.abs() > LARGEST_CODES {
-            return Reading::Failed(TiltTrouble::Nonsense);
+            return Reading::Failed(TiltError::Nonsense);
         }
         Reading::New(self.smoother.take(from_sine(codes * 1000 / CODES_PER_G)))
     }
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_broken_wire_is_nonsense() {
         for code in [0, 4095] {
-            assert_eq!(read(code), Reading::Failed(TiltTrouble::Nonsense));
+            assert_eq!(read(code), Reading::Failed(TiltError::Nonsense));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! From single readings to the verdict that the sensor is broken: one bad transfer is none.
 
-use super::TiltTrouble;
+use super::TiltError;
 use crate::timing;
 use control_core::units::Milliradians;
 
@@ -12,7 +12,7 @@ pub enum Reading {
     /// None since the last look.
     Unchanged,
     /// Something is wrong.
-    Failed(TiltTrouble),
+    Failed(TiltError),
 }
 
 /// Counts what is wrong in a row.
@@ -23,8 +23,8 @@ pub struct TiltWatch {
 }
 
 impl TiltWatch {
-    /// Takes a reading; the trouble once it has lasted.
-    pub fn judge(&mut self, reading: Reading) -> Result<(), TiltTrouble> {
+    /// Takes a reading; returns an error that has lasted.
+    pub fn judge(&mut self, reading: Reading) -> Result<(), TiltError> {
         match reading {
             Reading::New(_) => {
                 *self = Self::default();
@@ -32,11 +32,11 @@ impl TiltWatch {
             }
             Reading::Unchanged => {
                 self.stale = self.stale.saturating_add(1);
-                if self.stale >= timing::TILT_STALE_READINGS { Err(TiltTrouble::Stuck) } else { Ok(()) }
+                if self.stale >= timing::TILT_STALE_READINGS { Err(TiltError::Stuck) } else { Ok(()) }
             }
-            Reading::Failed(trouble) => {
+            Reading::Failed(error) => {
                 self.bad = self.bad.saturating_add(1);
-                if self.bad >= timing::TILT_BAD_READINGS { Err(trouble) } else { Ok(()) }
+                if self.bad >= timing::TILT_BAD_READINGS { Err(error) } else { Ok(()) }
             }
         }
     }
@@ -47,14 +47,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn trouble_that_lasts_is_reported_and_a_measurement_ends_it() {
+    fn an_error_that_lasts_is_reported_and_a_measurement_ends_it() {
         let mut watch = TiltWatch::default();
         for _ in 1..timing::TILT_BAD_READINGS {
-            assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Ok(()));
+            assert_eq!(watch.judge(Reading::Failed(TiltError::Absent)), Ok(()));
         }
-        assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Err(TiltTrouble::Absent));
+        assert_eq!(watch.judge(Reading::Failed(TiltError::Absent)), Err(TiltError::Absent));
         assert_eq!(watch.judge(Reading::New(Milliradians(1))), Ok(()));
-        assert_eq!(watch.judge(Reading::Failed(TiltTrouble::Absent)), Ok(()));
+        assert_eq!(watch.judge(Reading::Failed(TiltError::Absent)), Ok(()));
     }
 
     #[test]
@@ -63,6 +63,6 @@ mod tests {
         for _ in 1..timing::TILT_STALE_READINGS {
             assert_eq!(watch.judge(Reading::Unchanged), Ok(()));
         }
-        assert_eq!(watch.judge(Reading::Unchanged), Err(TiltTrouble::Stuck));
+        assert_eq!(watch.judge(Reading::Unchanged), Err(TiltError::Stuck));
     }
 }

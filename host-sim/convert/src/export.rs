@@ -2,7 +2,7 @@
 //! the converter's code less its mid-scale, so that `gain · command` is the motor's torque.
 
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::plant::{GRAVITY, PlantConfig};
 use diagnosis::rig::{Actuator, Encoder, Kind, Model, Rig, Uncertainty};
 use recording::messages::Hello;
@@ -77,13 +77,13 @@ pub fn rig(name: &str, hello: &Hello) -> Rig {
 }
 
 /// Writes `rig.toml` and the CSV files to `dir`, which is made where it is missing.
-pub fn export(recording: &Recording, dir: &Path) -> Result<Exported, Failure> {
+pub fn export(recording: &Recording, dir: &Path) -> Result<Exported, Error> {
     let stretches = stretches(recording);
     let Some(first) = stretches.iter().find(|s| s.samples.len() > 1) else {
-        return Err(Failure::input(format_args!("{}: has no samples to export", recording.file)));
+        return Err(Error::input(format_args!("{}: has no samples to export", recording.file)));
     };
     std::fs::create_dir_all(dir).map_err(|cause| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}: the folder cannot be made ({cause}); choose another --out",
             dir.display()
         ))
@@ -102,18 +102,18 @@ pub fn export(recording: &Recording, dir: &Path) -> Result<Exported, Failure> {
     Ok(Exported { rig: rig_path, recordings })
 }
 
-/// Writes a file by `fill`; a failure names its path.
+/// Writes a file by `fill`; an error names its path.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<std::fs::File>) -> std::io::Result<()>,
-) -> Result<(), Failure> {
+) -> Result<(), Error> {
     let written = std::fs::File::create(path).and_then(|file| {
         let mut out = BufWriter::new(file);
         fill(&mut out)?;
         out.flush()
     });
     written.map_err(|cause| {
-        Failure::failed(format_args!(
+        Error::failed(format_args!(
             "{}: cannot be written ({cause}); free some space or choose another --out",
             path.display()
         ))

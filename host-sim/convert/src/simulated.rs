@@ -1,7 +1,7 @@
 //! A recording and what simulations make of it as one MCAP file, for Foxglove, Rerun and PlotJuggler: a topic for what was recorded,
 //! one for each model, and one for what each is off.
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::simulation::comparison::Comparison;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
@@ -13,9 +13,9 @@ use std::io::Cursor;
 const RATE_HZ: f64 = 1000.0;
 
 /// Returns the file: `/recording`, and `/simulation/NAME` and `/residual/NAME` for each model. Times count from the first row.
-pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Failure> {
+pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Error> {
     written(compared)
-        .map_err(|cause| Failure::failed(format_args!("{}: no MCAP of it ({cause})", compared.file)))
+        .map_err(|cause| Error::failed(format_args!("{}: no MCAP of it ({cause})", compared.file)))
 }
 
 fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {

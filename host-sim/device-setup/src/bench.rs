@@ -6,7 +6,7 @@ use control_core::event::{Fault, State};
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient, TICK_HZ};
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use link::commissioning::Record;
 use link::crash::Crash;
 use link::frames::{DeviceFrame, EventKind};
@@ -31,7 +31,7 @@ pub enum Act {
 /// A way to a device.
 pub trait Line {
     /// Sends `out`, adds what has come to `into`, and says how long the line has been open.
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure>;
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error>;
 
     /// Makes the virtual hand act. If a person is the hand, a prompt has asked already.
     fn act(&mut self, act: Act);
@@ -57,7 +57,7 @@ pub struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Says hello and waits until the device listens.
-    pub async fn open(line: &'a mut dyn Line) -> Result<Self, Failure> {
+    pub async fn open(line: &'a mut dyn Line) -> Result<Self, Error> {
         let mut driver = Driver::new(Patient::nobody());
         driver.connected(Duration::ZERO);
         let mut bench = Self {
@@ -75,7 +75,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Waits until the device listens: while a person was asked something, the line may have fallen silent.
-    pub async fn settle(&mut self) -> Result<(), Failure> {
+    pub async fn settle(&mut self) -> Result<(), Error> {
         self.exchange().await?;
         self.until("the device did not answer; check that it runs this project's firmware", |bench| {
             bench.driver.is_ready(bench.now)
@@ -84,47 +84,47 @@ impl<'a> Bench<'a> {
     }
 
     /// The device's part of the configuration.
-    pub async fn device(&mut self) -> Result<Device, Failure> {
+    pub async fn device(&mut self) -> Result<Device, Error> {
         Ok(self.record().await?.device)
     }
 
     /// The same under the device's seal.
-    pub async fn record(&mut self) -> Result<Record, Failure> {
+    pub async fn record(&mut self) -> Result<Record, Error> {
         const SILENT: &str = "the device did not report its configuration; restart it";
         self.record = None;
         self.driver.report_device();
         self.until(SILENT, |bench| bench.record.is_some()).await?;
-        self.record.ok_or_else(|| Failure::failed(SILENT))
+        self.record.ok_or_else(|| Error::failed(SILENT))
     }
 
     /// Gives the device its part and sees that it has taken and kept it.
-    pub async fn configure(&mut self, device: &Device) -> Result<(), Failure> {
+    pub async fn configure(&mut self, device: &Device) -> Result<(), Error> {
         self.driver.configure_device(*device);
         self.becomes(device).await.map(drop)
     }
 
     /// Has the device, which `device` is what was found of, take itself for commissioned: it looks at what its own pulses have
     /// shown. Its record.
-    pub async fn commission(&mut self, device: &Device) -> Result<Record, Failure> {
+    pub async fn commission(&mut self, device: &Device) -> Result<Record, Error> {
         self.driver.commission();
         self.becomes(&Device { commissioned: true, ..*device }).await
     }
 
     /// Checks that what was asked for makes the device `wanted`, and that it stays so.
-    async fn becomes(&mut self, wanted: &Device) -> Result<Record, Failure> {
+    async fn becomes(&mut self, wanted: &Device) -> Result<Record, Error> {
         let record = self.record().await?;
         if record.device != *wanted {
-            return Err(Failure::failed("the device did not accept its new configuration; restart it"));
+            return Err(Error::failed("the device did not accept its new configuration; restart it"));
         }
         // An erasure of the flash takes a second or two, and what becomes of it is said afterwards.
         let until = self.now + Duration::from_millis(100);
         self.until("the device stopped answering while it saved; restart it", |bench| bench.now >= until)
             .await?;
-        self.not_saved.take().map_or(Ok(record), |why| Err(Failure::failed(why)))
+        self.not_saved.take().map_or(Ok(record), |why| Err(Error::failed(why)))
     }
 
     /// Tells the device where the rotor's angle is zero, in counts past the zero.
-    pub async fn index(&mut self, count: i32) -> Result<(), Failure> {
+    pub async fn index(&mut self, count: i32) -> Result<(), Error> {
         self.driver.index(count);
         let until = self.now + Duration::from_millis(100);
         self.until("the device did not accept the rotor's angle; restart it", |bench| bench.now >= until)
@@ -137,7 +137,7 @@ impl<'a> Bench<'a> {
         act: Act,
         longest: Duration,
         is_done: impl Fn(&[Sample]) -> bool,
-    ) -> Result<&[Sample], Failure> {
+    ) -> Result<&[Sample], Error> {
         self.samples.clear();
         self.line.act(act);
         let end = self.now + longest;
@@ -149,7 +149,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Plays an excitation to its end or to a fault: the samples during which torque was on.
-    pub async fn play(&mut self, excitation: &Excitation) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
+    pub async fn play(&mut self, excitation: &Excitation) -> Result<(Vec<Sample>, Option<Fault>), Error> {
         self.play_within(excitation, TO_ANSWER).await
     }
 
@@ -158,7 +158,7 @@ impl<'a> Bench<'a> {
         &mut self,
         excitation: &Excitation,
         longest: Duration,
-    ) -> Result<(Vec<Sample>, Option<Fault>), Failure> {
+    ) -> Result<(Vec<Sample>, Option<Fault>), Error> {
         self.samples.clear();
         self.fault = None;
         self.driver.excite(excitation.clone());
@@ -175,7 +175,7 @@ impl<'a> Bench<'a> {
         Ok((played, self.fault))
     }
 
-    async fn until(&mut self, why_not: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), Failure> {
+    async fn until(&mut self, why_not: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), Error> {
         self.until_within(TO_ANSWER, why_not, is_so).await
     }
 
@@ -184,21 +184,21 @@ impl<'a> Bench<'a> {
         longest: Duration,
         why_not: &str,
         is_so: impl Fn(&Self) -> bool,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Error> {
         let end = self.now + longest;
         while !is_so(self) {
             self.exchange().await?;
             if let Some(why) = self.driver.refused().or(self.driver.notice()) {
-                return Err(Failure::failed(why));
+                return Err(Error::failed(why));
             }
             if self.now > end {
-                return Err(Failure::failed(why_not));
+                return Err(Error::failed(why_not));
             }
         }
         Ok(())
     }
 
-    async fn exchange(&mut self) -> Result<(), Failure> {
+    async fn exchange(&mut self) -> Result<(), Error> {
         self.bytes.clear();
         let out = self.driver.transmit(self.now).to_vec();
         self.now = self.line.exchange(&out, &mut self.bytes)?;

@@ -8,7 +8,7 @@ use control_core::compensation::Gains;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
 use link::codec::{self, MAX_FRAME};
-use link::frames::{Ack, Command, DeviceFrame, PROTOCOL_VERSION, Rejection};
+use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -291,7 +291,7 @@ impl Driver {
                 self.patient = patient.clone();
                 self.changed = Some(Ok(()));
             }
-            (Err(why @ Rejection::Config(_)), Command::ConfigurePatient(_)) if self.ready => {
+            (Err(why @ CommandRefusal::Config(_)), Command::ConfigurePatient(_)) if self.ready => {
                 self.changed = Some(Err(format!("the device refused: {why}")));
             }
             (Ok(()), Command::ConfigurePatient(_)) => self.ready = true,
@@ -304,9 +304,9 @@ impl Driver {
             }
             (Ok(()), _) => {}
             // The same bytes again, soon.
-            (Err(Rejection::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
+            (Err(CommandRefusal::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
             (
-                Err(Rejection::Powered),
+                Err(CommandRefusal::Powered),
                 Command::ConfigureDevice(_) | Command::RestoreDevice(_) | Command::ConfigurePatient(_),
             ) => {
                 self.waiting.push_front(pending.command);
@@ -314,11 +314,11 @@ impl Driver {
             }
             (
                 Err(
-                    why @ (Rejection::Config(_)
-                    | Rejection::Sequence(_)
-                    | Rejection::Version
-                    | Rejection::Commissioned(_)
-                    | Rejection::NotShown),
+                    why @ (CommandRefusal::Config(_)
+                    | CommandRefusal::Sequence(_)
+                    | CommandRefusal::Version
+                    | CommandRefusal::Commissioned(_)
+                    | CommandRefusal::NotShown),
                 ),
                 _,
             ) => {

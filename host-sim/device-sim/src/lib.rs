@@ -5,7 +5,7 @@
 
 pub mod device;
 pub mod driver;
-pub mod failure;
+pub mod error;
 pub mod lockstep;
 pub mod named_files;
 pub mod page;

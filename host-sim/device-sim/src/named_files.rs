@@ -1,6 +1,6 @@
 //! Files that a person names: one of those that come with the program, by its name, or any file, by its path.
 
-use crate::failure::Failure;
+use crate::error::Error;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub struct Text {
 }
 
 /// Finds `wanted` among `built_in` (name, text), else reads it as a path. `what` names the kind in errors.
-pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text, Failure> {
+pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text, Error> {
     if let Some((name, text)) = built_in.iter().find(|(name, _)| *name == wanted) {
         return Ok(Text { origin: format!("{what} {name}"), text: (*text).to_owned() });
     }
@@ -22,12 +22,12 @@ pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text,
     let looks_like_a_path = wanted.contains(['/', '\\', '.']);
     match std::fs::read_to_string(path) {
         Ok(text) => Ok(Text { origin: wanted.to_owned(), text }),
-        Err(cause) if looks_like_a_path => Err(Failure::input(format_args!(
+        Err(cause) if looks_like_a_path => Err(Error::input(format_args!(
             "{wanted}: the {what} file cannot be read ({cause}); check its path"
         ))),
         Err(_) => {
             let names: Vec<&str> = built_in.iter().map(|(name, _)| *name).collect();
-            Err(Failure::input(format_args!(
+            Err(Error::input(format_args!(
                 "there is no {what} called \"{wanted}\"; use one of {} or the path of a TOML file",
                 names.join(", ")
             )))
@@ -36,7 +36,7 @@ pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text,
 }
 
 /// Parses TOML; an error names the file and the line.
-pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Failure> {
+pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Error> {
     toml::from_str(&source.text).map_err(|cause| {
         let before = cause.span().map_or(0, |span| span.start.min(source.text.len()));
         let line = source.text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count() + 1;
@@ -48,7 +48,7 @@ pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Failure> {
             .and_then(|text| text.split_once('='))
             .map(|(key, _)| key.trim());
         let key = key.map(|key| format!(" ({key})")).unwrap_or_default();
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}, line {line}{key}: {}; correct the file",
             source.origin,
             in_words(cause.message())

@@ -4,7 +4,7 @@
 
 pub mod task;
 
-use crate::failure::Failure;
+use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::plant::hand::Grip;
 use crate::profile::{Profile, TissueName, puncture_path_mm};
@@ -112,7 +112,7 @@ struct Step {
 
 impl Procedure {
     /// A built-in procedure by its name, or a file by its path.
-    pub fn find(wanted: &str, profile: &Profile) -> Result<Self, Failure> {
+    pub fn find(wanted: &str, profile: &Profile) -> Result<Self, Error> {
         match insertion(wanted) {
             Some(text) => Self::parse(&text, profile),
             None => Self::parse(&named_files::find("procedure", wanted, &BUILT_IN)?, profile),
@@ -120,9 +120,9 @@ impl Procedure {
     }
 
     /// Checks the text of a procedure against the tissue of `profile`.
-    pub fn parse(source: &Text, profile: &Profile) -> Result<Self, Failure> {
+    pub fn parse(source: &Text, profile: &Profile) -> Result<Self, Error> {
         let file: File = named_files::parse(source)?;
-        file.resolve(profile).map_err(|what| Failure::input(format_args!("{}: {what}", source.origin)))
+        file.resolve(profile).map_err(|what| Error::input(format_args!("{}: {what}", source.origin)))
     }
 
     /// Returns the number of the step that is going on `seconds` into the procedure.

@@ -4,7 +4,7 @@ use crate::output;
 use crate::serving::stop_on_signals;
 use clap::Args;
 use control_core::Device;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::session::Session;
 use server::class::board::{Board, Sent};
 use server::class::{self, Meeting, Membership, Name, USUAL_ADDRESS};
@@ -41,20 +41,20 @@ pub struct Class {
 }
 
 impl Class {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let meeting = Meeting { class: self.name, address: self.listen, token: self.class_token };
-        meeting.check("--listen").map_err(Failure::input)?;
+        meeting.check("--listen").map_err(Error::input)?;
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;
         let board = Arc::new(Board::default());
-        let _listener = class::listen(&meeting, board.clone()).map_err(Failure::failed)?;
+        let _listener = class::listen(&meeting, board.clone()).map_err(Error::failed)?;
         let Meeting { class: name, address, .. } = meeting;
         let shown = name.clone();
         let watch = move || -> Watch {
             let (board, name, mut sent) = (board.clone(), shown.clone(), Sent::default());
             Box::new(move || board.text(&name, address, Instant::now(), &mut sent))
         };
-        let server = visualizer::serve_watched(Arc::new(watch), self.port).map_err(Failure::failed)?;
+        let server = visualizer::serve_watched(Arc::new(watch), self.port).map_err(Error::failed)?;
         note!("class {name} listens on {address}");
         output::page("class page", &server.url());
         while !stop.load(Ordering::Relaxed) {
@@ -83,15 +83,15 @@ pub(crate) struct ClassFlags {
 
 impl ClassFlags {
     /// Checks the options beyond what clap can.
-    pub(crate) fn check(&self) -> Result<(), Failure> {
-        self.meeting().map_or(Ok(()), |meeting| meeting.check("--class-at")).map_err(Failure::input)
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.meeting().map_or(Ok(()), |meeting| meeting.check("--class-at")).map_err(Error::input)
     }
 
     /// Joins the class if one was given, and says so.
-    pub(crate) fn join(&self, session: &Session, device: Device) -> Result<Option<Membership>, Failure> {
+    pub(crate) fn join(&self, session: &Session, device: Device) -> Result<Option<Membership>, Error> {
         let Some(meeting) = self.meeting() else { return Ok(None) };
         let name = self.class_as.clone().unwrap_or_else(computer);
-        let membership = class::join(session.clone(), device, &meeting, &name).map_err(Failure::failed)?;
+        let membership = class::join(session.clone(), device, &meeting, &name).map_err(Error::failed)?;
         say!("class {} at {} as {name}", meeting.class, meeting.address);
         Ok(Some(membership))
     }

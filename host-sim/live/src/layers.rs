@@ -1,7 +1,7 @@
 //! `layers`: what a needle meets on a straight line into a body.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::profile::{InBody, Profile};
 use serde_json::json;
 
@@ -33,7 +33,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let given = |keys: &[(&'static str, Option<f64>)]| -> Vec<(&'static str, f64)> {
             keys.iter().filter_map(|(key, value)| Some((*key, (*value)?))).collect()
         };
@@ -45,7 +45,7 @@ impl Layers {
         ]);
         let profile = Profile::find(&self.profile)?.with_keys(&given(&[("entry_deg", self.angle)]), &body)?;
         let Some(body) = &profile.body else {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{}: this patient is layers without a body; choose one with [body], such as forearm",
                 self.profile
             )));

@@ -1,7 +1,7 @@
 //! The commands that show the device and judge what it recorded, and what every command of the program needs: options, output,
 //! progress, a serial port. Nothing here needs the diagnosis, so that the first command has little to build.
 
-/// Prints a line. A closed pipe is not a failure.
+/// Prints a line. A closed pipe is not an error.
 #[macro_export]
 macro_rules! say {
     ($($text:tt)*) => {{
@@ -41,7 +41,7 @@ mod streams;
 mod training;
 
 use clap::{Args, Parser, Subcommand};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 pub use outcome::finish;
 
@@ -97,7 +97,7 @@ impl Command {
     }
 
     /// Carries it out.
-    pub fn run(self) -> Result<(), Failure> {
+    pub fn run(self) -> Result<(), Error> {
         match self {
             Self::Run(command) => command.run(),
             Self::Class(command) => command.run(),

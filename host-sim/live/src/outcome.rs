@@ -1,12 +1,12 @@
-//! The end of a program: help goes to standard output, a failure is one line and an exit status, 1 if the request failed, 2 for unusable
+//! The end of a program: help goes to standard output, an error is one line and an exit status, 1 if the request failed, 2 for unusable
 //! input.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::process::ExitCode;
 
 /// Carries out a command line that was parsed, and returns the program's exit status.
-pub fn finish<T>(parsed: Result<T, clap::Error>, run: impl FnOnce(T) -> Result<(), Failure>) -> ExitCode {
+pub fn finish<T>(parsed: Result<T, clap::Error>, run: impl FnOnce(T) -> Result<(), Error>) -> ExitCode {
     let result = match parsed {
         Ok(command) => run(command),
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -18,15 +18,15 @@ pub fn finish<T>(parsed: Result<T, clap::Error>, run: impl FnOnce(T) -> Result<(
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("host-sim: {failure}");
-            ExitCode::from(failure.status())
+        Err(error) => {
+            eprintln!("host-sim: {error}");
+            ExitCode::from(error.status())
         }
     }
 }
 
 /// Returns the parser's message, in one sentence.
-fn usage(error: &clap::Error) -> Failure {
+fn usage(error: &clap::Error) -> Error {
     let drawn = error.to_string();
     // The last line of help that the parser names: of the command that was asked for.
     let help = drawn.lines().find_map(|line| line.trim().strip_prefix("Usage: ")).map_or(
@@ -41,7 +41,7 @@ fn usage(error: &clap::Error) -> Failure {
         error.get(ContextKind::InvalidArg).filter(|_| error.kind() == ErrorKind::MissingRequiredArgument)
     {
         let (what, them) = if missing.len() == 1 { ("is", "it") } else { ("are", "them") };
-        return Failure::input(format_args!(
+        return Error::input(format_args!(
             "{} {what} missing; add {them}, see {help}",
             missing.join(" and ")
         ));
@@ -54,5 +54,5 @@ fn usage(error: &clap::Error) -> Failure {
         .map(|line| line.trim_start_matches("tip: "))
         .collect();
     let said = said.join("; ");
-    Failure::input(format_args!("{}; see {help}", said.trim_start_matches("error: ")))
+    Error::input(format_args!("{}; see {help}", said.trim_start_matches("error: ")))
 }

@@ -2,7 +2,7 @@
 
 use crate::serving::{serve, stop_on_signals};
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::session::{self, Source};
 use recording::read::Recording;
 use server::replay::Replay as Player;
@@ -26,7 +26,7 @@ pub struct Replay {
 }
 
 /// Reads a recording and warns if it is cut off.
-pub fn read(file: &Path) -> Result<Recording, Failure> {
+pub fn read(file: &Path) -> Result<Recording, Error> {
     let recording = Recording::read(file)?;
     if let Some(why) = &recording.cut {
         eprintln!("host-sim: {} ends early ({why}); continuing with the complete part", recording.file);
@@ -35,7 +35,7 @@ pub fn read(file: &Path) -> Result<Recording, Failure> {
 }
 
 impl Replay {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let recording = read(&self.file)?;
         let profile = recording.profile()?;
         let source = Source::Recording { file: recording.file.clone() };

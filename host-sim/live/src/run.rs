@@ -12,7 +12,7 @@ use control_core::{Device, TICK_HZ};
 use device_sim::device::device_config::DeviceConfig;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{Model, Profile};
 use device_sim::session::{self, Session, Source, Subscription};
@@ -134,7 +134,7 @@ impl Run {
         self.listen.unwrap_or_else(|| (Ipv4Addr::LOCALHOST, self.port).into())
     }
 
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let seconds = self.check()?;
         let chosen = self.choose()?;
         let serial = if self.is_virtual() { None } else { Some(SerialPort::find(&self.device)?) };
@@ -168,7 +168,7 @@ impl Run {
     }
 
     /// Reads the device's file and finds the patient and the procedure.
-    fn choose(&self) -> Result<Chosen, Failure> {
+    fn choose(&self) -> Result<Chosen, Error> {
         let mut part = self.device_config.as_deref().map(DeviceConfig::read).transpose()?;
         if let Some(part) = part.as_mut().filter(|_| self.is_virtual()) {
             // It is built as its file says.
@@ -237,7 +237,7 @@ impl Run {
         serial: Option<SerialPort>,
         chosen: Chosen,
         seconds: Option<f64>,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome, Error> {
         let mut bar = Progress::new("running");
         let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
         if let Some(mut port) = serial {
@@ -256,14 +256,14 @@ impl Run {
     }
 
     /// Returns the requested patient, or the default one of the requested law.
-    fn find_profile(&self, device: &Device) -> Result<Profile, Failure> {
+    fn find_profile(&self, device: &Device) -> Result<Profile, Error> {
         let model = self.model.map(Model::from);
         let usual = model.unwrap_or(Model::Jog).patient();
         let profile = Profile::find_for(self.profile.as_deref().unwrap_or(usual), device)?;
         let its = profile.model();
         match model.filter(|model| *model != its) {
             None => Ok(profile),
-            Some(model) => Err(Failure::input(format_args!(
+            Some(model) => Err(Error::input(format_args!(
                 "{}: law.model is {}, but --model is {}; omit --model, or choose a patient with that law, such as {}",
                 profile.source.origin,
                 its.name(),
@@ -274,26 +274,26 @@ impl Run {
     }
 
     /// Checks the options beyond what clap can.
-    fn check(&self) -> Result<Option<f64>, Failure> {
+    fn check(&self) -> Result<Option<f64>, Error> {
         self.streams.check()?;
         self.class.check()?;
         if self.angle.is_some() && !self.is_virtual() {
-            return Err(Failure::input("--angle is for the virtual device: a hand turns a real needle"));
+            return Err(Error::input("--angle is for the virtual device: a hand turns a real needle"));
         }
         if self.deformed && !self.is_virtual() {
-            return Err(Failure::input(
+            return Err(Error::input(
                 "--deformed is for the virtual device: the board takes no surface from a PC that may stall",
             ));
         }
         if self.fast && !self.is_virtual() {
-            return Err(Failure::input("--fast is for the virtual device: a real one runs in real time"));
+            return Err(Error::input("--fast is for the virtual device: a real one runs in real time"));
         }
         match self.seconds {
             Some(s) if !(s.is_finite() && (1e-4..=1e7).contains(&s)) => {
-                Err(Failure::input(format_args!("--seconds is {s}; it must be from 0.0001 to 10000000")))
+                Err(Error::input(format_args!("--seconds is {s}; it must be from 0.0001 to 10000000")))
             }
             None if self.headless && self.fast => {
-                Err(Failure::input("--headless --fast without --seconds would never end; add --seconds 60"))
+                Err(Error::input("--headless --fast without --seconds would never end; add --seconds 60"))
             }
             seconds => Ok(seconds),
         }
@@ -334,12 +334,12 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 /// Serves the page, with the debrief of what is recorded in the page.
-fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Failure> {
+fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Error> {
     let write: visualizer::Debrief = Arc::new(|file| {
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
         debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
     });
-    let server = visualizer::serve_with_debrief(session, address, write).map_err(Failure::failed)?;
+    let server = visualizer::serve_with_debrief(session, address, write).map_err(Error::failed)?;
     // A page on one address of the network is not on 127.0.0.1.
     if address.ip().is_loopback() || address.ip().is_unspecified() {
         output::page("visualizer", &server.url());

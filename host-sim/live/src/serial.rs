@@ -1,7 +1,7 @@
 //! A device behind a serial port: USB CDC, where the baud rate means nothing, or anything else that carries bytes.
 
 use device_sim::device::{Port, Wire};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::io;
 use std::time::Duration;
 
@@ -19,11 +19,11 @@ struct SerialWire(Box<dyn serialport::SerialPort>);
 
 impl SerialPort {
     /// Checks that there is such a port now.
-    pub fn find(path: &str) -> Result<Self, Failure> {
+    pub fn find(path: &str) -> Result<Self, Error> {
         let port = Self { path: path.to_owned() };
         match port.connect() {
             Ok(_) => Ok(port),
-            Err(cause) => Err(Failure::input(format_args!(
+            Err(cause) => Err(Error::input(format_args!(
                 "{path}: the serial port cannot be opened ({cause}); plug the device in, check the path and your rights, or use --device virtual"
             ))),
         }

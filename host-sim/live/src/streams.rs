@@ -1,7 +1,7 @@
 //! The flags of the live streams.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::session::Session;
 use server::streams::{self, Spec, Streams, Token};
 
@@ -18,16 +18,16 @@ pub(crate) struct StreamFlags {
 
 impl StreamFlags {
     /// Checks the options beyond what clap can.
-    pub(crate) fn check(&self) -> Result<(), Failure> {
-        self.streams.iter().try_for_each(|spec| spec.check(self.token.as_ref())).map_err(Failure::input)
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.streams.iter().try_for_each(|spec| spec.check(self.token.as_ref())).map_err(Error::input)
     }
 
     /// Serves the requested streams and prints their addresses.
-    pub(crate) fn serve(&self, session: &Session) -> Result<Option<Streams>, Failure> {
+    pub(crate) fn serve(&self, session: &Session) -> Result<Option<Streams>, Error> {
         if self.streams.is_empty() {
             return Ok(None);
         }
-        let served = streams::serve(session, &self.streams, self.token.as_ref()).map_err(Failure::failed)?;
+        let served = streams::serve(session, &self.streams, self.token.as_ref()).map_err(Error::failed)?;
         for (kind, address) in served.addresses() {
             note!("{kind} stream at {address}");
         }

@@ -2,7 +2,7 @@
 
 use crate::replay::read;
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::patients;
 use device_sim::profile::{BUILT_IN, Profile};
 use std::path::{Path, PathBuf};
@@ -62,18 +62,18 @@ pub struct Profiles {
 }
 
 impl Score {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let recording = read(&self.file)?;
         let profile = self.profile.as_deref().map(Profile::find).transpose()?;
         let scored = score(&recording, profile.as_ref())?;
         if let Some(actor) = self.actor.as_ref().filter(|_| self.xapi) {
             check(&scored.insertions, &self.file)?;
             let statements = statements(&recording, profile.as_ref(), actor)?;
-            say!("{}", serde_json::to_string_pretty(&statements).map_err(Failure::failed)?);
+            say!("{}", serde_json::to_string_pretty(&statements).map_err(Error::failed)?);
             return Ok(());
         }
         if self.json {
-            let text = serde_json::to_string_pretty(&scored).map_err(Failure::failed)?;
+            let text = serde_json::to_string_pretty(&scored).map_err(Error::failed)?;
             say!("{text}");
             return check(&scored.insertions, &self.file);
         }
@@ -90,12 +90,12 @@ impl Score {
 }
 
 /// Refuses a recording without an insertion.
-fn check(insertions: &[Insertion], file: &Path) -> Result<(), Failure> {
+fn check(insertions: &[Insertion], file: &Path) -> Result<(), Error> {
     if insertions.is_empty() { Err(without_insertion(file)) } else { Ok(()) }
 }
 
-pub(crate) fn without_insertion(file: &Path) -> Failure {
-    Failure::input(format_args!(
+pub(crate) fn without_insertion(file: &Path) -> Error {
+    Error::input(format_args!(
         "{}: it has no insertion: the needle never touched the skin; record one first",
         file.display()
     ))
@@ -155,7 +155,7 @@ fn print_total(all: &[Insertion]) {
 }
 
 impl Debrief {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let given = self.profile.as_deref().map(Profile::find).transpose()?;
         let mut attempts = Vec::new();
         for file in &self.files {
@@ -172,14 +172,14 @@ impl Debrief {
             return Err(without_insertion(&self.files[0]));
         };
         std::fs::create_dir_all(&self.out).map_err(|cause| {
-            Failure::input(format_args!(
+            Error::input(format_args!(
                 "{}: the folder cannot be made ({cause}); choose another --out",
                 self.out.display()
             ))
         })?;
         let page = self.out.join("debrief.html");
         std::fs::write(&page, html).map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: cannot be written ({cause}); choose another --out",
                 page.display()
             ))
@@ -190,7 +190,7 @@ impl Debrief {
 }
 
 impl Profiles {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let wanted: Vec<String> = match self.wanted {
             none if none.is_empty() => BUILT_IN.iter().map(|(name, _)| (*name).to_owned()).collect(),
             some => some,

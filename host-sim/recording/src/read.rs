@@ -2,7 +2,7 @@
 
 use super::mcap_repair::intact;
 use super::messages::{Message, Setup};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::named_files::Text;
 use device_sim::profile::Profile;
 use mcap::read::{MessageStream, Options};
@@ -37,24 +37,24 @@ fn with_extension(path: &Path) -> Cow<'_, Path> {
 
 impl Recording {
     /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap` unless there is a file of that name.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         let path = with_extension(path);
         let shown = path.display().to_string();
         let bytes = std::fs::read(&path).map_err(|cause| {
-            Failure::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
+            Error::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
         })?;
         Self::parse(shown, &bytes)
     }
 
     /// Reads the bytes of a recording; `file` is what errors call it.
-    pub fn parse(file: String, bytes: &[u8]) -> Result<Self, Failure> {
+    pub fn parse(file: String, bytes: &[u8]) -> Result<Self, Error> {
         if !bytes.starts_with(mcap::MAGIC) {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{file}: not an MCAP recording; give one that `run --record` made"
             )));
         }
         let stream = MessageStream::new_with_options(intact(bytes), Options::IgnoreEndMagic.into())
-            .map_err(|cause| Failure::input(format_args!("{file}: not a usable MCAP recording ({cause})")))?;
+            .map_err(|cause| Error::input(format_args!("{file}: not a usable MCAP recording ({cause})")))?;
         let (mut setup, mut messages, mut cut, mut begun_ns) = (None, Vec::new(), None, 0);
         for message in stream {
             let message = match message {
@@ -73,7 +73,7 @@ impl Recording {
                 // Somebody else's channel.
                 Ok(None) => {}
                 Err(cause) => {
-                    return Err(Failure::input(format_args!(
+                    return Err(Error::input(format_args!(
                         "{file}: a message on {topic} cannot be understood ({cause}); was it recorded by host-sim?"
                     )));
                 }
@@ -84,18 +84,18 @@ impl Recording {
             cut = Some("its end was never written".to_owned());
         }
         let setup = setup.ok_or_else(|| {
-            Failure::input(format_args!("{file}: has no /setup message; was it recorded by host-sim?"))
+            Error::input(format_args!("{file}: has no /setup message; was it recorded by host-sim?"))
         })?;
         Ok(Self { file, setup, messages, cut, begun_ns })
     }
 
     /// The profile that it was recorded with at the beginning.
-    pub fn profile(&self) -> Result<Profile, Failure> {
+    pub fn profile(&self) -> Result<Profile, Error> {
         self.profile_of(&self.setup)
     }
 
     /// The profile of one of its set-ups.
-    pub fn profile_of(&self, setup: &Setup) -> Result<Profile, Failure> {
+    pub fn profile_of(&self, setup: &Setup) -> Result<Profile, Error> {
         let origin = format!("{}, {}", self.file, setup.profile_origin);
         Profile::parse(Text { origin, text: setup.profile_toml.clone() })
     }

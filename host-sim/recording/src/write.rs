@@ -5,7 +5,7 @@ use super::foxglove;
 use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::named_files::Text;
 use device_sim::profile::Profile;
 use device_sim::session::{ProbeView, Source, TaskDone};
@@ -49,29 +49,29 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
 
 impl Recorder {
     /// Begins a recording in a new file; an old one of this name is replaced.
-    pub fn create(path: &Path, setup: &Setup) -> Result<Self, Failure> {
+    pub fn create(path: &Path, setup: &Setup) -> Result<Self, Error> {
         let shown = path.display().to_string();
         let file = File::create(path).map_err(|cause| {
-            Failure::input(format_args!("{shown}: cannot be created ({cause}); choose another --record file"))
+            Error::input(format_args!("{shown}: cannot be created ({cause}); choose another --record file"))
         })?;
         Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup)
     }
 
     /// Begins a recording called `name` in the current folder. An older one is never replaced: after `monday` come `monday-2` and so on.
-    pub fn create_new(name: &str, setup: &Setup) -> Result<Self, Failure> {
+    pub fn create_new(name: &str, setup: &Setup) -> Result<Self, Error> {
         for number in 1..=MOST_OF_A_NAME {
             let shown = if number == 1 { format!("{name}.mcap") } else { format!("{name}-{number}.mcap") };
             match File::create_new(&shown) {
                 Ok(file) => return Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup),
                 Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(cause) => {
-                    return Err(Failure::failed(format_args!(
+                    return Err(Error::failed(format_args!(
                         "{shown}: cannot be created ({cause}); start the program in a folder that can be written"
                     )));
                 }
             }
         }
-        Err(Failure::failed(format_args!(
+        Err(Error::failed(format_args!(
             "there are {MOST_OF_A_NAME} recordings called {name}; choose another name"
         )))
     }
@@ -79,7 +79,7 @@ impl Recorder {
 
 impl<W: Write + Seek> Recorder<W> {
     /// Begins a recording in anything; `file` is what errors call it.
-    pub fn begin(file: String, to: W, setup: &Setup) -> Result<Self, Failure> {
+    pub fn begin(file: String, to: W, setup: &Setup) -> Result<Self, Error> {
         let options = WriteOptions::new()
             .compression(None)
             .profile("needle-insertion")
@@ -121,7 +121,7 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// Set up anew: what follows is of another patient.
-    pub fn setup(&mut self, setup: &Setup) -> Result<(), Failure> {
+    pub fn setup(&mut self, setup: &Setup) -> Result<(), Error> {
         self.put(0, setup)?;
         let text = Text { origin: setup.profile_origin.clone(), text: setup.profile_toml.clone() };
         // A profile for a stronger device than the built-in one is recorded and not drawn.
@@ -131,12 +131,12 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// Writes the device's identity and scale.
-    pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Failure> {
+    pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Error> {
         self.put(1, &Hello::from(hello))
     }
 
     /// Consecutive samples.
-    pub fn samples(&mut self, first_tick: u64, samples: &[Sample]) -> Result<(), Failure> {
+    pub fn samples(&mut self, first_tick: u64, samples: &[Sample]) -> Result<(), Error> {
         self.tick = first_tick;
         self.put(2, &Samples::from_block(first_tick, samples))?;
         // A device that starts anew counts from 0 again.
@@ -144,7 +144,7 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// A pose.
-    pub fn pose(&mut self, pose: &frames::Pose) -> Result<(), Failure> {
+    pub fn pose(&mut self, pose: &frames::Pose) -> Result<(), Error> {
         let pose = Pose::from(pose);
         self.put(3, &pose)?;
         if self.drawn_at.is_some_and(|last| pose.tick.abs_diff(last) < TRANSFORM_TICKS) {
@@ -157,17 +157,17 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// An event.
-    pub fn event(&mut self, event: &frames::Event) -> Result<(), Failure> {
+    pub fn event(&mut self, event: &frames::Event) -> Result<(), Error> {
         self.put(4, event)
     }
 
     /// The place of the ultrasound probe.
-    pub fn probe(&mut self, view: ProbeView) -> Result<(), Failure> {
+    pub fn probe(&mut self, view: ProbeView) -> Result<(), Error> {
         self.put(6, &Probe { tick: self.tick, view })
     }
 
     /// A task of the procedure that was done.
-    pub fn task(&mut self, task: &TaskDone) -> Result<(), Failure> {
+    pub fn task(&mut self, task: &TaskDone) -> Result<(), Error> {
         self.put(7, task)
     }
 
@@ -182,7 +182,7 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// Closes the recording, with the totals of the link.
-    pub fn finish(mut self, link: Link) -> Result<u64, Failure> {
+    pub fn finish(mut self, link: Link) -> Result<u64, Error> {
         self.put(5, &link)?;
         self.writer.finish().map_err(|cause| self.lost(&cause))?;
         let bytes = self.bytes();
@@ -191,11 +191,11 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(bytes)
     }
 
-    fn put(&mut self, channel: usize, message: &impl Serialize) -> Result<(), Failure> {
+    fn put(&mut self, channel: usize, message: &impl Serialize) -> Result<(), Error> {
         self.text.clear();
         // Only maps with odd keys and failing writers make this fail; there is neither.
         if serde_json::to_writer(&mut self.text, message).is_err() {
-            return Err(Failure::failed("a message could not be put into words; report this"));
+            return Err(Error::failed("a message could not be put into words; report this"));
         }
         let text = std::mem::take(&mut self.text);
         let written = self.write(self.channels[channel], &text);
@@ -208,28 +208,28 @@ impl<W: Write + Seek> Recorder<W> {
         self.epoch_ns + self.tick * NS_PER_TICK
     }
 
-    fn write(&mut self, channel_id: u16, message: &[u8]) -> Result<(), Failure> {
+    fn write(&mut self, channel_id: u16, message: &[u8]) -> Result<(), Error> {
         let time = self.now_ns();
         let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
         self.writer.write_to_known_channel(&header, message).map_err(|cause| self.lost(&cause))
     }
 
-    fn flush(&mut self) -> Result<(), Failure> {
+    fn flush(&mut self) -> Result<(), Error> {
         self.flushed = self.tick;
         self.writer.flush().map_err(|cause| self.lost(&cause))
     }
 
-    fn lost(&self, cause: &McapError) -> Failure {
+    fn lost(&self, cause: &McapError) -> Error {
         lost(&self.file, cause, self.bytes())
     }
 }
 
-fn lost(file: &str, cause: &McapError, bytes: u64) -> Failure {
+fn lost(file: &str, cause: &McapError, bytes: u64) -> Error {
     let why = match cause {
         McapError::Io(io) => io.to_string(),
         other => other.to_string(),
     };
-    Failure::failed(format_args!(
+    Error::failed(format_args!(
         "{file}: recording stopped after {bytes} bytes ({why}); what was written until then can be read; free some space"
     ))
 }

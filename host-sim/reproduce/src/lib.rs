@@ -7,7 +7,7 @@ mod paper_001;
 mod paper_002;
 mod table_1;
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use html_report::{Cell, Sheet};
 use std::path::{Path, PathBuf};
 
@@ -61,9 +61,9 @@ fn row(what: &str, paper: &str, ours: impl Into<String>, whose: Whose) -> Row {
 }
 
 /// Runs the procedures of `paper` and writes its page and the recordings that it shows to `dir`; the page.
-pub fn reproduce(paper: Paper, dir: &Path) -> Result<PathBuf, Failure> {
+pub fn reproduce(paper: Paper, dir: &Path) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(dir).map_err(|cause| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}: the folder cannot be made ({cause}); choose another --out",
             dir.display()
         ))
@@ -75,7 +75,7 @@ pub fn reproduce(paper: Paper, dir: &Path) -> Result<PathBuf, Failure> {
     };
     let page = dir.join(format!("paper-{}.html", paper.number()));
     std::fs::write(&page, sheet.finish()).map_err(|cause| {
-        Failure::failed(format_args!("{}: cannot be written ({cause}); choose another --out", page.display()))
+        Error::failed(format_args!("{}: cannot be written ({cause}); choose another --out", page.display()))
     })?;
     Ok(page)
 }

@@ -1,7 +1,7 @@
 //! The measurements on a recording of a procedure: force over time and depth, what it was before and after a wall gave way.
 
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::profile::Profile;
 use link::frames::EventKind;
 use recording::read::Recording;
@@ -17,9 +17,9 @@ pub(super) struct Trace {
 
 impl Trace {
     /// The longest piece of a recording.
-    pub(super) fn of(recording: &Recording) -> Result<Self, Failure> {
+    pub(super) fn of(recording: &Recording) -> Result<Self, Error> {
         let longest = stretches(recording).into_iter().max_by_key(|s| s.samples.len());
-        let none = || Failure::failed(format_args!("{}: nothing was recorded", recording.file));
+        let none = || Error::failed(format_args!("{}: nothing was recorded", recording.file));
         Ok(Self { stretch: longest.ok_or_else(none)? })
     }
 

@@ -4,7 +4,7 @@ use super::measure::{Trace, is_contact_with, is_puncture_of};
 use super::table_1;
 use super::{Row, Whose, numbers, row};
 use control_core::config::Tissue;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use device_sim::session::tissue_name;
@@ -43,7 +43,7 @@ const OPEN: [&str; 5] = [
     "Whether speed matters is disputed between sources: it is a parameter of the table.",
 ];
 
-pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
+pub(super) fn sheet(dir: &Path) -> Result<Sheet, Error> {
     let profile = Profile::find("phantom")?;
     let cuts = record(&profile, dir)?;
     let mut sheet = Sheet::new(
@@ -82,7 +82,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
 }
 
 /// Records an insertion at every speed and angle.
-fn record(profile: &Profile, dir: &Path) -> Result<Vec<Cut>, Failure> {
+fn record(profile: &Profile, dir: &Path) -> Result<Vec<Cut>, Error> {
     let mut cuts = Vec::new();
     for (speed, angle) in SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a))) {
         let procedure = Procedure::find(&format!("insertion-{speed}mms-{angle}deg"), profile)?;
@@ -181,8 +181,8 @@ fn largest(cuts: &[Cut], measured: bool) -> Vec<Row> {
 }
 
 /// Compares fit-force's table of the paper's five cells with the insertions that it was made from, and in a sentence how it tells the other four.
-fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Failure> {
-    let read = |wanted: bool| -> Result<Vec<_>, Failure> {
+fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Error> {
+    let read = |wanted: bool| -> Result<Vec<_>, Error> {
         let files = cuts.iter().filter(|c| c.is_the_papers() == wanted).map(|c| insertions::read(&c.file));
         Ok(files.collect::<Result<Vec<_>, _>>()?.concat())
     };

@@ -5,7 +5,7 @@ use super::{Row, Whose, numbers, row};
 use control_core::TICK_HZ;
 use control_core::config::Tissue;
 use device_sim::device::device_config::DeviceConfig;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::named_files::Text;
 use device_sim::plant::hand::Grip;
 use device_sim::plant::motor::Motor;
@@ -22,13 +22,13 @@ const AS_PRINTED: &str = "[friction]\nlaw = \"paper\"\nlevel_length_mm = 23.0\nl
 /// The time for which the procedure holds the needle still, s.
 const HELD_S: f64 = 2.0;
 
-pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
+pub(super) fn sheet(dir: &Path) -> Result<Sheet, Error> {
     let cone = Profile::find("adult")?;
     let printed = Profile::parse(Text {
         origin: "profile adult with eq. 2 as printed".into(),
         text: cone.source.text.replacen("[[layer]]", AS_PRINTED, 1),
     })?;
-    let run = |profile: &Profile, procedure: &str, file: &str| -> Result<Trace, Failure> {
+    let run = |profile: &Profile, procedure: &str, file: &str| -> Result<Trace, Error> {
         let procedure = Procedure::find(procedure, profile)?;
         Trace::of(&virtual_run::record(profile, procedure, &dir.join(file))?)
     };
@@ -68,7 +68,7 @@ fn number(profile: &Profile, tissue: Tissue) -> Option<u8> {
     profile.config.patient.layers.iter().position(|l| l.tissue == tissue).map(|at| at as u8)
 }
 
-fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> Result<Vec<Row>, Failure> {
+fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> Result<Vec<Row>, Error> {
     let device = &profile.config.device;
     let motor = Motor::re25(device.full_scale_torque.0.to_num::<f64>() * 1e-3);
     let newtons = |n: f64| format!("{} N", decimal(n, 2));
@@ -126,7 +126,7 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
 
 /// The current that the plant takes for the torque at full scale while a hand holds the needle: with the paper's motor and with the built-in
 /// device's.
-fn currents(profile: &Profile) -> Result<String, Failure> {
+fn currents(profile: &Profile) -> Result<String, Error> {
     let device = &profile.config.device;
     let paper = DeviceConfig::read(Path::new("paper-001"))?;
     let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;

@@ -4,7 +4,7 @@ use super::measure::{Trace, is_contact_with, is_exit_from};
 use super::{Row, Whose, numbers, row};
 use control_core::TICK_HZ;
 use control_core::config::{Law, Tissue};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use device_sim::session::{Source, tissue_name};
@@ -32,7 +32,7 @@ const INJECTIONS: [(&str, &str); 2] = [
     ("shoulder-straight", "second injection: straight"),
 ];
 
-pub(super) fn sheet(dir: &Path) -> Result<Sheet, Failure> {
+pub(super) fn sheet(dir: &Path) -> Result<Sheet, Error> {
     let profile = Profile::find("shoulder")?;
     let traces = INJECTIONS
         .iter()

@@ -2,7 +2,7 @@
 //! the deformed surface.
 
 use super::measure::{Trace, is_puncture_of};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use html_report::chart::{Chart, Curve};
@@ -34,9 +34,8 @@ struct Row {
 }
 
 /// Pushes each configuration, and writes the state of [`CHECKED`] beside the page.
-fn rows(dir: &Path) -> Result<Vec<Row>, Failure> {
-    let failed =
-        |refusal: tissue::Refusal| Failure::failed(format_args!("Table 1 cannot be built: {refusal}"));
+fn rows(dir: &Path) -> Result<Vec<Row>, Error> {
+    let failed = |refusal: tissue::Refusal| Error::failed(format_args!("Table 1 cannot be built: {refusal}"));
     let mut rows = Vec::new();
     for (name, configuration) in configurations() {
         let begin = Instant::now();
@@ -49,7 +48,7 @@ fn rows(dir: &Path) -> Result<Vec<Row>, Failure> {
         if let Some(fine) = fine.as_ref().filter(|_| name == CHECKED) {
             let file = dir.join("paper-000-push.json");
             std::fs::write(&file, state(fine).to_string()).map_err(|cause| {
-                Failure::failed(format_args!(
+                Error::failed(format_args!(
                     "{}: cannot be written ({cause}); choose another --out",
                     file.display()
                 ))
@@ -86,7 +85,7 @@ fn state(pushed: &Pushed) -> Value {
 }
 
 /// The table.
-pub(super) fn pushes(sheet: &mut Sheet, dir: &Path) -> Result<(), Failure> {
+pub(super) fn pushes(sheet: &mut Sheet, dir: &Path) -> Result<(), Error> {
     let rows = rows(dir)?;
     let limb_s = rows.last().map_or(1.0, |row| row.seconds);
     sheet.heading("Pushing to 5 mm with each configuration");
@@ -129,7 +128,7 @@ fn cells(row: &Row, limb_s: f64) -> Vec<Cell> {
 }
 
 /// The same insertion with depth from the surface at rest and from the deformed one.
-pub(super) fn side_by_side(dir: &Path) -> Result<(String, String), Failure> {
+pub(super) fn side_by_side(dir: &Path) -> Result<(String, String), Error> {
     let profile = Profile::find("phantom")?;
     let procedure = || Procedure::find("insertion-5mms-60deg", &profile);
     let rigid = virtual_run::record(&profile, procedure()?, &dir.join("paper-000-rigid.mcap"))?;

@@ -2,7 +2,7 @@
 //! each step, what the device reads meanwhile, what came of it. It shows and waits; it knows no device and moves nothing.
 
 use crate::visualizer::{Said, Watch, Watches};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 pub use device_sim::page::guide::Reading;
 use device_sim::page::guide::{GuideAnswer, GuideState};
 use std::fmt::Display;
@@ -34,12 +34,12 @@ impl Guide {
     }
 
     /// Shows the next step and waits until a person begins it in the page.
-    pub fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Failure> {
+    pub fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Error> {
         let mut state = self.lock();
         let number = state.ask(step.to_string(), moves);
         let mut state = self.wait(state, |state| state.is_agreed(number) || state.is_left());
         if !state.is_agreed(number) {
-            return Err(Failure::failed("ended before the last step; begin again from the first one"));
+            return Err(Error::failed("ended before the last step; begin again from the first one"));
         }
         state.run_last();
         Ok(())
@@ -51,7 +51,7 @@ impl Guide {
     }
 
     /// Shows what came of it and waits until a person has read it.
-    pub fn end(&self, outcome: Result<Vec<String>, &Failure>) {
+    pub fn end(&self, outcome: Result<Vec<String>, &Error>) {
         let mut state = self.lock();
         state.end(outcome.map_err(ToString::to_string));
         drop(self.wait(state, GuideState::is_left));

@@ -2,7 +2,7 @@
 
 use crate::live_gains::LiveGains;
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::session::{LinkStatus, ProbeView, Publisher, RecordingStatus, TaskDone};
 use link::frames::{self, DeviceFrame};
 use recording::messages::{Hello, Setup};
@@ -22,7 +22,7 @@ pub struct Outlets {
     /// The totals.
     pub stats: RunStats,
     pub(crate) gains: LiveGains,
-    pub(crate) failure: Option<Failure>,
+    pub(crate) error: Option<Error>,
     /// The device's last hello, for a recording that begins later.
     hello: Option<frames::Hello>,
     /// The file of the last recording that was ended.
@@ -41,7 +41,7 @@ impl Outlets {
             recorder,
             stats,
             gains: LiveGains::default(),
-            failure: None,
+            error: None,
             hello: None,
             recorded: None,
             complaint: None,
@@ -53,14 +53,14 @@ impl Outlets {
         if self.stats.is_full() {
             return;
         }
-        if let Err(failure) = self.deliver(frame) {
+        if let Err(error) = self.deliver(frame) {
             // The rest of the run must not write on: the file ends where the disk did.
             self.recorder = None;
-            self.failure = Some(failure);
+            self.error = Some(error);
         }
     }
 
-    fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Failure> {
+    fn deliver(&mut self, frame: &DeviceFrame) -> Result<(), Error> {
         match frame {
             DeviceFrame::Hello(hello) => {
                 self.stats.hello(Hello::from(hello));
@@ -125,10 +125,10 @@ impl Outlets {
         self.written(written);
     }
 
-    fn written(&mut self, written: Result<(), Failure>) {
-        if let Err(failure) = written {
+    fn written(&mut self, written: Result<(), Error>) {
+        if let Err(error) = written {
             self.recorder = None;
-            self.failure = Some(failure);
+            self.error = Some(error);
         }
     }
 
@@ -136,7 +136,7 @@ impl Outlets {
     pub(crate) fn end_recording(&mut self, driver: &Driver) {
         if let Some(recorder) = self.recorder.take() {
             let file = recorder.file().to_owned();
-            self.complaint = recorder.finish(driver.counts().into()).err().map(|failure| failure.to_string());
+            self.complaint = recorder.finish(driver.counts().into()).err().map(|error| error.to_string());
             self.recorded = self.complaint.is_none().then_some(file);
         }
     }

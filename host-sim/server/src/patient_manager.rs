@@ -3,7 +3,7 @@
 
 use crate::saved_patients::SavedPatients;
 use control_core::{Device, Patient};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::named_files::Text;
 use device_sim::procedure::Procedure;
 use device_sim::profile::{self, Profile};
@@ -47,7 +47,7 @@ impl PatientManager {
     }
 
     /// Checks a patient that comes with the program or was saved; what to ask of the device, or in one sentence why not.
-    pub fn choose(&mut self, name: &str) -> Result<Patient, Failure> {
+    pub fn choose(&mut self, name: &str) -> Result<Patient, Error> {
         let profile = Profile::parse_for(self.named(name)?, &self.device)?;
         // It brings its own procedure; the scripted hand must find its way in any.
         let own = self.procedure.is_some().then(|| profile.procedure.clone());
@@ -55,15 +55,15 @@ impl PatientManager {
     }
 
     /// Checks an edited patient, key by key as in a profile's file; what to ask of the device, or in one sentence why not.
-    pub fn edit(&mut self, json: &serde_json::Value) -> Result<Patient, Failure> {
+    pub fn edit(&mut self, json: &serde_json::Value) -> Result<Patient, Error> {
         let profile = self.edited(json)?;
         self.ask(profile, None, None)
     }
 
     /// The same, to be saved under `name`, or a free name like it, once the device has taken it.
-    pub fn save(&mut self, name: &str, json: &serde_json::Value) -> Result<Patient, Failure> {
+    pub fn save(&mut self, name: &str, json: &serde_json::Value) -> Result<Patient, Error> {
         let saved = self.saved.as_ref().ok_or_else(|| {
-            Failure::input("this program keeps no patients; send it to the device without saving")
+            Error::input("this program keeps no patients; send it to the device without saving")
         })?;
         let name = saved.free_name(name)?;
         let mut json = json.clone();
@@ -79,7 +79,7 @@ impl PatientManager {
         profile: Profile,
         procedure: Option<String>,
         save_as: Option<String>,
-    ) -> Result<Patient, Failure> {
+    ) -> Result<Patient, Error> {
         let wanted = procedure.as_ref().or(self.procedure.as_ref());
         wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
@@ -88,19 +88,19 @@ impl PatientManager {
     }
 
     /// The text of a patient that can be chosen.
-    fn named(&self, name: &str) -> Result<Text, Failure> {
+    fn named(&self, name: &str) -> Result<Text, Error> {
         if let Some((_, text)) = profile::BUILT_IN.iter().find(|(known, _)| *known == name) {
             return Ok(Text { origin: format!("profile {name}"), text: (*text).to_owned() });
         }
         self.saved.as_ref().and_then(|saved| saved.read(name)).unwrap_or_else(|| {
-            Err(Failure::input(format_args!("there is no patient called \"{name}\"; choose one of the list")))
+            Err(Error::input(format_args!("there is no patient called \"{name}\"; choose one of the list")))
         })
     }
 
     /// An edited patient, checked.
-    fn edited(&self, json: &serde_json::Value) -> Result<Profile, Failure> {
+    fn edited(&self, json: &serde_json::Value) -> Result<Profile, Error> {
         let text = toml::to_string(json).map_err(|cause| {
-            Failure::input(format_args!("the edited patient is not a profile ({cause}); correct it"))
+            Error::input(format_args!("the edited patient is not a profile ({cause}); correct it"))
         })?;
         Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)
     }
@@ -174,7 +174,7 @@ impl PatientManager {
 }
 
 /// Returns the requested procedure or, if it makes no sense in this patient, the one that the patient's file names.
-fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Failure> {
+fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Error> {
     Procedure::find(wanted, profile)
         .or_else(|cause| Procedure::find(&profile.procedure, profile).map_err(|_| cause))
 }

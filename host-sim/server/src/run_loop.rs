@@ -8,7 +8,7 @@ use control_core::Patient;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::device::{Port, Wire};
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::lockstep;
 use device_sim::session::{Control, PatientAnswer, Subscription};
 use recording::run_stats::RunStats;
@@ -105,7 +105,7 @@ impl<'a> RunLoop<'a> {
         mut device: VirtualDevice,
         mut clock: RealtimeClock,
         mut progress: impl FnMut(u64),
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome, Error> {
         self.driver.connected(Duration::ZERO);
         while !self.is_over() {
             let now = lockstep::time(device.ticks());
@@ -153,7 +153,7 @@ impl<'a> RunLoop<'a> {
         port: &mut dyn Port,
         seconds: Option<f64>,
         mut progress: impl FnMut(u64),
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome, Error> {
         let begin = Instant::now();
         let mut wire: Option<Box<dyn Wire>> = None;
         let mut next_try = Duration::ZERO;
@@ -190,7 +190,7 @@ impl<'a> RunLoop<'a> {
                 self.driver.notice().filter(|_| !self.person_starts && !self.driver.has_started())
             {
                 // Nobody would see it in a page.
-                return Err(Failure::failed(why));
+                return Err(Error::failed(why));
             }
             self.report(now);
             progress(self.outlets.stats.samples);
@@ -300,7 +300,7 @@ impl<'a> RunLoop<'a> {
     }
 
     /// Asks the device for another patient, or says why not.
-    fn ask_patient(&mut self, ask: impl FnOnce(&mut PatientManager) -> Result<Patient, Failure>) {
+    fn ask_patient(&mut self, ask: impl FnOnce(&mut PatientManager) -> Result<Patient, Error>) {
         let Some(patients) = &mut self.patients else { return };
         match ask(patients) {
             Ok(patient) => self.driver.configure_patient(patient),
@@ -322,9 +322,9 @@ impl<'a> RunLoop<'a> {
                 practice.patient(patients.profile(), &patients.setup().tasks, &self.outlets.publisher);
             }
             let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(patients.setup()));
-            if let Err(failure) = written {
+            if let Err(error) = written {
                 self.outlets.recorder = None;
-                self.outlets.failure = Some(failure);
+                self.outlets.error = Some(error);
             }
         } else {
             patients.refused();
@@ -340,27 +340,27 @@ impl<'a> RunLoop<'a> {
 
     fn is_over(&self) -> bool {
         self.outlets.stats.is_full()
-            || self.outlets.failure.is_some()
+            || self.outlets.error.is_some()
             || self.driver.refused().is_some()
             || self.stop.load(Ordering::Relaxed)
     }
 
-    fn never_ready(&self) -> Failure {
-        Failure::failed(format_args!(
+    fn never_ready(&self) -> Error {
+        Error::failed(format_args!(
             "the device did not answer within {} s; check that it runs this project's firmware and is not in use elsewhere",
             FIRST_ANSWER.as_secs()
         ))
     }
 
-    fn finish(mut self) -> Result<Outcome, Failure> {
+    fn finish(mut self) -> Result<Outcome, Error> {
         let link = self.driver.counts();
         let recorder = self.outlets.recorder.take();
         let recorded_bytes = recorder.map(|recorder| recorder.finish(link.into())).transpose();
-        if let Some(failure) = self.outlets.failure {
-            return Err(failure);
+        if let Some(error) = self.outlets.error {
+            return Err(error);
         }
         if let Some(refused) = self.driver.refused() {
-            return Err(Failure::failed(refused));
+            return Err(Error::failed(refused));
         }
         Ok(Outcome { link, stats: self.outlets.stats, recorded_bytes: recorded_bytes? })
     }

@@ -1,6 +1,6 @@
 //! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen like those of the program.
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::named_files::Text;
 use device_sim::named_files::is_file_name;
 use device_sim::profile;
@@ -36,7 +36,7 @@ impl SavedPatients {
     }
 
     /// Returns the text of the patient called `name`; none if there is no such file.
-    pub fn read(&self, name: &str) -> Option<Result<Text, Failure>> {
+    pub fn read(&self, name: &str) -> Option<Result<Text, Error>> {
         let file = self.file(name);
         if !is_file_name(name) || !file.is_file() {
             return None;
@@ -49,33 +49,33 @@ impl SavedPatients {
             fs::read_to_string(&file)
         };
         Some(read().map(|text| Text { origin: origin.clone(), text }).map_err(|cause| {
-            Failure::input(format_args!("{origin}: the patient cannot be read ({cause}); choose another"))
+            Error::input(format_args!("{origin}: the patient cannot be read ({cause}); choose another"))
         }))
     }
 
     /// Returns `name` or, where a patient has it already, the next of `name-2`, `name-3` and so on.
-    pub(crate) fn free_name(&self, name: &str) -> Result<String, Failure> {
+    pub(crate) fn free_name(&self, name: &str) -> Result<String, Error> {
         let is_free = |name: &str| {
             !profile::BUILT_IN.iter().any(|(known, _)| *known == name) && !self.file(name).exists()
         };
         let mut names =
             (1..=MOST_OF_A_NAME).map(|n| if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
         names.find(|name| is_free(name)).ok_or_else(|| {
-            Failure::input(format_args!(
+            Error::input(format_args!(
                 "there are {MOST_OF_A_NAME} patients called {name}; choose another name"
             ))
         })
     }
 
     /// Writes a new file; its path.
-    pub fn write(&self, name: &str, text: &str) -> Result<String, Failure> {
+    pub fn write(&self, name: &str, text: &str) -> Result<String, Error> {
         let file = self.file(name);
         let shown = file.display().to_string();
         let written = fs::create_dir_all(&self.folder)
             .and_then(|()| fs::File::create_new(&file))
             .and_then(|mut new| new.write_all(text.as_bytes()));
         written.map(|()| shown.clone()).map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{shown}: the patient cannot be saved ({cause}); start the program in a folder that can be written"
             ))
         })

@@ -7,7 +7,7 @@ use crate::run_loop::RunLoop;
 use control_core::TICK_HZ;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
 use device_sim::session::{self, Source};
@@ -19,12 +19,12 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// One round of `procedure` on `profile`, recorded in `file`, and read from there.
-pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
+pub fn record(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Error> {
     record_with(profile, procedure, file, false)
 }
 
 /// The same with depth counted from the surface of the deformed tissue.
-pub fn record_deformed(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Failure> {
+pub fn record_deformed(profile: &Profile, procedure: Procedure, file: &Path) -> Result<Recording, Error> {
     record_with(profile, procedure, file, true)
 }
 
@@ -33,7 +33,7 @@ fn record_with(
     procedure: Procedure,
     file: &Path,
     is_deformed: bool,
-) -> Result<Recording, Failure> {
+) -> Result<Recording, Error> {
     let (_, publisher) = session::open(profile.scene(Source::Virtual, Some(procedure.name.clone())));
     let setup = Setup {
         program: recording::version::program(),

@@ -2,7 +2,7 @@
 
 use super::confirm::needle_is_out;
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::BareDevice;
 use lab::characterise::{self, News, programme, written};
@@ -39,7 +39,7 @@ pub(crate) struct Characterise {
 }
 
 impl Characterise {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let config = characterise::configuration();
         let hello = characterise::scale(&config)?;
         let nominal = written::nominal_rig(&hello);
@@ -57,13 +57,13 @@ impl Characterise {
         };
         let tracks = if is_virtual {
             let (truth, file) = match &self.plant {
-                Some(path) => (Rig::read(path).map_err(Failure::input)?, path.display().to_string()),
+                Some(path) => (Rig::read(path).map_err(Error::input)?, path.display().to_string()),
                 None => (nominal, "the nominal rig".to_owned()),
             };
             characterise::on_virtual(&mut BareDevice::new(&truth, &file)?, &programmes, news)?
         } else {
             if self.plant.is_some() {
-                return Err(Failure::input(
+                return Err(Error::input(
                     "--plant is for the virtual device: a real one has its own mechanism",
                 ));
             }

@@ -3,7 +3,7 @@
 use super::confirm::{Consent, ConsentFlags};
 use clap::Args;
 use device_sim::device::Port;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use lab::characterise::mechanism::Wiring;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
@@ -46,7 +46,7 @@ pub(crate) struct Commission {
 }
 
 impl Commission {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let wish = self.wish()?;
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;
@@ -63,7 +63,7 @@ impl Commission {
         }
         if let Some(path) = &self.out {
             std::fs::write(path, outcome.to_toml(&self.device)?).map_err(|cause| {
-                Failure::input(format_args!(
+                Error::input(format_args!(
                     "{}: the file cannot be written ({cause}); the device is commissioned; choose another --out",
                     path.display()
                 ))
@@ -74,37 +74,37 @@ impl Commission {
         Ok(())
     }
 
-    fn wish(&self) -> Result<Wish, Failure> {
+    fn wish(&self) -> Result<Wish, Error> {
         if !(10.0..=1000.0).contains(&self.pull_mm) {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "--pull-mm is {}; it must be from 10 to 1000",
                 self.pull_mm
             )));
         }
         if !(1..=20).contains(&self.turns) {
-            return Err(Failure::input(format_args!("--turns is {}; it must be from 1 to 20", self.turns)));
+            return Err(Error::input(format_args!("--turns is {}; it must be from 1 to 20", self.turns)));
         }
         if self.counts_per_turn.is_some_and(|counts| counts < 256) {
-            return Err(Failure::input("--counts-per-turn must be from 256 to 65535"));
+            return Err(Error::input("--counts-per-turn must be from 256 to 65535"));
         }
         Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
     }
 
-    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Outcome, Failure> {
+    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Outcome, Error> {
         let scale = characterise::scale(&characterise::configuration())?;
         let rig = written::nominal_rig(&scale);
         let line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
         on(line, wish, consent)
     }
 
-    fn on_port(&self, wish: &Wish, consent: &Consent, stop: &AtomicBool) -> Result<Outcome, Failure> {
+    fn on_port(&self, wish: &Wish, consent: &Consent, stop: &AtomicBool) -> Result<Outcome, Error> {
         let mut port = SerialPort::find(&self.device)?;
         consent.needle_is_out()?;
-        on(WireLine::new(port.open().map_err(Failure::failed)?, stop), wish, consent)
+        on(WireLine::new(port.open().map_err(Error::failed)?, stop), wish, consent)
     }
 }
 
-fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<Outcome, Failure> {
+fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<Outcome, Error> {
     let mut line = GuidedLine { line, guide: consent.guide() };
     commission::commission(&mut line, wish, |step: Step| consent.ask(&step, step.moves()))
 }

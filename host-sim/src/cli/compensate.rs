@@ -3,7 +3,7 @@
 use super::confirm::{Consent, ConsentFlags};
 use clap::Args;
 use device_sim::device::Port;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
@@ -51,9 +51,9 @@ pub(crate) struct Compensate {
 }
 
 impl Compensate {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         if !(0.0..=1.0).contains(&self.gain) {
-            return Err(Failure::input(format_args!("--gain is {}; it must be from 0 to 1", self.gain)));
+            return Err(Error::input(format_args!("--gain is {}; it must be from 0 to 1", self.gain)));
         }
         let rig = compensate::read_report(&self.report)?;
         let stop = Arc::new(AtomicBool::new(false));
@@ -67,31 +67,29 @@ impl Compensate {
         Ok(())
     }
 
-    fn on_device(&self, rig: &Rig, consent: &Consent, stop: &AtomicBool) -> Result<Vec<String>, Failure> {
+    fn on_device(&self, rig: &Rig, consent: &Consent, stop: &AtomicBool) -> Result<Vec<String>, Error> {
         if self.device == "virtual" {
             return self.on(self.virtual_line()?, rig, consent);
         }
         if self.plant.is_some() {
-            return Err(Failure::input(
-                "--plant is for the virtual device: a real one has its own mechanism",
-            ));
+            return Err(Error::input("--plant is for the virtual device: a real one has its own mechanism"));
         }
         let mut port = SerialPort::find(&self.device)?;
         consent.needle_is_out()?;
-        self.on(WireLine::new(port.open().map_err(Failure::failed)?, stop), rig, consent)
+        self.on(WireLine::new(port.open().map_err(Error::failed)?, stop), rig, consent)
     }
 
-    fn virtual_line(&self) -> Result<VirtualLine, Failure> {
+    fn virtual_line(&self) -> Result<VirtualLine, Error> {
         let scale = characterise::scale(&characterise::configuration())?;
         let (plant, file) = match &self.plant {
-            Some(path) => (Rig::read(path).map_err(Failure::input)?, path.display().to_string()),
+            Some(path) => (Rig::read(path).map_err(Error::input)?, path.display().to_string()),
             None => (written::nominal_rig(&scale), "the nominal rig".to_owned()),
         };
         VirtualLine::commissioned(&plant, &file, scale.roller_radius_mm)
     }
 
     /// Runs on `line` and returns the result, one line each.
-    fn on(&self, line: impl Line, rig: &Rig, consent: &Consent) -> Result<Vec<String>, Failure> {
+    fn on(&self, line: impl Line, rig: &Rig, consent: &Consent) -> Result<Vec<String>, Error> {
         let mut line = GuidedLine { line, guide: consent.guide() };
         if self.align {
             consent.ask(&Step::Before, true)?;

@@ -3,7 +3,7 @@
 use super::Cli;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::{examples, say};
 
 /// Print a script with which a shell completes commands and options.
@@ -19,7 +19,7 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "host-sim", &mut script);
         // clap_complete 4.6 takes the hyphen of the program's name for the boundary of a subcommand where bash looks one up.

@@ -1,7 +1,7 @@
 //! The consent of a person before a motor moves: on the terminal, or in the page of a guide.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::output;
 use server::guide::Guide;
 use server::visualizer::{self, Server};
@@ -26,11 +26,11 @@ pub(crate) struct ConsentFlags {
 
 impl ConsentFlags {
     /// Opens the page where one was asked for; `title` is its heading, `stop` ends its waits.
-    pub(crate) fn open(&self, title: &str, device: &str, stop: &Arc<AtomicBool>) -> Result<Consent, Failure> {
+    pub(crate) fn open(&self, title: &str, device: &str, stop: &Arc<AtomicBool>) -> Result<Consent, Error> {
         let guide = if self.page {
             let guide = Guide::new(title, device, stop.clone());
             let server = visualizer::serve_guide(guide.watches(), guide.said(), self.port);
-            let server = server.map_err(Failure::failed)?;
+            let server = server.map_err(Error::failed)?;
             output::page("guide", &server.url());
             Some((guide, server))
         } else {
@@ -54,7 +54,7 @@ impl Consent {
     }
 
     /// Announces the next step. Waits for a person to agree if the motor `moves`, and always on a page.
-    pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Failure> {
+    pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Error> {
         match &self.guide {
             Some((guide, _)) => guide.ask(step, moves),
             None if moves => confirm(step, self.yes),
@@ -66,14 +66,14 @@ impl Consent {
     }
 
     /// Shows the result on the page.
-    pub(crate) fn end(&self, outcome: Result<Vec<String>, &Failure>) {
+    pub(crate) fn end(&self, outcome: Result<Vec<String>, &Error>) {
         if let Some((guide, _)) = &self.guide {
             guide.end(outcome);
         }
     }
 
     /// Asks that the needle is out, because the motor will move on its own.
-    pub(crate) fn needle_is_out(&self) -> Result<(), Failure> {
+    pub(crate) fn needle_is_out(&self) -> Result<(), Error> {
         match &self.guide {
             // Nothing moves before the next step.
             Some((guide, _)) => guide.ask(&NEEDLE_OUT, false),
@@ -85,7 +85,7 @@ impl Consent {
 const NEEDLE_OUT: &str = "the roller will move on its own: take the needle out of the device, and keep hands off unless a step asks for them";
 
 /// Announces `what` and waits for Enter; with `yes`, only announces it.
-fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
+fn confirm(what: &dyn Display, yes: bool) -> Result<(), Error> {
     eprintln!("{what}");
     if yes {
         return Ok(());
@@ -94,11 +94,11 @@ fn confirm(what: &dyn Display, yes: bool) -> Result<(), Failure> {
     let mut line = String::new();
     match std::io::stdin().lock().read_line(&mut line) {
         Ok(read) if read > 0 => Ok(()),
-        _ => Err(Failure::input("the movement was not confirmed; in a script, add --yes")),
+        _ => Err(Error::input("the movement was not confirmed; in a script, add --yes")),
     }
 }
 
 /// The same as [`Consent::needle_is_out`] without a page.
-pub(crate) fn needle_is_out(yes: bool) -> Result<(), Failure> {
+pub(crate) fn needle_is_out(yes: bool) -> Result<(), Error> {
     confirm(&NEEDLE_OUT, yes)
 }

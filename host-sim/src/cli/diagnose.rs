@@ -1,7 +1,7 @@
 //! `host-sim diagnose`: which physics the simulation leaves out.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::{Made, Request};
 use live::progress::Progress;
 use live::{examples, say};
@@ -38,7 +38,7 @@ pub(crate) struct Diagnose {
 }
 
 impl Diagnose {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let formats = super::export::formats(&self.export)?;
         let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout, effects: self.effects };
         let bar = Mutex::new(Progress::new("diagnosing"));
@@ -47,11 +47,11 @@ impl Diagnose {
                 bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
             }
         };
-        let mut outcome = diagnosis::diagnose(&request, &show).map_err(Failure::input)?;
+        let mut outcome = diagnosis::diagnose(&request, &show).map_err(Error::input)?;
         drop(bar);
         outcome.made = Some(made(&request));
         outcome.write(&self.out).map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: the report cannot be written ({cause}); free some space or choose another --out",
                 self.out.display()
             ))

@@ -1,7 +1,7 @@
 //! `host-sim experiment`: the input that best tells the rivals of a diagnosis apart.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use experiment::{Case, design};
 use live::{examples, say};
 use std::path::PathBuf;
@@ -41,13 +41,13 @@ pub(crate) struct Experiment {
 }
 
 impl Experiment {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         if !(4.0..=MOST_S).contains(&self.seconds) {
-            return Err(Failure::input("--seconds must be between 4 and 30; correct it"));
+            return Err(Error::input("--seconds must be between 4 and 30; correct it"));
         }
-        let case = Case::read(&self.report, self.travel, self.speed, self.force).map_err(Failure::input)?;
-        let design = design(&case, self.seconds, self.seed).map_err(Failure::input)?;
-        let paths = design.write(&self.out).map_err(Failure::failed)?;
+        let case = Case::read(&self.report, self.travel, self.speed, self.force).map_err(Error::input)?;
+        let design = design(&case, self.seconds, self.seed).map_err(Error::input)?;
+        let paths = design.write(&self.out).map_err(Error::failed)?;
         say!("{}", design.summary().trim_end());
         for path in paths {
             say!("{}", path.display());

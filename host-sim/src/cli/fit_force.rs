@@ -1,7 +1,7 @@
 //! `host-sim fit-force`.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use lab::force_fit::{self, Fit, insertions, page, table::Origin, writer};
 use live::{examples, say};
 use std::path::{Path, PathBuf};
@@ -26,19 +26,19 @@ pub(crate) struct FitForce {
 }
 
 impl FitForce {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         if let Some(both) = self.files.iter().find(|file| self.holdout.contains(file)) {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{}: is both to fit to and to judge by; give it once",
                 both.display()
             )));
         }
-        let read = |files: &[PathBuf]| -> Result<Vec<_>, Failure> {
+        let read = |files: &[PathBuf]| -> Result<Vec<_>, Error> {
             Ok(files.iter().map(|f| insertions::read(f)).collect::<Result<Vec<_>, _>>()?.concat())
         };
         let (seen, unseen) = (read(&self.files)?, read(&self.holdout)?);
         let fit = force_fit::fit(seen, &unseen)
-            .ok_or_else(|| Failure::input("the recordings hold no insertion to fit to; give others"))?;
+            .ok_or_else(|| Error::input("the recordings hold no insertion to fit to; give others"))?;
         save(&self.out, &writer::toml(&fit))?;
         let shown = self.out.with_extension("html");
         save(&shown, &page::html(&fit))?;
@@ -49,9 +49,9 @@ impl FitForce {
     }
 }
 
-fn save(path: &Path, text: &str) -> Result<(), Failure> {
+fn save(path: &Path, text: &str) -> Result<(), Error> {
     std::fs::write(path, text).map_err(|cause| {
-        Failure::failed(format_args!("{}: cannot be written ({cause}); choose another --out", path.display()))
+        Error::failed(format_args!("{}: cannot be written ({cause}); choose another --out", path.display()))
     })
 }
 

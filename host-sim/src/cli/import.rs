@@ -3,7 +3,7 @@
 use clap::Args;
 use convert::import::{self, Keep, Known, Request, RigValues};
 use convert::shell::quoted;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::{examples, note, say};
 use std::path::PathBuf;
 
@@ -66,7 +66,7 @@ pub(crate) struct Import {
 }
 
 impl Import {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let positive = [
             ("--rate", self.rate),
             ("--counts-per-turn", self.counts_per_turn),
@@ -75,14 +75,14 @@ impl Import {
         ];
         for (option, value) in positive {
             if value.is_some_and(|x| !(x.is_finite() && x > 0.0)) {
-                return Err(Failure::input(format_args!("{option} must be a number above zero; correct it")));
+                return Err(Error::input(format_args!("{option} must be a number above zero; correct it")));
             }
         }
         if self.gain.is_some_and(|x| !x.is_finite() || x == 0.0) {
-            return Err(Failure::input("--gain must be a number other than zero; correct it"));
+            return Err(Error::input("--gain must be a number other than zero; correct it"));
         }
         if self.split.is_some_and(|x| !(0.1..=0.9).contains(&x)) {
-            return Err(Failure::input("--split must be between 0.1 and 0.9; 0.6 is usual"));
+            return Err(Error::input("--split must be between 0.1 and 0.9; 0.6 is usual"));
         }
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let done = import::import(&Request {

@@ -2,7 +2,7 @@
 
 use super::Cli;
 use clap::{Args, CommandFactory};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::{examples, say};
 use std::path::PathBuf;
 
@@ -16,13 +16,13 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let write = || {
             std::fs::create_dir_all(&self.out)?;
             clap_mangen::generate_to(Cli::command().disable_help_subcommand(true), &self.out)
         };
         write().map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: the pages cannot be written ({cause}); free some space or choose another --out",
                 self.out.display()
             ))

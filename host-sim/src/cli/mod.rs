@@ -17,7 +17,7 @@ mod settle;
 mod simulate;
 
 use clap::{Parser, Subcommand};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::examples;
 
 /// The PC side of the needle insertion device: run it (virtual or real), watch it, record it, export and score recordings.
@@ -52,7 +52,7 @@ enum Command {
 }
 
 impl Cli {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         self.options.apply();
         match self.command {
             None => live::Command::usual().run(),

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use convert::export;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::replay::read;
 use live::{examples, say};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub(crate) struct Export {
 }
 
 impl Export {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let recording = read(&self.file)?;
         let exported = export::export(&recording, &self.out)?;
         say!("{}", exported.rig.display());

@@ -1,7 +1,7 @@
 //! `host-sim reproduce`: the papers' figures beside ours.
 
 use clap::Args;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use live::{examples, say};
 use reproduce::{PAPERS, Paper, reproduce};
 use std::path::PathBuf;
@@ -19,13 +19,13 @@ pub(crate) struct Reproduce {
 }
 
 impl Reproduce {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let wanted: Vec<Paper> = match &self.paper {
             None => PAPERS.to_vec(),
             Some(number) => PAPERS.into_iter().filter(|p| p.number() == number).collect(),
         };
         if wanted.is_empty() {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "--paper is {}; it must be 000, 001 or 002",
                 self.paper.unwrap_or_default()
             )));

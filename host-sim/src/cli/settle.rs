@@ -2,7 +2,7 @@
 
 use super::confirm::{Consent, ConsentFlags};
 use clap::{Args, ValueEnum};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::settle::{
     self, Feel, Inputs, MOST_MOTION_S, MOST_ROUNDS, Plant, Progress, Settings, Settled, Subject,
@@ -68,12 +68,12 @@ pub(crate) struct Settle {
 }
 
 impl Settle {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         if !(1..=MOST_ROUNDS).contains(&self.rounds) {
-            return Err(Failure::input(format_args!("--rounds must be 1 to {MOST_ROUNDS}; correct it")));
+            return Err(Error::input(format_args!("--rounds must be 1 to {MOST_ROUNDS}; correct it")));
         }
         if !(20.0..=MOST_MOTION_S).contains(&self.motion) {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "--motion must be 20 to {MOST_MOTION_S:.0} s; correct it"
             )));
         }
@@ -91,13 +91,13 @@ impl Settle {
         outcome.map(drop)
     }
 
-    fn on_device(&self, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Failure> {
+    fn on_device(&self, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Error> {
         match &self.plant {
             Some(_) if self.device != "virtual" => {
-                Err(Failure::input("--plant is for the virtual device: a real one has its own mechanism"))
+                Err(Error::input("--plant is for the virtual device: a real one has its own mechanism"))
             }
             Some(path) => {
-                let rig = Rig::read(path).map_err(Failure::input)?;
+                let rig = Rig::read(path).map_err(Error::input)?;
                 self.on(
                     &mut Subject::Virtual(Box::new(Plant { rig, file: path.display().to_string() })),
                     consent,
@@ -112,14 +112,14 @@ impl Settle {
         }
     }
 
-    fn on(&self, subject: &mut Subject, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Failure> {
+    fn on(&self, subject: &mut Subject, consent: &Consent, stop: &AtomicBool) -> Result<Settled, Error> {
         let rig = match &self.rig {
-            Some(path) => Rig::read(path).map_err(Failure::input)?,
+            Some(path) => Rig::read(path).map_err(Error::input)?,
             None => subject.data_sheet_rig()?,
         };
         settle::settle(subject, &rig, &self.settings(), |progress| {
             if stop.load(Ordering::Relaxed) {
-                return Err(Failure::failed("stopped before the end; the rounds so far are in --out"));
+                return Err(Error::failed("stopped before the end; the rounds so far are in --out"));
             }
             match progress {
                 Progress::Asked(number, asked, why) => {

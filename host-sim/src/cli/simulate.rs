@@ -2,7 +2,7 @@
 
 use clap::Args;
 use convert::simulated;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::recording::Recording;
 use diagnosis::report::{motion_picture, simulation_page};
 use diagnosis::rig::Rig;
@@ -42,8 +42,8 @@ pub(crate) struct Simulate {
 }
 
 /// Returns the rigs to simulate: with a report's patched rig, also the others in its folder.
-fn models(path: &Path) -> Result<Vec<(String, Rig)>, Failure> {
-    let rig = Rig::read(path).map_err(Failure::input)?;
+fn models(path: &Path) -> Result<Vec<(String, Rig)>, Error> {
+    let rig = Rig::read(path).map_err(Error::input)?;
     if path.file_name().is_none_or(|name| name != "patched-rig.toml") {
         return Ok(vec![("nominal".into(), rig)]);
     }
@@ -51,7 +51,7 @@ fn models(path: &Path) -> Result<Vec<(String, Rig)>, Failure> {
     for name in ["nominal", "refit"] {
         let beside = path.with_file_name(format!("{name}-rig.toml"));
         if beside.exists() {
-            out.push((name.to_owned(), Rig::read(&beside).map_err(Failure::input)?));
+            out.push((name.to_owned(), Rig::read(&beside).map_err(Error::input)?));
         }
     }
     out.push(("patched".into(), rig));
@@ -97,7 +97,7 @@ impl Simulate {
         items
     }
 
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(self) -> Result<(), Error> {
         let formats = super::export::formats(&self.export)?;
         let mut models = models(&self.rig)?;
         let recordings = read_all(&self.recording)?;
@@ -150,13 +150,13 @@ impl Simulate {
         notes
     }
 
-    fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+    fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Error> {
         let write = || {
             std::fs::create_dir_all(&self.out)?;
             files.iter().try_for_each(|(name, bytes)| std::fs::write(self.out.join(name), bytes))
         };
         write().map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: cannot be written ({cause}); free some space or choose another --out",
                 self.out.display()
             ))
@@ -164,14 +164,14 @@ impl Simulate {
     }
 }
 
-fn read_all(paths: &[PathBuf]) -> Result<Vec<Recording>, Failure> {
-    paths.iter().map(|path| Recording::read(path).map_err(Failure::input)).collect()
+fn read_all(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+    paths.iter().map(|path| Recording::read(path).map_err(Error::input)).collect()
 }
 
 /// Returns the names and contents of the files: the page, its figures, and a CSV and an MCAP for each recording.
-fn files(page: String, compared: &[Comparison], notes: &[String]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+fn files(page: String, compared: &[Comparison], notes: &[String]) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let json =
-        serde_json::to_string_pretty(&motion_picture::summary(compared, notes)).map_err(Failure::failed)?;
+        serde_json::to_string_pretty(&motion_picture::summary(compared, notes)).map_err(Error::failed)?;
     let mut files = vec![
         ("simulation.html".to_owned(), page.into_bytes()),
         ("simulation.json".to_owned(), (json + "\n").into_bytes()),

@@ -12,7 +12,7 @@ use lab::characterise::programme::{Programme, Step};
 use lab::characterise::sequencer::Sequencer;
 use lab::characterise::{self, programme, written};
 use link::codec::{self, Decoder, MAX_FRAME};
-use link::frames::{Ack, DeviceFrame, HostFrame, Numbered, Rejection};
+use link::frames::{Ack, CommandRefusal, DeviceFrame, HostFrame, Numbered};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -137,7 +137,7 @@ fn a_device_of_an_older_protocol_says_what_to_do() {
     let bytes = sequencer.transmit(Duration::ZERO, |_| {}).to_vec();
     let hello =
         bytes.iter().find_map(|byte| decoder.push::<HostFrame>(*byte)).expect("a hello").expect("whole");
-    let ack = Ack { id: hello.id, result: Err(Rejection::Version) };
+    let ack = Ack { id: hello.id, result: Err(CommandRefusal::Version) };
     let mut out = [0; MAX_FRAME];
     let length =
         codec::encode(&Numbered { sequence: 0, frame: DeviceFrame::Ack(ack) }, &mut out).expect("it fits");

@@ -1,7 +1,7 @@
 //! Commissioning the virtual device over the link, with what a bench gets wrong in its wires.
 
 use control_core::Device;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::{Channel, Wiring};
 use lab::characterise::{self, written};
@@ -16,11 +16,7 @@ fn rig() -> Rig {
     written::nominal_rig(&scale)
 }
 
-fn commission_on(
-    rig: &Rig,
-    wiring: Wiring,
-    tilt: (f64, f64),
-) -> (Result<Outcome, Failure>, Vec<Step>, Device) {
+fn commission_on(rig: &Rig, wiring: Wiring, tilt: (f64, f64)) -> (Result<Outcome, Error>, Vec<Step>, Device) {
     let line = VirtualLine::new(rig, "the test's rig", wiring, RADIUS_MM).expect("rotary, in DAC steps");
     let mut line = line.with_tilt(tilt.0, tilt.1);
     let mut steps = Vec::new();

@@ -1,4 +1,4 @@
-//! docs/glossary.md has every verdict, fault, rejection and refusal, in the words that the program prints.
+//! docs/glossary.md has every verdict, fault and refusal, in the words that the program prints.
 
 use control_core::Refusal;
 use control_core::event::Fault;
@@ -7,7 +7,7 @@ use control_core::interlock::Interlock;
 use control_core::plan::Field;
 use diagnosis::Verdict;
 use fixed::types::I16F16;
-use link::frames::{Rejection, SaveFailure};
+use link::frames::{CommandRefusal, SaveError};
 
 const GLOSSARY: &str = include_str!("../../../docs/glossary.md");
 
@@ -20,7 +20,7 @@ fn rows(heading: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn the_glossary_quotes_every_fault_and_rejection_exactly() {
+fn the_glossary_quotes_every_fault_and_refusal_exactly() {
     let faults = rows("Faults");
     assert_eq!(faults.len(), 1 + Fault::ALL.len(), "a head and a row each");
     for fault in Fault::ALL {
@@ -28,15 +28,15 @@ fn the_glossary_quotes_every_fault_and_rejection_exactly() {
         assert!(faults.iter().any(|row| row.contains(&wanted)), "{fault:?}: {wanted}");
     }
     let own = [
-        Rejection::Powered,
-        Rejection::Version,
-        Rejection::Full,
-        Rejection::NoSession,
+        CommandRefusal::Powered,
+        CommandRefusal::Version,
+        CommandRefusal::Full,
+        CommandRefusal::NoSession,
         // Any field.
-        Rejection::Commissioned(Field::TorqueLimit),
-        Rejection::NotShown,
+        CommandRefusal::Commissioned(Field::TorqueLimit),
+        CommandRefusal::NotShown,
     ];
-    let interlocked = Interlock::ALL.map(Rejection::Interlocked);
+    let interlocked = Interlock::ALL.map(CommandRefusal::Interlocked);
     let sequence = [
         SequenceRefusal::TooLong { index: 1 },
         SequenceRefusal::TooMany,
@@ -47,15 +47,15 @@ fn the_glossary_quotes_every_fault_and_rejection_exactly() {
         SequenceRefusal::Damaged,
         SequenceRefusal::Late,
     ]
-    .map(Rejection::Sequence);
-    let kept = [SaveFailure::Flash, SaveFailure::Full, SaveFailure::TooLong];
+    .map(CommandRefusal::Sequence);
+    let kept = [SaveError::Flash, SaveError::Full, SaveError::TooLong];
     let sentences = own.iter().chain(&interlocked).chain(&sequence).map(ToString::to_string);
-    let sentences: Vec<String> = sentences.chain(kept.map(|failure| failure.to_string())).collect();
-    let rejections = rows("Rejections by the device");
+    let sentences: Vec<String> = sentences.chain(kept.map(|error| error.to_string())).collect();
+    let refusals = rows("Refusals of a command");
     // Two heads, and the two rows that point to the refusals.
-    assert_eq!(rejections.len(), 4 + sentences.len());
+    assert_eq!(refusals.len(), 4 + sentences.len());
     for sentence in sentences {
-        assert!(rejections.iter().any(|row| row.ends_with(&format!("| {sentence} |"))), "{sentence}");
+        assert!(refusals.iter().any(|row| row.ends_with(&format!("| {sentence} |"))), "{sentence}");
     }
 }
 

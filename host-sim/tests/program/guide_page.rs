@@ -1,7 +1,7 @@
 //! The guide in the page: it waits for a person before each step, takes nonsense for nothing, shows what came of it, and ends where
 //! the person or the program does.
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use serde_json::{Value, json};
 use server::guide::{Guide, Reading};
 use std::sync::Arc;
@@ -87,7 +87,7 @@ fn the_result_stays_until_it_has_been_read() {
     let (guide, _stop) = guide();
     let ending = {
         let guide = guide.clone();
-        thread::spawn(move || guide.end(Err(&Failure::failed("the leads are off"))))
+        thread::spawn(move || guide.end(Err(&Error::failed("the leads are off"))))
     };
     wait_for(&guide, "the end", |told| told["end"]["well"] == false);
     assert_eq!(told(&guide)["end"]["lines"][0], "the leads are off");

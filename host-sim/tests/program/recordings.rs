@@ -3,7 +3,7 @@
 use crate::common::{folder, run_well, text};
 use control_core::controller::Sample;
 use convert::export::export;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::profile::Profile;
 use link::device::{Endpoint, Identity};
 use link::frames::{Event, EventKind, Hello};
@@ -33,11 +33,7 @@ fn hello() -> Hello {
         .hello()
 }
 
-fn minute_of_blocks(
-    recorder: &mut Recorder<impl Write + Seek>,
-    from: u64,
-    blocks: u64,
-) -> Result<(), Failure> {
+fn minute_of_blocks(recorder: &mut Recorder<impl Write + Seek>, from: u64, blocks: u64) -> Result<(), Error> {
     (0..blocks)
         .try_for_each(|b| recorder.samples(from + b * 32, &[Sample { dac: 2048, ..Sample::default() }; 32]))
 }

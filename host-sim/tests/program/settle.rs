@@ -2,7 +2,7 @@
 
 use crate::common::folder;
 use device_sim::device::{Port, Wire};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::BareDevice;
 use lab::settle::{Inputs, Plant, Progress, Settings, Subject, settle};
@@ -155,7 +155,7 @@ fn a_person_refuses_the_first_movement() {
     let mut subject = Subject::Virtual(Box::new(Plant { rig: hidden(), file: "hidden.toml".into() }));
     let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
     let refused = settle(&mut subject, &rig, &settings(&out, 9.0, false), |progress| match progress {
-        Progress::Asked(..) => Err(Failure::failed("not now")),
+        Progress::Asked(..) => Err(Error::failed("not now")),
         _ => Ok(()),
     });
     assert_eq!(refused.expect_err("it was refused").to_string(), "not now");

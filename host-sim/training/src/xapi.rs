@@ -4,7 +4,7 @@
 use crate::practice::Goal;
 use crate::score::{Insertion, each};
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::profile::Profile;
 use recording::read::Recording;
 use serde_json::{Map, Value, json};
@@ -19,7 +19,7 @@ const OURS: &str = "urn:needle-insertion:";
 
 /// Returns a statement for each insertion: passed or failed, how long it took, the figures of `score`, and what was missing. `e_mail` is
 /// the trainee's.
-pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> Result<Vec<Value>, Failure> {
+pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> Result<Vec<Value>, Error> {
     let actor = actor(e_mail)?;
     let mut statements = Vec::new();
     each(recording, by, |span, judge, profile| {
@@ -40,7 +40,7 @@ fn utc(since_1970_s: u64) -> Option<String> {
 }
 
 /// The trainee, identified by an e-mail address.
-fn actor(e_mail: &str) -> Result<Value, Failure> {
+fn actor(e_mail: &str) -> Result<Value, Error> {
     let is_plain = |part: &str| {
         !part.is_empty()
             && !part.contains(|c: char| c.is_whitespace() || c.is_control() || "@<>\"".contains(c))
@@ -49,7 +49,7 @@ fn actor(e_mail: &str) -> Result<Value, Failure> {
         Some((name, domain)) if is_plain(name) && is_plain(domain) => {
             Ok(json!({ "objectType": "Agent", "mbox": format!("mailto:{e_mail}") }))
         }
-        _ => Err(Failure::input(format_args!(
+        _ => Err(Error::input(format_args!(
             "--actor is \"{e_mail}\"; it must be an e-mail address such as trainee@example.org"
         ))),
     }

@@ -1,8 +1,8 @@
-//! The PC's commands: each is carried out or rejected, and answered.
+//! The PC's commands: each is carried out or refused, and answered.
 
 use super::{Endpoint, Waiting};
 use crate::commissioning::{Proof, may_become};
-use crate::frames::{Ack, Command, HostFrame, PROTOCOL_VERSION, Rejection};
+use crate::frames::{Ack, Command, CommandRefusal, HostFrame, PROTOCOL_VERSION};
 use control_core::compensation::check::check;
 use control_core::config::Device;
 use control_core::excitation::Excitation;
@@ -38,16 +38,16 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
         let result = self.carry_out(frame.command);
         let ack = Ack { id: frame.id, result };
-        if result != Err(Rejection::Full) {
+        if result != Err(CommandRefusal::Full) {
             self.answered.write(ack);
         }
         // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered again.
         let _ = self.waiting.borrow_mut().acks.push_back(ack);
     }
 
-    fn carry_out(&mut self, command: Command) -> Result<(), Rejection> {
+    fn carry_out(&mut self, command: Command) -> Result<(), CommandRefusal> {
         if (self.powered || self.start_ordered) && needs_torque_off(&command) {
-            return Err(Rejection::Powered);
+            return Err(CommandRefusal::Powered);
         }
         match command {
             Command::Hello { version } => self.hello_to(version),
@@ -61,7 +61,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             }
             Command::Excite(excitation) => self.excite(excitation),
             Command::ConfigurePatient(patient) => {
-                self.configure(Plan::new(self.plan.device(), &patient).map_err(Rejection::Config)?)
+                self.configure(Plan::new(self.plan.device(), &patient).map_err(CommandRefusal::Config)?)
             }
             Command::ConfigureDevice(device) => {
                 may_become(self.plan.device(), &device)?;
@@ -85,7 +85,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 Ok(())
             }
             Command::Compensate(gains) => {
-                check(self.plan.device(), gains).map_err(Rejection::Config)?;
+                check(self.plan.device(), gains).map_err(CommandRefusal::Config)?;
                 self.order(Order::Compensate(gains))
             }
             Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
@@ -94,9 +94,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
-    fn hello_to(&mut self, version: u16) -> Result<(), Rejection> {
+    fn hello_to(&mut self, version: u16) -> Result<(), CommandRefusal> {
         if version != PROTOCOL_VERSION {
-            return Err(Rejection::Version);
+            return Err(CommandRefusal::Version);
         }
         self.forget_waiting();
         self.upload.forget();
@@ -107,7 +107,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.order(Order::Heartbeat)
     }
 
-    fn stop(&mut self) -> Result<(), Rejection> {
+    fn stop(&mut self) -> Result<(), CommandRefusal> {
         self.start_ordered = false;
         self.proof.interrupt();
         self.upload.forget();
@@ -116,19 +116,19 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.order(Order::Stop)
     }
 
-    fn start(&mut self) -> Result<(), Rejection> {
+    fn start(&mut self) -> Result<(), CommandRefusal> {
         self.may_give_torque()?;
         self.is_commissioned()?;
         if !self.zeroed {
-            return Err(Rejection::Interlocked(Interlock::NotZeroed));
+            return Err(CommandRefusal::Interlocked(Interlock::NotZeroed));
         }
         self.order(Order::Start)?;
         self.will_power_up();
         Ok(())
     }
 
-    fn excite(&mut self, excitation: Excitation) -> Result<(), Rejection> {
-        excitation.check(&self.plan).map_err(Rejection::Config)?;
+    fn excite(&mut self, excitation: Excitation) -> Result<(), CommandRefusal> {
+        excitation.check(&self.plan).map_err(CommandRefusal::Config)?;
         self.may_give_torque()?;
         let is_gentle = excitation.is_gentle();
         if !is_gentle {
@@ -148,25 +148,25 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.upload.forget();
     }
 
-    pub(super) fn is_commissioned(&self) -> Result<(), Rejection> {
+    pub(super) fn is_commissioned(&self) -> Result<(), CommandRefusal> {
         let is = self.plan.device().commissioned;
-        if is { Ok(()) } else { Err(Rejection::Interlocked(Interlock::NotCommissioned)) }
+        if is { Ok(()) } else { Err(CommandRefusal::Interlocked(Interlock::NotCommissioned)) }
     }
 
     /// Torque is given to a PC that listens, and under no interlock.
-    pub(super) fn may_give_torque(&self) -> Result<(), Rejection> {
+    pub(super) fn may_give_torque(&self) -> Result<(), CommandRefusal> {
         if !self.in_session {
-            return Err(Rejection::NoSession);
+            return Err(CommandRefusal::NoSession);
         }
-        self.interlocks.first().map_or(Ok(()), |interlock| Err(Rejection::Interlocked(interlock)))
+        self.interlocks.first().map_or(Ok(()), |interlock| Err(CommandRefusal::Interlocked(interlock)))
     }
 
     /// A patient for another device leaves; what is wrong with the device itself is wrong without a patient too.
-    fn configure_device(&mut self, device: &Device) -> Result<(), Rejection> {
-        self.identity.ceilings.check(device).map_err(Rejection::Config)?;
+    fn configure_device(&mut self, device: &Device) -> Result<(), CommandRefusal> {
+        self.identity.ceilings.check(device).map_err(CommandRefusal::Config)?;
         let plan = Plan::new(device, self.plan.patient())
             .or_else(|_| Plan::new(device, &Patient::nobody()))
-            .map_err(Rejection::Config)?;
+            .map_err(CommandRefusal::Config)?;
         let before = *self.plan.device();
         self.configure(plan)?;
         self.proof.keep(&before, device);
@@ -177,7 +177,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         Ok(())
     }
 
-    fn configure(&mut self, plan: Plan) -> Result<(), Rejection> {
+    fn configure(&mut self, plan: Plan) -> Result<(), CommandRefusal> {
         self.order(LargeOrder::Configure(plan.clone()))?;
         self.plan = plan;
         self.upload.forget();

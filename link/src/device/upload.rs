@@ -3,7 +3,7 @@
 use super::{Endpoint, Waiting};
 use crate::codec;
 use crate::commissioning::Proof;
-use crate::frames::Rejection;
+use crate::frames::CommandRefusal;
 use control_core::excitation::{Excitation, Prepared, Sequence, SequenceRefusal};
 use control_core::{LargeOrder, Plan, TICK_HZ};
 use core::borrow::BorrowMut;
@@ -63,21 +63,21 @@ impl Upload {
 }
 
 impl<W: BorrowMut<Waiting>> Endpoint<W> {
-    pub(super) fn upload(&mut self, index: u8, segment: Excitation) -> Result<(), Rejection> {
+    pub(super) fn upload(&mut self, index: u8, segment: Excitation) -> Result<(), CommandRefusal> {
         if !self.in_session {
-            return Err(Rejection::NoSession);
+            return Err(CommandRefusal::NoSession);
         }
-        self.upload.take(self.now, index, segment, &self.plan).map_err(Rejection::Sequence)
+        self.upload.take(self.now, index, segment, &self.plan).map_err(CommandRefusal::Sequence)
     }
 
-    pub(super) fn play(&mut self, count: u8, checksum: u32) -> Result<(), Rejection> {
+    pub(super) fn play(&mut self, count: u8, checksum: u32) -> Result<(), CommandRefusal> {
         self.may_give_torque()?;
         self.is_commissioned()?;
         match self.upload.prepared(self.now, count, checksum, &self.plan) {
             Ok(prepared) => self.order(LargeOrder::Play(prepared))?,
             Err(refusal) => {
                 self.upload.forget();
-                return Err(Rejection::Sequence(refusal));
+                return Err(CommandRefusal::Sequence(refusal));
             }
         }
         self.proof = Proof::None;

@@ -1,6 +1,6 @@
 //! Chromium as a process of our own: a fresh profile, no screen, nothing in the background, ended with its test.
 
-use super::Failure;
+use super::Error;
 use super::devtools::DevTools;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -52,16 +52,16 @@ pub struct Chromium {
 
 impl Chromium {
     /// Starts it with a fresh profile below `scratch`, without WebGPU.
-    pub fn start(scratch: &Path) -> Result<Self, Failure> {
+    pub fn start(scratch: &Path) -> Result<Self, Error> {
         Self::start_with(scratch, WEBGL)
     }
 
     /// The same with WebGPU computed by the processor.
-    pub fn start_with_webgpu(scratch: &Path) -> Result<Self, Failure> {
+    pub fn start_with_webgpu(scratch: &Path) -> Result<Self, Error> {
         Self::start_with(scratch, WEBGPU)
     }
 
-    fn start_with(scratch: &Path, graphics: &[&str]) -> Result<Self, Failure> {
+    fn start_with(scratch: &Path, graphics: &[&str]) -> Result<Self, Error> {
         let program = PROGRAMS.iter().find(|path| Path::new(path).exists()).ok_or_else(|| {
             format!("no browser at {}: run `cargo xtask test`, which installs Chromium", PROGRAMS[0])
         })?;
@@ -90,7 +90,7 @@ impl Chromium {
     }
 
     /// A new connection to it.
-    pub fn devtools(&self) -> Result<DevTools, Failure> {
+    pub fn devtools(&self) -> Result<DevTools, Error> {
         DevTools::connect(&self.address)
     }
 }
@@ -111,7 +111,7 @@ impl Drop for Chromium {
 }
 
 /// The address of the DevTools protocol, which Chromium prints when it is ready.
-fn announced(process: &mut Child) -> Result<String, Failure> {
+fn announced(process: &mut Child) -> Result<String, Error> {
     let stderr = process.stderr.take().ok_or("no standard error")?;
     let (sender, receiver) = mpsc::channel();
     // Reads on after the address: a full pipe would stop the browser.

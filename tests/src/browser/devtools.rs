@@ -1,6 +1,6 @@
 //! The DevTools protocol as far as a test needs it: a call and its answer, and the events that arrive in between.
 
-use super::Failure;
+use super::Error;
 use serde_json::{Value, json};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -24,7 +24,7 @@ const DRAIN_TIME: std::time::Duration = std::time::Duration::from_millis(300);
 
 impl DevTools {
     /// Connects to the address that the browser announced.
-    pub fn connect(address: &str) -> Result<Self, Failure> {
+    pub fn connect(address: &str) -> Result<Self, Error> {
         let host = address.strip_prefix("ws://").and_then(|rest| rest.split('/').next()).unwrap_or_default();
         let stream = TcpStream::connect(host).map_err(|e| format!("no DevTools at {host}: {e}"))?;
         let ready = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(ANSWER_TIMEOUT)));
@@ -35,7 +35,7 @@ impl DevTools {
     }
 
     /// From here on calls go to a new tab.
-    pub fn open_tab(&mut self) -> Result<(), Failure> {
+    pub fn open_tab(&mut self) -> Result<(), Error> {
         let text = |value: &Value, key: &str| value[key].as_str().map(str::to_owned).ok_or("no id of a tab");
         let tab = self.call("Target.createTarget", json!({ "url": "about:blank" }))?;
         let attach = json!({ "targetId": text(&tab, "targetId")?, "flatten": true });
@@ -45,7 +45,7 @@ impl DevTools {
     }
 
     /// Calls a method and waits for its result.
-    pub fn call(&mut self, method: &str, parameters: Value) -> Result<Value, Failure> {
+    pub fn call(&mut self, method: &str, parameters: Value) -> Result<Value, Error> {
         self.last_id += 1;
         let mut message = json!({ "id": self.last_id, "method": method, "params": parameters });
         if let Some(session) = &self.session {
@@ -68,7 +68,7 @@ impl DevTools {
     }
 
     /// Events that have arrived since the last time, oldest first.
-    pub fn events(&mut self) -> Result<Vec<Value>, Failure> {
+    pub fn events(&mut self) -> Result<Vec<Value>, Error> {
         // A page that streams never falls silent: what has not come by now is not waited for.
         let begin = Instant::now();
         while begin.elapsed() < DRAIN_TIME
@@ -80,7 +80,7 @@ impl DevTools {
     }
 
     /// The next message, if one arrives soon.
-    fn receive(&mut self) -> Result<Option<Value>, Failure> {
+    fn receive(&mut self) -> Result<Option<Value>, Error> {
         match self.socket.read() {
             Ok(Message::Text(text)) => {
                 serde_json::from_str(&text).map(Some).map_err(|e| format!("DevTools: {e}"))

@@ -14,10 +14,10 @@ pub use page::Page;
 pub use processor_time::loop_time;
 pub use program::{Places, Program};
 
-/// The browser's failure, in one sentence.
-pub type Failure = String;
+/// The browser's error, in one sentence.
+pub type Error = String;
 
 /// An error with what was seen instead, where something does not hold.
-pub fn check(what: &str, holds: bool, seen: impl std::fmt::Debug) -> Result<(), Failure> {
+pub fn check(what: &str, holds: bool, seen: impl std::fmt::Debug) -> Result<(), Error> {
     if holds { Ok(()) } else { Err(format!("{what}: not so, but {seen:?}")) }
 }

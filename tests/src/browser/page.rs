@@ -1,7 +1,7 @@
 //! A page in a tab: what a test does with it and what it reads from it.
 
 use super::devtools::DevTools;
-use super::{Chromium, Failure};
+use super::{Chromium, Error};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -13,13 +13,7 @@ pub struct Page {
 
 impl Page {
     /// Opens `url` in a view of `width` by `height` CSS pixels; a phone has fingers.
-    pub fn open(
-        browser: &Chromium,
-        url: &str,
-        width: u32,
-        height: u32,
-        phone: bool,
-    ) -> Result<Self, Failure> {
+    pub fn open(browser: &Chromium, url: &str, width: u32, height: u32, phone: bool) -> Result<Self, Error> {
         let mut devtools = browser.devtools()?;
         devtools.open_tab()?;
         for domain in ["Page", "Runtime", "Log", "Network"] {
@@ -32,28 +26,28 @@ impl Page {
     }
 
     /// Shows the page in a view of another size, in CSS pixels.
-    pub fn resize(&mut self, width: u32, height: u32, phone: bool) -> Result<(), Failure> {
+    pub fn resize(&mut self, width: u32, height: u32, phone: bool) -> Result<(), Error> {
         let view = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone });
         self.devtools.call("Emulation.setDeviceMetricsOverride", view)?;
         self.devtools.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": phone })).map(drop)
     }
 
     /// Light or dark, as the person's system would ask for.
-    pub fn dark(&mut self, dark: bool) -> Result<(), Failure> {
+    pub fn dark(&mut self, dark: bool) -> Result<(), Error> {
         let value = if dark { "dark" } else { "light" };
         let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": value }] });
         self.devtools.call("Emulation.setEmulatedMedia", features).map(drop)
     }
 
     /// The languages that the person prefers, as `de-CH,de`; the next load of a page hears of them.
-    pub fn languages(&mut self, tags: &str) -> Result<(), Failure> {
+    pub fn languages(&mut self, tags: &str) -> Result<(), Error> {
         let agent = self.text("navigator.userAgent")?;
         let asked = json!({ "userAgent": agent, "acceptLanguage": tags });
         self.devtools.call("Emulation.setUserAgentOverride", asked).map(drop)
     }
 
     /// The value of a JavaScript expression; a promise is waited for.
-    pub fn evaluate(&mut self, expression: &str) -> Result<Value, Failure> {
+    pub fn evaluate(&mut self, expression: &str) -> Result<Value, Error> {
         let ask = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let mut answer = self.devtools.call("Runtime.evaluate", ask)?;
         match answer.get("exceptionDetails") {
@@ -63,18 +57,18 @@ impl Page {
     }
 
     /// A number that an expression gives.
-    pub fn number(&mut self, expression: &str) -> Result<f64, Failure> {
+    pub fn number(&mut self, expression: &str) -> Result<f64, Error> {
         self.evaluate(expression)?.as_f64().ok_or_else(|| format!("{expression} is not a number"))
     }
 
     /// A text that an expression gives.
-    pub fn text(&mut self, expression: &str) -> Result<String, Failure> {
+    pub fn text(&mut self, expression: &str) -> Result<String, Error> {
         let value = self.evaluate(expression)?;
         value.as_str().map(str::to_owned).ok_or_else(|| format!("{expression} is not a text"))
     }
 
     /// Waits until an expression is true; what was waited for where it does not become so.
-    pub fn wait(&mut self, what: &str, limit: Duration, expression: &str) -> Result<(), Failure> {
+    pub fn wait(&mut self, what: &str, limit: Duration, expression: &str) -> Result<(), Error> {
         let begin = Instant::now();
         while begin.elapsed() < limit {
             // A page that is just being loaded has not everything yet.
@@ -88,7 +82,7 @@ impl Page {
     }
 
     /// Middle of the element with `id` in CSS pixels.
-    pub fn middle(&mut self, id: &str) -> Result<(f64, f64), Failure> {
+    pub fn middle(&mut self, id: &str) -> Result<(f64, f64), Error> {
         let rectangle = format!("document.getElementById('{id}').getBoundingClientRect()");
         let x = self.number(&format!("{rectangle}.x + {rectangle}.width / 2"))?;
         let y = self.number(&format!("{rectangle}.y + {rectangle}.height / 2"))?;
@@ -96,7 +90,7 @@ impl Page {
     }
 
     /// A mouse event as the system would send it: `mousePressed`, `mouseMoved` or `mouseReleased`, left button.
-    pub fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Failure> {
+    pub fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Error> {
         let buttons = if kind == "mouseReleased" { 0 } else { 1 };
         let event =
             json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
@@ -104,7 +98,7 @@ impl Page {
     }
 
     /// A finger: `touchStart`, `touchMove` or `touchEnd`.
-    pub fn touch(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Failure> {
+    pub fn touch(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Error> {
         let points = if kind == "touchEnd" { json!([]) } else { json!([{ "x": x, "y": y }]) };
         self.devtools
             .call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }))
@@ -112,14 +106,14 @@ impl Page {
     }
 
     /// Clicks the middle of the element with `id`.
-    pub fn click(&mut self, id: &str) -> Result<(), Failure> {
+    pub fn click(&mut self, id: &str) -> Result<(), Error> {
         let at = self.middle(id)?;
         self.mouse("mousePressed", at)?;
         self.mouse("mouseReleased", at)
     }
 
     /// Presses and lets go a key, e.g. `Escape`.
-    pub fn press(&mut self, key: &str, code: &str, windows_code: u32) -> Result<(), Failure> {
+    pub fn press(&mut self, key: &str, code: &str, windows_code: u32) -> Result<(), Error> {
         for kind in ["rawKeyDown", "keyUp"] {
             let event =
                 json!({ "type": kind, "key": key, "code": code, "windowsVirtualKeyCode": windows_code });
@@ -129,19 +123,19 @@ impl Page {
     }
 
     /// Writes a picture of the view to `file`, to be looked at.
-    pub fn photograph(&mut self, file: &std::path::Path) -> Result<(), Failure> {
+    pub fn photograph(&mut self, file: &std::path::Path) -> Result<(), Error> {
         let picture = self.screenshot()?;
         std::fs::write(file, picture).map_err(|e| format!("cannot write {}: {e}", file.display()))
     }
 
     /// The view as a PNG.
-    pub fn screenshot(&mut self) -> Result<Vec<u8>, Failure> {
+    pub fn screenshot(&mut self) -> Result<Vec<u8>, Error> {
         let picture = self.devtools.call("Page.captureScreenshot", json!({ "format": "png" }))?;
         decode_base64(picture["data"].as_str().unwrap_or_default()).ok_or_else(|| "not a picture".into())
     }
 
     /// Bytes of all answers to this page's requests so far, headers not counted.
-    pub fn transferred_bytes(&mut self) -> Result<f64, Failure> {
+    pub fn transferred_bytes(&mut self) -> Result<f64, Error> {
         self.number(
             "performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation')) \
              .reduce((sum, entry) => sum + entry.encodedBodySize, 0)",
@@ -149,7 +143,7 @@ impl Page {
     }
 
     /// Errors in the console and uncaught exceptions since the last time.
-    pub fn complaints(&mut self) -> Result<Vec<String>, Failure> {
+    pub fn complaints(&mut self) -> Result<Vec<String>, Error> {
         for event in self.devtools.events()? {
             let parameters = &event["params"];
             let complaint = match event["method"].as_str() {

@@ -1,7 +1,7 @@
 //! Processor time of the browser, in units of a loop timed on the same machine: a judgement of a picture's cost that holds on a
 //! slow machine as on a fast one.
 
-use super::Failure;
+use super::Error;
 use super::chromium::Chromium;
 use std::collections::HashMap;
 use std::fs;
@@ -16,7 +16,7 @@ const REPEATS: usize = 20;
 
 impl Chromium {
     /// Seconds of processor time that the browser and all its processes have used, user's and kernel's.
-    pub fn processor_s(&self) -> Result<f64, Failure> {
+    pub fn processor_s(&self) -> Result<f64, Error> {
         let processes = all_processes()?;
         let mut ticks = 0;
         let mut open = vec![self.id()];
@@ -47,7 +47,7 @@ struct Process {
     ticks: u32,
 }
 
-fn all_processes() -> Result<HashMap<u32, Process>, Failure> {
+fn all_processes() -> Result<HashMap<u32, Process>, Error> {
     let folder = fs::read_dir("/proc").map_err(|e| format!("cannot read /proc: {e}"))?;
     let ids = folder.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     // A process may end between the two readings.

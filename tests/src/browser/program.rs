@@ -1,6 +1,6 @@
 //! The program under test: found beside the test, started, asked where its page is, and ended.
 
-use super::Failure;
+use super::Error;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -20,7 +20,7 @@ pub struct Places {
 
 impl Places {
     /// Looks for them; the error says what to run where the program is not there.
-    pub fn find() -> Result<Self, Failure> {
+    pub fn find() -> Result<Self, Error> {
         let own = std::env::current_exe().map_err(|e| e.to_string())?;
         let profile = own.ancestors().nth(2).ok_or("the test is not in a target directory")?;
         let program = profile.join(format!("host-sim{}", std::env::consts::EXE_SUFFIX));
@@ -33,7 +33,7 @@ impl Places {
     }
 
     /// A folder of one's own for pictures and recordings.
-    pub fn scratch(&self, name: &str) -> Result<PathBuf, Failure> {
+    pub fn scratch(&self, name: &str) -> Result<PathBuf, Error> {
         let scratch = self.target.join(name);
         std::fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
         Ok(scratch)
@@ -49,7 +49,7 @@ pub struct Program {
 
 impl Program {
     /// A virtual device with its page at `port` (0: any free one), recorded where that is wanted.
-    pub fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Failure> {
+    pub fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Error> {
         let port = port.to_string();
         let record =
             record.map(|file| file.to_str().ok_or("the target folder has a plain name")).transpose()?;
@@ -59,12 +59,12 @@ impl Program {
     }
 
     /// Starts it and reads the address that it prints.
-    pub fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Failure> {
+    pub fn start_with(path: &Path, arguments: &[&str]) -> Result<Self, Error> {
         Self::start_in(path, Path::new("."), arguments)
     }
 
     /// The same in another folder.
-    pub fn start_in(path: &Path, folder: &Path, arguments: &[&str]) -> Result<Self, Failure> {
+    pub fn start_in(path: &Path, folder: &Path, arguments: &[&str]) -> Result<Self, Error> {
         let mut command = Command::new(path);
         command.args(arguments).current_dir(folder);
         let spawned = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
@@ -84,13 +84,13 @@ impl Program {
     }
 
     /// The port of its page.
-    pub fn port(&self) -> Result<u16, Failure> {
+    pub fn port(&self) -> Result<u16, Error> {
         let port = self.url.trim_end_matches('/').rsplit(':').next().and_then(|port| port.parse().ok());
         port.ok_or_else(|| format!("no port in {}", self.url))
     }
 
     /// Waits until it has ended by itself, without a failure.
-    pub fn ended(&mut self, limit: Duration) -> Result<(), Failure> {
+    pub fn ended(&mut self, limit: Duration) -> Result<(), Error> {
         let begin = Instant::now();
         loop {
             match self.process.try_wait() {

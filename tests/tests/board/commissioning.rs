@@ -11,12 +11,12 @@ use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::interlock::Interlock;
 use control_core::plan::Field;
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use fixed::types::I16F16;
 use lab::commission::bench::{Act, Line};
 use lab::commission::{Outcome, Wish, commission};
 use link::Command;
-use link::frames::Rejection;
+use link::frames::CommandRefusal;
 use tests::board::wires::{Wire, Wires};
 use tests::board::{Board, Wiring, plant};
 use tests::needle::Needle;
@@ -24,7 +24,7 @@ use tests::pc::{Pc, open_port};
 use tests::rig::ZERO_TORQUE;
 use tests::scenario::{board, board_wired};
 
-const NOT_COMMISSIONED: Rejection = Rejection::Interlocked(Interlock::NotCommissioned);
+const NOT_COMMISSIONED: CommandRefusal = CommandRefusal::Interlocked(Interlock::NotCommissioned);
 
 fn ramps(torque: MillinewtonMetres, stiffness: f64) -> Command {
     Command::Excite(Excitation {
@@ -52,7 +52,7 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
 
     assert_eq!(
         pc.must_not(&mut board, Command::Commission),
-        Rejection::NotShown,
+        CommandRefusal::NotShown,
         "it has not seen itself move"
     );
 
@@ -72,7 +72,7 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     let turned = Device { encoder_reversed: true, ..Device::commissioned_virtual() };
     for device in [turned, Device::commissioned_virtual()] {
         let refused = pc.must_not(&mut board, Command::ConfigureDevice(device));
-        assert_eq!(refused, Rejection::NotShown, "a command does not commission it");
+        assert_eq!(refused, CommandRefusal::NotShown, "a command does not commission it");
     }
     let record = pc.record_of(turned);
     pc.must(&mut board, record);
@@ -80,7 +80,7 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     pc.must(&mut board, record);
     assert_eq!(
         pc.must_not(&mut board, Command::Start),
-        Rejection::Interlocked(Interlock::NotZeroed),
+        CommandRefusal::Interlocked(Interlock::NotZeroed),
         "counts that ran the other way are another depth"
     );
     pc.must(&mut board, Command::Zero);
@@ -92,7 +92,7 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     board.at_stop(|stopped| stopped.reset_by_pin());
     board.run_ms(20);
     pc.connect(&mut board);
-    assert_eq!(pc.must_not(&mut board, Command::Start), Rejection::Interlocked(Interlock::NotZeroed));
+    assert_eq!(pc.must_not(&mut board, Command::Start), CommandRefusal::Interlocked(Interlock::NotZeroed));
     pc.must(&mut board, Command::Zero);
     pc.must(&mut board, Command::Start);
 }
@@ -139,7 +139,7 @@ fn no_command_raises_a_ceiling() {
         let unknown = Device { commissioned: false, ..device };
         for command in [pc.record_of(device), Command::ConfigureDevice(unknown)] {
             let refused = pc.must_not(&mut board, command);
-            assert!(matches!(refused, Rejection::Config(_)), "{refused:?}");
+            assert!(matches!(refused, CommandRefusal::Config(_)), "{refused:?}");
         }
     }
     let weak = with(|device| device.limits.torque.0 = I16F16::from_num(20));
@@ -153,7 +153,7 @@ fn no_command_raises_a_ceiling() {
         (Device { motor_reversed: true, ..weak }, Field::MotorSign),
     ] {
         let refused = pc.must_not(&mut board, Command::ConfigureDevice(device));
-        assert_eq!(refused, Rejection::Commissioned(field));
+        assert_eq!(refused, CommandRefusal::Commissioned(field));
     }
     // It is in flash as well.
     pc.run_ms(&mut board, 50);
@@ -187,7 +187,7 @@ impl Bench {
         Self { board, needle, end: None }
     }
 
-    fn commission(&mut self) -> (Result<Outcome, Failure>, bool) {
+    fn commission(&mut self) -> (Result<Outcome, Error>, bool) {
         let wish = Wish { turns: 1, pull_mm: 40.0, counts_per_turn: None };
         let mut has_moved = false;
         let outcome = commission(self, &wish, |step| {
@@ -199,7 +199,7 @@ impl Bench {
 }
 
 impl Line for Bench {
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         let out = out.to_vec();
         self.board.at_stop(move |stopped| stopped.usb().host.write(&out));
         self.board.run_ms(1);

@@ -6,7 +6,7 @@ use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Millinewto
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::codec::{self, MAX_FRAME};
-use link::frames::{HostFrame, Rejection};
+use link::frames::{CommandRefusal, HostFrame};
 use tests::board::{Board, MILLISECOND, Nanos, plant};
 use tests::pc::{self, Pc};
 use tests::rig::ZERO_TORQUE;
@@ -63,7 +63,7 @@ fn a_sequence_stays_in_bounds_and_ends_with_its_session() {
     ];
     for (what, excitation) in beyond {
         let refused = pc.must_not(&mut board, Command::Excite(excitation));
-        assert!(matches!(refused, Rejection::Config(_)), "{what}: {refused:?}");
+        assert!(matches!(refused, CommandRefusal::Config(_)), "{what}: {refused:?}");
     }
     // A bit that turns on the way.
     let mut bytes = [0; MAX_FRAME];
@@ -81,7 +81,7 @@ fn a_sequence_stays_in_bounds_and_ends_with_its_session() {
     pc.must(&mut board, Command::Excite(sound.clone()));
     pc.run_ms(&mut board, 50);
     assert!(board.at_stop(|stopped| stopped.drive().enabled), "it plays");
-    assert_eq!(pc.must_not(&mut board, Command::Excite(sound)), Rejection::Powered, "one at a time");
+    assert_eq!(pc.must_not(&mut board, Command::Excite(sound)), CommandRefusal::Powered, "one at a time");
     // The program dies: no heartbeat, no goodbye.
     pc.set_silent(true);
     let since = board.now();
@@ -137,7 +137,7 @@ fn a_sequence_is_uploaded_torque_off_and_plays_without_a_rest() {
     assert_eq!(played[7_499] - played[0], 7_499, "no tick between two segments is without it");
     let after = pc.heard.timing.expect("once a second");
     assert_eq!((after.missed_ticks, after.garbage_frames), (before.missed_ticks, 0), "{before:?} {after:?}");
-    assert_eq!(pc.must_not(&mut board, play.clone()), Rejection::Sequence(SequenceRefusal::Nothing));
+    assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(SequenceRefusal::Nothing));
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
     commands.iter().for_each(|command| pc.must(&mut board, command.clone()));
     pc.run_ms(&mut board, 350);
     assert!(board.at_stop(|stopped| stopped.drive().enabled), "it plays");
-    assert_eq!(pc.must_not(&mut board, commands[0].clone()), Rejection::Powered, "no upload meanwhile");
+    assert_eq!(pc.must_not(&mut board, commands[0].clone()), CommandRefusal::Powered, "no upload meanwhile");
     let since = board.now();
     pc.must(&mut board, Command::Stop);
     pc.run_ms(&mut board, 1_000);
@@ -160,7 +160,7 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
         panic!("off once: {:?}", switched(&mut board, since))
     };
     assert!(off - since <= 10 * MILLISECOND, "{} ns after the stop", off - since);
-    assert_eq!(pc.must_not(&mut board, play.clone()), Rejection::Sequence(SequenceRefusal::Nothing));
+    assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(SequenceRefusal::Nothing));
     // The PC falls silent in the second segment, and comes back.
     commands.iter().for_each(|command| pc.must(&mut board, command.clone()));
     pc.run_ms(&mut board, 300);
@@ -175,7 +175,7 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
     // Uploaded before the next session begins, it is not that session's.
     commands[..3].iter().for_each(|segment| pc.must(&mut board, segment.clone()));
     pc.hello(&mut board);
-    assert_eq!(pc.must_not(&mut board, play.clone()), Rejection::Sequence(SequenceRefusal::Nothing));
+    assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(SequenceRefusal::Nothing));
     pc.run_ms(&mut board, 100);
     assert!(!board.at_stop(|stopped| stopped.drive().enabled), "a new session starts no torque");
 }
@@ -201,9 +201,9 @@ fn a_damaged_or_unsound_sequence_gives_no_torque() {
     for (what, index, excitation) in beyond {
         commands[..2].iter().for_each(|segment| pc.must(&mut board, segment.clone()));
         let refused = pc.must_not(&mut board, Command::Segment { index, excitation });
-        assert!(matches!(refused, Rejection::Sequence(_)), "{what}: {refused:?}");
+        assert!(matches!(refused, CommandRefusal::Sequence(_)), "{what}: {refused:?}");
         let left = pc.must_not(&mut board, play.clone());
-        assert_eq!(left, Rejection::Sequence(SequenceRefusal::Nothing), "{what}");
+        assert_eq!(left, CommandRefusal::Sequence(SequenceRefusal::Nothing), "{what}");
     }
     // Another segment than the one that was sent, and one that never arrived.
     let other = Command::Segment { index: 2, excitation: strokes(31.0, 250) };
@@ -211,7 +211,7 @@ fn a_damaged_or_unsound_sequence_gives_no_torque() {
         [(Some(other), SequenceRefusal::Damaged), (None, SequenceRefusal::Count { found: 2, wanted: 3 })]
     {
         commands[..2].iter().cloned().chain(last).for_each(|segment| pc.must(&mut board, segment));
-        assert_eq!(pc.must_not(&mut board, play.clone()), Rejection::Sequence(refusal));
+        assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(refusal));
     }
     // A bit that turns on the way, of a segment and of the command that plays.
     for (id, command, whole) in [(77, &commands[2], 2), (78, play, 3)] {
@@ -226,7 +226,7 @@ fn a_damaged_or_unsound_sequence_gives_no_torque() {
         }
         if whole == 2 {
             let refusal = SequenceRefusal::Count { found: 2, wanted: 3 };
-            assert_eq!(pc.must_not(&mut board, play.clone()), Rejection::Sequence(refusal));
+            assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(refusal));
         }
     }
     assert!(!has_given_torque(&mut board), "a refused or damaged sequence gave torque");

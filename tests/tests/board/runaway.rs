@@ -4,7 +4,7 @@
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use link::Command;
-use link::frames::{EventKind, Rejection};
+use link::frames::{CommandRefusal, EventKind};
 use tests::board::wires::{Wire, Wires};
 use tests::board::{Amplifier, Effect, MILLISECOND, Nanos, Wiring};
 use tests::needle::Needle;
@@ -124,7 +124,7 @@ fn an_encoder_wire_that_comes_off_a_needle_at_rest() {
         report(&format!("wires {a:?} and {b:?}"), gone, SOON);
         tripped(&mut rig, Fault::EncoderWire);
         let why = rig.pc.must_not(&mut rig.board, Command::Start);
-        assert_eq!(why, Rejection::Interlocked(Interlock::EncoderWire));
+        assert_eq!(why, CommandRefusal::Interlocked(Interlock::EncoderWire));
     }
 }
 
@@ -178,7 +178,7 @@ fn an_encoder_whose_supply_is_sensed() {
     report("encoder without its supply, which is sensed", gone, SOON);
     tripped(&mut rig, Fault::EncoderWire);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::EncoderWire));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::EncoderWire));
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn an_amplifier_that_is_not_ready() {
     report("amplifier not ready", gone, SOON);
     tripped(&mut rig, Fault::AmplifierNotReady);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::AmplifierNotReady));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::AmplifierNotReady));
     rig.board.at_stop(|stopped| stopped.set_amplifier_ready(true));
     rig.pc.run_ms(&mut rig.board, 5);
     rig.pc.must(&mut rig.board, Command::Start);
@@ -203,7 +203,7 @@ fn the_emergency_stop() {
     report("emergency stop", gone, SOON);
     tripped(&mut rig, Fault::EmergencyStop);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::EmergencyStop));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::EmergencyStop));
     rig.board.at_stop(|stopped| stopped.set_emergency_stop(false));
     rig.pc.run_ms(&mut rig.board, 300);
     assert!(!rig.board.at_stop(|stopped| stopped.drive().enabled), "it does not start by itself");
@@ -237,7 +237,7 @@ fn an_enable_line_that_is_stuck_on() {
     );
     assert!((needle.state().depth - from).abs() < FAR);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::AmplifierStuckOn));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::AmplifierStuckOn));
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_current_that_is_not_the_command() {
     rig.board.at_stop(|stopped| stopped.set_amplifier(Amplifier::Full));
     rig.pc.run_ms(&mut rig.board, 20);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::AmplifierStuckOn), "current without a command");
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::AmplifierStuckOn), "current without a command");
 }
 
 #[test]

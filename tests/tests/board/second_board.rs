@@ -5,7 +5,7 @@ use control_core::Config;
 use control_core::event::{Fault, State};
 use control_core::interlock::Interlock;
 use link::Command;
-use link::frames::Rejection;
+use link::frames::CommandRefusal;
 use tests::board::pins::{Clock, DISCOVERY, NUCLEO_F429ZI, Pins};
 use tests::board::wires::{Wire, Wires};
 use tests::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring, image_for, plant};
@@ -28,7 +28,7 @@ fn connected() -> Rig {
 fn refused(rig: &mut Rig, interlock: Interlock) {
     rig.pc.run_ms(&mut rig.board, 20);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(interlock));
+    assert_eq!(why, CommandRefusal::Interlocked(interlock));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use control_core::interlock::Interlock;
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
-use link::frames::{EventKind, Rejection, SaveFailure, Stage};
+use link::frames::{CommandRefusal, EventKind, SaveError, Stage};
 use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
 use tests::board::wires::Wires;
 use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, plant};
@@ -114,7 +114,7 @@ fn a_configuration_that_is_not_saved_is_reported() {
     config.device.limits.fade_in_ms = 400;
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
     rig.pc.run_ms(&mut rig.board, 50);
-    let cause = SaveFailure::Flash;
+    let cause = SaveError::Flash;
     assert!(rig.pc.heard_event(|kind| *kind == EventKind::NotSaved { cause }), "{:?}", rig.pc.heard.events);
     // It is in force all the same.
     rig.pc.must(&mut rig.board, Command::Start);
@@ -126,7 +126,7 @@ fn a_supply_that_is_low_from_the_start_is_seen() {
     let mut rig = connected(Wiring { supply: 2_600, ..Wiring::default() });
     rig.pc.run_ms(&mut rig.board, 20);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::Supply));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::Supply));
     rig.board.at_stop(|stopped| stopped.set_supply(2_900));
     rig.pc.run_ms(&mut rig.board, 20);
     rig.pc.must(&mut rig.board, Command::Start);
@@ -183,7 +183,7 @@ fn a_part_from_the_factory_gets_its_brown_out_reset_once() {
     rig.pc.connect(&mut rig.board);
     rig.pc.must(&mut rig.board, Command::Zero);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::Interlocked(Interlock::Supply));
+    assert_eq!(why, CommandRefusal::Interlocked(Interlock::Supply));
 }
 
 /// UM1472: PC0 low would switch the 5 V of CN5 on, against the PC that feeds it.
@@ -267,7 +267,7 @@ fn a_start_without_a_session_is_refused() {
     rig.board.at_stop(|stopped| stopped.usb().host.open());
     rig.board.run_ms(20);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, Rejection::NoSession);
+    assert_eq!(why, CommandRefusal::NoSession);
     rig.board.run_ms(100);
     assert!(rig.enabled_since(0).is_empty(), "the amplifier stayed off");
 }

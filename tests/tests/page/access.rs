@@ -4,7 +4,7 @@
 use crate::needle::{SIZES, SOON, Size, complaints, open, pictures, resize};
 use serde_json::json;
 use std::path::Path;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// Sizes at which parts of the page change places.
 const MORE_SIZES: [Size; 4] = [(1_100, 640, false), (820, 1_180, true), (844, 390, true), (320, 568, true)];
@@ -19,12 +19,12 @@ const LEAST_CONTRAST: f64 = 4.5;
 
 #[test]
 fn stop_is_never_covered_and_keys_stop() {
-    if let Err(failure) = stop_and_keys() {
-        panic!("{failure}");
+    if let Err(error) = stop_and_keys() {
+        panic!("{error}");
     }
 }
 
-fn stop_and_keys() -> Result<(), Failure> {
+fn stop_and_keys() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-stop")?;
     let browser = Chromium::start(&scratch)?;
@@ -41,13 +41,13 @@ fn stop_and_keys() -> Result<(), Failure> {
 }
 
 /// A dialog that this test does not open would not be seen to cover Stop.
-fn every_dialog_has_an_opener(page: &mut Page) -> Result<(), Failure> {
+fn every_dialog_has_an_opener(page: &mut Page) -> Result<(), Error> {
     let dialogs = page.number("document.querySelectorAll('dialog').length")?;
     check("each dialog is opened by this test", dialogs == OPENERS.len() as f64, dialogs)
 }
 
 /// The element at Stop's centre is Stop, whatever is open over the page, at its top and at its end.
-fn stop_is_on_top(page: &mut Page, size: Size, scratch: &Path) -> Result<(), Failure> {
+fn stop_is_on_top(page: &mut Page, size: Size, scratch: &Path) -> Result<(), Error> {
     hit(page, size, "nothing open")?;
     for view in ["view-body", "view-section"] {
         page.evaluate(&format!("document.getElementById('{view}').click()"))?;
@@ -66,7 +66,7 @@ fn stop_is_on_top(page: &mut Page, size: Size, scratch: &Path) -> Result<(), Fai
     Ok(())
 }
 
-fn hit(page: &mut Page, size: Size, what: &str) -> Result<(), Failure> {
+fn hit(page: &mut Page, size: Size, what: &str) -> Result<(), Error> {
     let hit = page.text(
         "(() => { const r = document.getElementById('stop').getBoundingClientRect(); \
          const hit = document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2); \
@@ -76,7 +76,7 @@ fn hit(page: &mut Page, size: Size, what: &str) -> Result<(), Failure> {
 }
 
 /// Escape stops and closes; Space stops, but not where a control has the focus.
-fn keys(page: &mut Page) -> Result<(), Failure> {
+fn keys(page: &mut Page) -> Result<(), Error> {
     page.click("patient")?;
     page.wait("the editor", SOON, "document.querySelector('dialog[open]') !== null")?;
     page.evaluate("document.querySelector('#patient-editor input').focus()")?;
@@ -102,7 +102,7 @@ fn keys(page: &mut Page) -> Result<(), Failure> {
     start(page)
 }
 
-fn start(page: &mut Page) -> Result<(), Failure> {
+fn start(page: &mut Page) -> Result<(), Error> {
     page.wait("Start to be had", SOON, "!document.getElementById('start').disabled")?;
     page.click("start")?;
     page.wait("a start", SOON, RUNNING)
@@ -110,12 +110,12 @@ fn start(page: &mut Page) -> Result<(), Failure> {
 
 #[test]
 fn axe_core_finds_no_barrier() {
-    if let Err(failure) = accessible() {
-        panic!("{failure}");
+    if let Err(error) = accessible() {
+        panic!("{error}");
     }
 }
 
-fn accessible() -> Result<(), Failure> {
+fn accessible() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-axe")?;
     let file = places.target.join("node/node_modules/axe-core/axe.min.js");
@@ -148,7 +148,7 @@ fn accessible() -> Result<(), Failure> {
 }
 
 /// Brings the page into a state: a view, the list of attempts, or the editor.
-fn show(page: &mut Page, state: &str) -> Result<(), Failure> {
+fn show(page: &mut Page, state: &str) -> Result<(), Error> {
     let clicks: &[&str] = match state {
         "body" => &["view-body", "view-events"],
         "practice" => &["view-section", "view-practice"],
@@ -161,7 +161,7 @@ fn show(page: &mut Page, state: &str) -> Result<(), Failure> {
     pictures(page, 3)
 }
 
-fn axe_finds_nothing(page: &mut Page, state: &str) -> Result<(), Failure> {
+fn axe_finds_nothing(page: &mut Page, state: &str) -> Result<(), Error> {
     let found = page.evaluate(&format!(
         "axe.run(document, {{ runOnly: {RULES} }}).then(r => r.violations.map(v => \
          [v.id, ...v.nodes.map(n => n.target.join(' ') + ': ' + (n.any[0]?.message ?? n.failureSummary))]))"

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tests::bootloader::{Bootloader, FLASH, MEMORY};
-use tests::browser::{Chromium, Failure, Page, Places, check};
+use tests::browser::{Chromium, Error, Page, Places, check};
 
 const SOME_TIME: Duration = Duration::from_secs(60);
 /// The most that the device's time goes on between two exchanges with the page: it is never ahead of the page's clock, whose heartbeat it awaits.
@@ -34,7 +34,7 @@ struct Bench {
 }
 
 impl Bench {
-    fn open(name: &str) -> Result<Self, Failure> {
+    fn open(name: &str) -> Result<Self, Error> {
         let places = Places::find()?;
         let site = places.target.join("site/board.html");
         if !site.exists() {
@@ -58,7 +58,7 @@ impl Bench {
     }
 
     /// Carries bytes to and fro until an expression of the page is true.
-    fn until(&mut self, what: &str, expression: &str) -> Result<(), Failure> {
+    fn until(&mut self, what: &str, expression: &str) -> Result<(), Error> {
         let begin = Instant::now();
         while begin.elapsed() < SOME_TIME {
             let mut heard = Vec::new();
@@ -66,9 +66,7 @@ impl Bench {
             let since = std::mem::replace(&mut self.exchanged, Instant::now()).elapsed().min(AT_ONCE);
             for _ in 0..since.as_millis() {
                 let out = &mut self.out;
-                self.line
-                    .exchange(&std::mem::take(out), &mut heard)
-                    .map_err(|failure| failure.to_string())?;
+                self.line.exchange(&std::mem::take(out), &mut heard).map_err(|error| error.to_string())?;
             }
             let both = format!("[mock.exchange({}), Boolean({expression})]", json!(heard));
             let answer = self.page.evaluate(&both)?;
@@ -86,7 +84,7 @@ impl Bench {
         Err(format!("{what}: not within {} s; the page shows: {state}", SOME_TIME.as_secs()))
     }
 
-    fn connect(&mut self) -> Result<(), Failure> {
+    fn connect(&mut self) -> Result<(), Error> {
         self.page.click("connect")?;
         self.until(
             "a live board",
@@ -101,7 +99,7 @@ impl Bench {
     }
 
     /// Begins a step as a person does.
-    fn begin(&mut self, step: usize) -> Result<(), Failure> {
+    fn begin(&mut self, step: usize) -> Result<(), Error> {
         let button = format!("document.querySelector('.step:nth-child({step})[data-stage=asked] .begin')");
         self.until(&format!("step {step}"), &format!("{button} !== null"))?;
         if self.gives_torque() {
@@ -117,9 +115,9 @@ fn bytes(value: &Value) -> Vec<u8> {
     value.as_array().into_iter().flatten().filter_map(Value::as_u64).map(|byte| byte as u8).collect()
 }
 
-fn passes(done: Result<(), Failure>) {
-    if let Err(failure) = done {
-        panic!("{failure}");
+fn passes(done: Result<(), Error>) {
+    if let Err(error) = done {
+        panic!("{error}");
     }
 }
 
@@ -128,7 +126,7 @@ fn a_board_is_shown_and_commissioned_in_the_page() {
     passes(commission());
 }
 
-fn commission() -> Result<(), Failure> {
+fn commission() -> Result<(), Error> {
     let mut bench = Bench::open("page-board")?;
     bench.page.photograph(&bench.scratch.join("closed.png"))?;
     bench.connect()?;
@@ -162,7 +160,7 @@ fn a_cable_that_is_pulled_forgets_the_guide() {
     passes(pull());
 }
 
-fn pull() -> Result<(), Failure> {
+fn pull() -> Result<(), Error> {
     let mut bench = Bench::open("page-board-pulled")?;
     bench.connect()?;
     bench.page.click("commission")?;
@@ -200,7 +198,7 @@ fn a_board_is_updated_in_the_page() {
     passes(update());
 }
 
-fn update() -> Result<(), Failure> {
+fn update() -> Result<(), Error> {
     let mut bench = Bench::open("page-board-update")?;
     let mut bootloader = Bootloader::default();
     let file = dfuse(FLASH, &image());

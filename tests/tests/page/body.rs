@@ -3,19 +3,19 @@
 
 use serde_json::Value;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const SOON: Duration = Duration::from_secs(40);
 const DRAWN: &str = "__body.frames > 5 && document.getElementById('body-note').textContent === ''";
 
 #[test]
 fn a_body_is_entered_where_and_how_one_likes() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-body")?;
     let browser = Chromium::start(&scratch)?;
@@ -49,20 +49,20 @@ fn meets(structure: &str) -> String {
     format!("__body.structures?.includes('{structure}')")
 }
 
-fn choose(page: &mut Page, site: &str) -> Result<Value, Failure> {
+fn choose(page: &mut Page, site: &str) -> Result<Value, Error> {
     page.evaluate(&format!(
         "{{ const s = document.getElementById('site'); s.value = '{site}'; s.dispatchEvent(new Event('change')); __body.frames = 0; }}"
     ))
 }
 
-fn slide(page: &mut Page, id: &str, value: i32) -> Result<Value, Failure> {
+fn slide(page: &mut Page, id: &str, value: i32) -> Result<Value, Error> {
     page.evaluate(&format!(
         "{{ const s = document.getElementById('{id}'); s.value = {value}; s.dispatchEvent(new Event('input')); }}"
     ))
 }
 
 /// A person's needle is drawn out, enters over the shoulder's vein, which it then meets, and the skin of the picture slopes as the limb turns.
-fn entry_and_turn(page: &mut Page) -> Result<(), Failure> {
+fn entry_and_turn(page: &mut Page) -> Result<(), Error> {
     slide(page, "needle-depth", 6)?;
     page.wait("a person's needle inside", SOON, "__stats.depthMm > 2")?;
     let level = page.number("__body.skinBesideMm")?;
@@ -91,10 +91,10 @@ fn entry_and_turn(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// A click on the skin enters there, and the probe follows a pointer that takes it.
-fn by_pointer(page: &mut Page) -> Result<(), Failure> {
+fn by_pointer(page: &mut Page) -> Result<(), Error> {
     slide(page, "place-turn", -39)?;
     page.wait("the limb back", SOON, "__body.entry.turn_deg === -39")?;
-    let find = |page: &mut Page, wanted: &str| -> Result<(f64, f64), Failure> {
+    let find = |page: &mut Page, wanted: &str| -> Result<(f64, f64), Error> {
         let script = format!(
             "(() => {{ const box = document.getElementById('limb').getBoundingClientRect();
                 for (let y = box.top + 4; y < box.bottom; y += 4) for (let x = box.left + 4; x < box.right; x += 4) {{

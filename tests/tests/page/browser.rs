@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check, loop_time};
+use tests::browser::{Chromium, Error, Page, Places, Program, check, loop_time};
 
 const DESKTOP: (u32, u32) = (1440, 900);
 const PHONE: (u32, u32) = (390, 844);
@@ -45,12 +45,12 @@ const AT_REST: &str = "(() => { const now = performance.now(), mm = __stats.dept
 
 #[test]
 fn a_person_watches_takes_the_needle_stops_and_comes_back() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-test")?;
     let browser = Chromium::start(&scratch)?;
@@ -79,7 +79,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// The needle moves, both punctures are listed, the plots change, and all of it at the rate of the screen.
-fn watch(page: &mut Page, browser: &Chromium) -> Result<Vec<Value>, Failure> {
+fn watch(page: &mut Page, browser: &Chromium) -> Result<Vec<Value>, Error> {
     page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     let first_frame_s = page.number("__stats.firstFrameMs")? / 1000.0;
     let megabytes = page.transferred_bytes()? / 1e6;
@@ -136,7 +136,7 @@ struct PictureRate {
 }
 
 /// The rate of the screen; where a slow machine does not reach it, a picture may not take more of the processor than on others.
-fn picture_rate(page: &mut Page, browser: &Chromium) -> Result<PictureRate, Failure> {
+fn picture_rate(page: &mut Page, browser: &Chromium) -> Result<PictureRate, Error> {
     let loop_s = loop_time().as_secs_f64();
     let mut rates = Vec::new();
     let (begin_s, begin) = (browser.processor_s()?, page.number("__stats.frames")?);
@@ -157,7 +157,7 @@ fn picture_rate(page: &mut Page, browser: &Chromium) -> Result<PictureRate, Fail
 }
 
 /// The page as it is, to be looked at: light and dark.
-fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.photograph(&scratch.join("desktop.png"))?;
     page.dark(true)?;
     std::thread::sleep(Duration::from_millis(300));
@@ -166,7 +166,7 @@ fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
 }
 
 /// A person takes the needle with the mouse and presses the skin: the force answers as the control core computes it.
-fn drag(page: &mut Page) -> Result<(), Failure> {
+fn drag(page: &mut Page) -> Result<(), Error> {
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
     let mut at = page.middle("section")?;
     page.mouse("mousePressed", at)?;
@@ -194,7 +194,7 @@ fn drag(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// Moves the pressed mouse along the needle until the tip is at `depth_mm`.
-fn push_until(page: &mut Page, at: &mut (f64, f64), depth_mm: f64) -> Result<(), Failure> {
+fn push_until(page: &mut Page, at: &mut (f64, f64), depth_mm: f64) -> Result<(), Error> {
     for _ in 0..400 {
         if page.number("__stats.depthMm")? >= depth_mm {
             return Ok(());
@@ -208,7 +208,7 @@ fn push_until(page: &mut Page, at: &mut (f64, f64), depth_mm: f64) -> Result<(),
 
 /// The force that the control core gives with the tip at rest at `depth_mm` in whole skin: the least on the way out, the
 /// greatest on the way in; friction makes the difference.
-fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Failure> {
+fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Error> {
     let config = Config::commissioned_virtual();
     let device = config.device;
     let mm_per_turn = 2.0 * std::f64::consts::PI * device.roller_radius.0.to_num::<f64>();
@@ -237,7 +237,7 @@ fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Failure> {
 
 /// Time from the event of the mouse in the page to the first picture in which the force has answered, by a tenth of the
 /// step or more. The way there and back: page, WebSocket, session, link, control core and plant, and back.
-fn latency(page: &mut Page) -> Result<Vec<Value>, Failure> {
+fn latency(page: &mut Page) -> Result<Vec<Value>, Error> {
     page.evaluate(
         "(() => { \
            const state = window.__latency = { start: null, from: 0, times: [] }; \
@@ -286,7 +286,7 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Failure> {
 }
 
 /// The stop takes the torque off, by button and by keys; Start brings it back; Demo gives the needle back.
-fn stop(page: &mut Page) -> Result<(), Failure> {
+fn stop(page: &mut Page) -> Result<(), Error> {
     let stopped =
         "document.getElementById('state').textContent === 'Stopped, torque off' && __stats.motorN === 0";
     let running = "document.getElementById('state').textContent.startsWith('Running')";
@@ -326,7 +326,7 @@ fn stop(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// The zero waits for torque off and then makes the tip's place depth 0; the slider turns the simulated needle.
-fn zero_and_turn(page: &mut Page) -> Result<(), Failure> {
+fn zero_and_turn(page: &mut Page) -> Result<(), Error> {
     let locked = "document.getElementById('zero').disabled";
     page.wait("no zero while torque is on", SOON, locked)?;
     page.click("stop")?;
@@ -344,7 +344,7 @@ fn zero_and_turn(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// The needle turns; steeper, the same way along the needle goes through the far wall, and is told as that.
-fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     let turn = |degrees: u32| {
         format!(
             "(() => {{ const angle = document.getElementById('angle'); angle.value = '{degrees}'; \
@@ -371,7 +371,7 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
 }
 
 /// The program ends and is started again: the page says so, shows old data as old, and is back by itself.
-fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), Failure> {
+fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), Error> {
     program.end();
     page.wait(
         "a word about the missing program",
@@ -392,7 +392,7 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
 }
 
 /// A phone: nothing sticks out, the stop is in reach, a finger drags.
-fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<(), Failure> {
+fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<(), Error> {
     let mut page = Page::open(browser, url, PHONE.0, PHONE.1, true)?;
     page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     let told_later = page.text(FIRST_PUNCTURE)?;

@@ -4,7 +4,7 @@
 use crate::needle::{A_FEW_INSERTIONS, SIZES, SOON, complaints, open, pictures, resize};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// The time in which a person is to be done. The test, which does not think, has to be done in it as well.
 const A_MINUTE: Duration = Duration::from_secs(60);
@@ -12,12 +12,12 @@ const ANSWER: &str = "document.getElementById('patient-answer')";
 
 #[test]
 fn a_patient_is_shaped_saved_and_driven_without_a_file() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-editor")?;
     let _ = std::fs::remove_dir_all(scratch.join("patients"));
@@ -44,7 +44,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// Sets a slider as a hand does: it moves, then it is let go.
-fn slide(page: &mut Page, name: &str, value: &str) -> Result<(), Failure> {
+fn slide(page: &mut Page, name: &str, value: &str) -> Result<(), Error> {
     page.evaluate(&format!(
         "(() => {{ const s = document.getElementById('patient-{name}'); s.value = '{value}'; \
          s.dispatchEvent(new Event('input', {{ bubbles: true }})); s.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
@@ -52,12 +52,12 @@ fn slide(page: &mut Page, name: &str, value: &str) -> Result<(), Failure> {
     pictures(page, 1)
 }
 
-fn value(page: &mut Page, name: &str) -> Result<String, Failure> {
+fn value(page: &mut Page, name: &str) -> Result<String, Error> {
     page.text(&format!("document.getElementById('patient-{name}-value').textContent"))
 }
 
 /// The pixels of both pictures as one number.
-fn picture(page: &mut Page) -> Result<f64, Failure> {
+fn picture(page: &mut Page) -> Result<f64, Error> {
     page.number(
         "['patient-picture', 'patient-force'].reduce((hash, id) => { const c = document.getElementById(id); \
          for (const v of c.getContext('2d').getImageData(0, 0, c.width, c.height).data) hash = (hash * 31 + v) | 0; return hash; }, 7)",
@@ -65,7 +65,7 @@ fn picture(page: &mut Page) -> Result<f64, Failure> {
 }
 
 /// Each slider changes its figure and the picture; a step is taken back.
-fn shape(page: &mut Page) -> Result<(), Failure> {
+fn shape(page: &mut Page) -> Result<(), Error> {
     page.click("patient")?;
     page.wait(
         "the editor",
@@ -100,7 +100,7 @@ fn shape(page: &mut Page) -> Result<(), Failure> {
     check("the wall's own figures say the same", (force - 0.7).abs() < 0.005, force)
 }
 
-fn save(page: &mut Page, name: &str, file: &str) -> Result<(), Failure> {
+fn save(page: &mut Page, name: &str, file: &str) -> Result<(), Error> {
     page.evaluate(&format!("document.getElementById('patient-name').value = '{name}'"))?;
     page.click("patient-save")?;
     page.wait(
@@ -118,7 +118,7 @@ fn save(page: &mut Page, name: &str, file: &str) -> Result<(), Failure> {
 }
 
 /// The scripted hand pierces skin and vein at the forces that were asked for.
-fn driven(page: &mut Page) -> Result<(), Failure> {
+fn driven(page: &mut Page) -> Result<(), Error> {
     let pierced = |layer: &str, force: &str| {
         format!(
             "[...document.querySelectorAll('#events [data-kind=puncture] span')].some(e => /^{layer} punctured at .*, {force}\\sN$/.test(e.textContent))"
@@ -129,7 +129,7 @@ fn driven(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// Tests that the slider refuses what the device cannot render, in its words.
-fn too_firm(page: &mut Page) -> Result<(), Failure> {
+fn too_firm(page: &mut Page) -> Result<(), Error> {
     page.evaluate(
         "(() => { const f = document.querySelector('#patient-fields [data-key=compliance_mm2_per_n]'); f.value = '0.5'; \
          f.dispatchEvent(new Event('input', { bubbles: true })); document.getElementById('patient-send').click(); })()",
@@ -145,7 +145,7 @@ fn too_firm(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// Another run in the same folder has the patient.
-fn tomorrow(browser: &Chromium, path: &Path, folder: &Path) -> Result<(), Failure> {
+fn tomorrow(browser: &Chromium, path: &Path, folder: &Path) -> Result<(), Error> {
     let program = Program::start_in(path, folder, &["run", "--port", "0"])?;
     let mut page = open(browser, &program.url, SIZES[0])?;
     page.click("patient")?;

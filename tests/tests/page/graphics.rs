@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program};
+use tests::browser::{Chromium, Error, Page, Places, Program};
 
 /// A start on a busy machine.
 const SOME_TIME: Duration = Duration::from_secs(60);
@@ -16,12 +16,12 @@ const KEEP_DEVICE: &str = "{
 
 #[test]
 fn webgpu_draws_what_webgl_draws_and_its_loss_is_survived() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-graphics")?;
     let browser = Chromium::start_with_webgpu(&scratch)?;
@@ -41,7 +41,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// Edges are smoothed otherwise, nothing else.
-fn same_picture(compared: &Value) -> Result<(), Failure> {
+fn same_picture(compared: &Value) -> Result<(), Error> {
     let number = |name: &str| compared[name].as_f64().ok_or_else(|| format!("no comparison: {compared}"));
     let (mean, unlike, tones) = (number("mean")?, number("unlike")?, number("tones")?);
     println!("mean difference {mean:.2} of 255, {:.2} % of the pixels unlike, {tones} tones", 100.0 * unlike);

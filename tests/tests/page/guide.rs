@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program};
+use tests::browser::{Chromium, Error, Page, Places, Program};
 
 /// A start on a busy machine.
 const SOME_TIME: Duration = Duration::from_secs(60);
@@ -36,12 +36,12 @@ drive = 0.0
 
 #[test]
 fn commissioning_goes_on_only_where_a_person_says_so() {
-    if let Err(failure) = commission() {
-        panic!("{failure}");
+    if let Err(error) = commission() {
+        panic!("{error}");
     }
 }
 
-fn commission() -> Result<(), Failure> {
+fn commission() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-guide")?;
     let browser = Chromium::start(&scratch)?;
@@ -75,12 +75,12 @@ fn commission() -> Result<(), Failure> {
 
 #[test]
 fn the_gains_of_a_compensated_device_are_changed_in_the_page() {
-    if let Err(failure) = change_gains() {
-        panic!("{failure}");
+    if let Err(error) = change_gains() {
+        panic!("{error}");
     }
 }
 
-fn change_gains() -> Result<(), Failure> {
+fn change_gains() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-gains")?;
     let browser = Chromium::start(&scratch)?;

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A start on a busy machine.
 const SOME_TIME: Duration = Duration::from_secs(60);
@@ -34,12 +34,12 @@ const COUNT_TONES: &str = "{
 
 #[test]
 fn a_headset_shows_the_limb_to_both_eyes() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-headset")?;
     let browser = Chromium::start(&scratch)?;
@@ -73,19 +73,19 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// Tests that nothing is offered if the browser has no headset.
-fn without_one(page: &mut Page) -> Result<(), Failure> {
+fn without_one(page: &mut Page) -> Result<(), Error> {
     page.wait("the limb", SOME_TIME, "__body.frames > 5")?;
     let hidden = page.evaluate(&format!("{BUTTON}.hidden"))?;
     check("no button without a headset", hidden == json!(true), hidden)
 }
 
-fn eyes(page: &mut Page) -> Result<Vec<Value>, Failure> {
+fn eyes(page: &mut Page) -> Result<Vec<Value>, Error> {
     let seen = page.evaluate(SEEN)?;
     seen.as_array().cloned().ok_or_else(|| format!("no eyes: {seen}"))
 }
 
 /// Each eye has its half, sees the entry from its own side, and sees more than a sky; the head's way is the eyes'.
-fn both_eyes(page: &mut Page) -> Result<(), Failure> {
+fn both_eyes(page: &mut Page) -> Result<(), Error> {
     let before = eyes(page)?;
     let [left, right] = before.as_slice() else { return Err(format!("two eyes and not {before:?}")) };
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
@@ -113,7 +113,7 @@ fn both_eyes(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// The needle in the headset is the device's, and the tissue goes on with it.
-fn needle_goes_on(page: &mut Page) -> Result<(), Failure> {
+fn needle_goes_on(page: &mut Page) -> Result<(), Error> {
     page.wait("the needle outside", SOME_TIME, "__stats.depthMm < 0")?;
     // The page's figure is of its last picture, and here pictures are slow.
     let is_the_devices =

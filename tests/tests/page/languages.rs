@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const LANGUAGES: [&str; 3] = ["en", "de", "fr"];
 /// The namespaces of keys that are put together by the page: `state.` and what the device says, `figure.` and the
@@ -90,12 +90,12 @@ fn is_code(line: &&str) -> bool {
 
 #[test]
 fn german_fits_at_every_size_and_french_is_chosen() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-languages")?;
     let browser = Chromium::start(&scratch)?;
@@ -124,7 +124,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// Opens the page anew in a browser that prefers these languages.
-fn speaks(page: &mut Page, tags: &str, language: &str, stop: &str) -> Result<(), Failure> {
+fn speaks(page: &mut Page, tags: &str, language: &str, stop: &str) -> Result<(), Error> {
     page.languages(tags)?;
     page.evaluate("window.__old = true, location.reload()")?;
     page.wait("the page anew", SOON, &format!("!window.__old && {LIVE}"))?;
@@ -141,7 +141,7 @@ fn speaks(page: &mut Page, tags: &str, language: &str, stop: &str) -> Result<(),
     check("headings are in the language", (title == english) == (language == "en"), &title)
 }
 
-fn show(page: &mut Page, state: &str) -> Result<(), Failure> {
+fn show(page: &mut Page, state: &str) -> Result<(), Error> {
     let clicks: &[&str] = match state {
         "body" => &["view-body", "view-events"],
         "practice" => &["view-section", "view-practice"],
@@ -156,7 +156,7 @@ fn show(page: &mut Page, state: &str) -> Result<(), Failure> {
 }
 
 /// No word is wider than its place, and Stop is on top.
-fn fits(page: &mut Page, language: &str, state: &str, size: Size) -> Result<(), Failure> {
+fn fits(page: &mut Page, language: &str, state: &str, size: Size) -> Result<(), Error> {
     let wide = page.evaluate(TOO_WIDE)?;
     check(&format!("{language}, {state}: words fit"), wide == json!([]), (size, &wide))?;
     let hit: Value = page.evaluate(
@@ -176,7 +176,7 @@ const TOO_WIDE: &str = "(() => {
 })()";
 
 /// A decimal comma, and sentences of the program, in German.
-fn numbers_and_sentences(page: &mut Page) -> Result<(), Failure> {
+fn numbers_and_sentences(page: &mut Page) -> Result<(), Error> {
     page.wait(
         "a decimal comma",
         SOON,

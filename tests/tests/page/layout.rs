@@ -2,19 +2,19 @@
 
 use crate::needle::{SOON, complaints, open, pictures, resize};
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A list that shows at least five attempts below its heading.
 const LIST_PX: f64 = 150.0;
 
 #[test]
 fn figures_and_attempts_fit_on_a_desktop() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-layout")?;
     let browser = Chromium::start(&scratch)?;
@@ -39,7 +39,7 @@ fn visit() -> Result<(), Failure> {
     complaints(&mut page)
 }
 
-fn fits(page: &mut Page, width: u32) -> Result<(), Failure> {
+fn fits(page: &mut Page, width: u32) -> Result<(), Error> {
     pictures(page, 3)?;
     std::thread::sleep(Duration::from_millis(200));
     let hidden = page.number(

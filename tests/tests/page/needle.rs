@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A size of the page: width and height in CSS pixels, and true if a finger drags instead of a mouse.
 pub(crate) type Size = (u32, u32, bool);
@@ -30,12 +30,12 @@ const FLAT_DEG: &str = "14";
 
 #[test]
 fn a_mm_of_the_hand_is_a_mm_of_the_needle() {
-    if let Err(failure) = follow_at_every_size() {
-        panic!("{failure}");
+    if let Err(error) = follow_at_every_size() {
+        panic!("{error}");
     }
 }
 
-fn follow_at_every_size() -> Result<(), Failure> {
+fn follow_at_every_size() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-needle")?;
     let browser = Chromium::start(&scratch)?;
@@ -60,20 +60,20 @@ fn follow_at_every_size() -> Result<(), Failure> {
 
 #[test]
 fn layers_are_at_their_depths_at_any_angle() {
-    if let Err(failure) = turn() {
-        panic!("{failure}");
+    if let Err(error) = turn() {
+        panic!("{error}");
     }
 }
 
 /// Opens the page and waits for live data.
-pub(crate) fn open(browser: &Chromium, url: &str, (width, height, phone): Size) -> Result<Page, Failure> {
+pub(crate) fn open(browser: &Chromium, url: &str, (width, height, phone): Size) -> Result<Page, Error> {
     let mut page = Page::open(browser, url, width, height, phone)?;
     page.wait("live data", SOON, LIVE)?;
     Ok(page)
 }
 
 /// Gives the page another size and waits until the section is drawn in it.
-pub(crate) fn resize(page: &mut Page, (width, height, phone): Size) -> Result<(), Failure> {
+pub(crate) fn resize(page: &mut Page, (width, height, phone): Size) -> Result<(), Error> {
     page.resize(width, height, phone)?;
     let resized = format!("innerWidth === {width} && innerHeight === {height}");
     page.wait("the new size", SOON, &resized)?;
@@ -81,19 +81,19 @@ pub(crate) fn resize(page: &mut Page, (width, height, phone): Size) -> Result<()
 }
 
 /// Waits for `count` more pictures.
-pub(crate) fn pictures(page: &mut Page, count: u32) -> Result<(), Failure> {
+pub(crate) fn pictures(page: &mut Page, count: u32) -> Result<(), Error> {
     page.evaluate("window.__seen = __stats.frames")?;
     page.wait("pictures", SOON, &format!("__stats.frames >= __seen + {count}"))
 }
 
 /// Fails if the console has errors.
-pub(crate) fn complaints(page: &mut Page) -> Result<(), Failure> {
+pub(crate) fn complaints(page: &mut Page) -> Result<(), Error> {
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
 
 /// Screen coordinates of a point that the section has drawn.
-pub(crate) fn drawn(page: &mut Page, what: &str) -> Result<(f64, f64), Failure> {
+pub(crate) fn drawn(page: &mut Page, what: &str) -> Result<(f64, f64), Error> {
     let rectangle = "document.getElementById('section').getBoundingClientRect()";
     let at = page.evaluate(&format!(
         "[{rectangle}.x + __stats.drawn.{what}.x, {rectangle}.y + __stats.drawn.{what}.y]"
@@ -114,7 +114,7 @@ pub(crate) struct Grab {
 
 impl Grab {
     /// Takes the needle at the end of its hub.
-    pub(crate) fn take(page: &mut Page, finger: bool) -> Result<Self, Failure> {
+    pub(crate) fn take(page: &mut Page, finger: bool) -> Result<Self, Error> {
         page.evaluate("document.getElementById('section').scrollIntoView({ block: 'center' })")?;
         pictures(page, 2)?;
         let at = drawn(page, "hub")?;
@@ -138,7 +138,7 @@ impl Grab {
     }
 
     /// Moves the hand to `mm`; each step is drawn before the next.
-    pub(crate) fn move_to(&self, page: &mut Page, mm: f64) -> Result<(), Failure> {
+    pub(crate) fn move_to(&self, page: &mut Page, mm: f64) -> Result<(), Error> {
         let at = self.place(mm);
         if self.finger {
             page.touch("touchMove", at)?
@@ -149,7 +149,7 @@ impl Grab {
     }
 
     /// Lets go of the needle, with the hand at `mm`.
-    pub(crate) fn let_go(&self, page: &mut Page, mm: f64) -> Result<(), Failure> {
+    pub(crate) fn let_go(&self, page: &mut Page, mm: f64) -> Result<(), Error> {
         let at = self.place(mm);
         if self.finger { page.touch("touchEnd", at) } else { page.mouse("mouseReleased", at) }
     }
@@ -159,7 +159,7 @@ impl Grab {
 pub(crate) const OUTSIDE_MM: f64 = -5.0;
 
 /// Drags the needle in single millimetres to each of `depths`, which lie behind the far wall, beyond its hub, and out again.
-fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> Result<(), Failure> {
+fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> Result<(), Error> {
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -4")?;
     let grab = Grab::take(page, size.2)?;
     let mut wanted = grab.begin_mm.ceil();
@@ -187,7 +187,7 @@ fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> R
 }
 
 /// Waits until hand and needle are at `depth`: the needle lags by what its force bends the grip.
-fn needle_is_at(page: &mut Page, depth: f64, size: Size, grab: &Grab) -> Result<(), Failure> {
+fn needle_is_at(page: &mut Page, depth: f64, size: Size, grab: &Grab) -> Result<(), Error> {
     // A pointer is on whole pixels.
     let allowed = TRUE_WITHIN * depth.abs() + 1.0 / grab.scale;
     let hand = format!("Math.abs(__stats.handMm - {depth}) <= {allowed}");
@@ -195,11 +195,11 @@ fn needle_is_at(page: &mut Page, depth: f64, size: Size, grab: &Grab) -> Result<
     let needle = format!("Math.abs({tip} - __stats.handMm) <= {TRUE_WITHIN} * __stats.handMm");
     let came = page.wait(&format!("hand and needle at {depth} mm"), SOON, &format!("{hand} && {needle}"));
     let seen = page.evaluate(&format!("[__stats.handMm, __stats.depthMm, {tip}]"))?;
-    came.map_err(|failure| format!("{size:?}: hand, needle, unbent: {seen}; {failure}"))
+    came.map_err(|error| format!("{size:?}: hand, needle, unbent: {seen}; {error}"))
 }
 
 /// Fails unless tip, hub and the hub's upper corner are drawn within the canvas.
-fn in_sight(page: &mut Page, size: Size, when: &str) -> Result<(), Failure> {
+fn in_sight(page: &mut Page, size: Size, when: &str) -> Result<(), Error> {
     let seen = page.evaluate(
         "(() => { const c = document.getElementById('section'), { tip, hub, hubTop, angle } = __stats.drawn; \
          const inside = p => p.x >= 0 && p.y >= 0 && p.x <= c.clientWidth && p.y <= c.clientHeight; \
@@ -208,7 +208,7 @@ fn in_sight(page: &mut Page, size: Size, when: &str) -> Result<(), Failure> {
     check(&format!("tip and hub in sight, {when}"), seen["ok"] == json!(true), (size, &seen))
 }
 
-fn photographs(page: &mut Page, (width, ..): Size, scratch: &Path) -> Result<(), Failure> {
+fn photographs(page: &mut Page, (width, ..): Size, scratch: &Path) -> Result<(), Error> {
     for (dark, name) in [(false, "light"), (true, "dark")] {
         page.dark(dark)?;
         pictures(page, 3)?;
@@ -217,7 +217,7 @@ fn photographs(page: &mut Page, (width, ..): Size, scratch: &Path) -> Result<(),
     page.dark(false)
 }
 
-fn turn() -> Result<(), Failure> {
+fn turn() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-turned")?;
     let browser = Chromium::start(&scratch)?;
@@ -241,7 +241,7 @@ fn turn() -> Result<(), Failure> {
 }
 
 /// The adult's skin, fat, vein and far wall.
-fn layers_at_their_depths(page: &mut Page, degrees: f64) -> Result<(), Failure> {
+fn layers_at_their_depths(page: &mut Page, degrees: f64) -> Result<(), Error> {
     let depths =
         page.evaluate("__stats.drawn.tops.map(y => (y - __stats.drawn.entry.y) / __stats.drawn.scale)")?;
     let depths: Vec<f64> = depths.as_array().into_iter().flatten().filter_map(Value::as_f64).collect();

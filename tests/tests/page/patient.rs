@@ -4,7 +4,7 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const DESKTOP: (u32, u32) = (1440, 900);
 const SOON: Duration = Duration::from_secs(10);
@@ -17,12 +17,12 @@ const FIRM_SKIN_PUNCTURED: &str = "[...document.querySelectorAll('#events [data-
 
 #[test]
 fn a_patient_is_edited_and_a_replay_scrubbed() {
-    if let Err(failure) = edit_and_scrub() {
-        panic!("{failure}");
+    if let Err(error) = edit_and_scrub() {
+        panic!("{error}");
     }
 }
 
-fn edit_and_scrub() -> Result<(), Failure> {
+fn edit_and_scrub() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-test-patients")?;
     let browser = Chromium::start(&scratch)?;
@@ -38,7 +38,7 @@ fn edit_and_scrub() -> Result<(), Failure> {
 }
 
 /// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says why.
-fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
+fn patients(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.click("patient")?;
     page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
     let taken = "document.getElementById('patient-answer').textContent === 'The device has taken it.'";
@@ -78,7 +78,7 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Failure> {
 }
 
 /// Two rounds of the scripted venepuncture.
-fn record(path: &Path, recording: &Path) -> Result<(), Failure> {
+fn record(path: &Path, recording: &Path) -> Result<(), Error> {
     let mut run = Command::new(path);
     run.args(["run", "--headless", "--fast", "--seconds", "12", "--record"]).arg(recording);
     let status =
@@ -87,7 +87,7 @@ fn record(path: &Path, recording: &Path) -> Result<(), Failure> {
 }
 
 /// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
-fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failure> {
+fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error> {
     let file = recording.to_str().ok_or("the target folder has a plain name")?;
     let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
     let mut page = Page::open(browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
@@ -122,7 +122,7 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Failur
 
 /// A recording has no device to start, no hand and no patient to choose: their controls are not there, and its computed force is
 /// drawn at the place that was sought.
-fn only_what_a_recording_has(page: &mut Page) -> Result<(), Failure> {
+fn only_what_a_recording_has(page: &mut Page) -> Result<(), Error> {
     let shown = page.evaluate(
         "[...document.querySelectorAll('button, input, select')].filter(e => e.checkVisibility()).map(e => e.id)",
     )?;

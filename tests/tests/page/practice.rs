@@ -5,7 +5,7 @@ use crate::needle::{A_FEW_INSERTIONS, Grab, OUTSIDE_MM, SIZES, SOON, complaints,
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program, check};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const VERDICT: &str = "document.getElementById('verdict').textContent";
 const ROWS: &str = "document.querySelectorAll('#attempts tr')";
@@ -17,12 +17,12 @@ const REST: Duration = Duration::from_millis(1_200);
 
 #[test]
 fn attempts_are_judged_compared_and_recorded() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-practice")?;
     // Recordings of an earlier run.
@@ -82,7 +82,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// Without its tasks an insertion into the vein fails, with them it does not.
-fn tasks_count(page: &mut Page) -> Result<(), Failure> {
+fn tasks_count(page: &mut Page) -> Result<(), Error> {
     insert(page, IN_VEIN_MM)?;
     page.wait(
         "a tourniquet left on is critical",
@@ -93,7 +93,7 @@ fn tasks_count(page: &mut Page) -> Result<(), Failure> {
     insert_and(page, IN_VEIN_MM, &["advance_catheter", "tourniquet_off"])
 }
 
-fn record(page: &mut Page, name: &str) -> Result<(), Failure> {
+fn record(page: &mut Page, name: &str) -> Result<(), Error> {
     page.evaluate(&format!("document.getElementById('record-name').value = '{name}'"))?;
     page.click("record")?;
     page.wait(
@@ -103,25 +103,25 @@ fn record(page: &mut Page, name: &str) -> Result<(), Failure> {
     )
 }
 
-fn end_recording(page: &mut Page) -> Result<(), Failure> {
+fn end_recording(page: &mut Page) -> Result<(), Error> {
     page.click("record")?;
     page.wait("no recording", SOON, "document.getElementById('recording').textContent === 'Not recording'")
 }
 
 /// Presses the button of a task, and waits until the program has told of it.
-fn task(page: &mut Page, name: &str) -> Result<(), Failure> {
+fn task(page: &mut Page, name: &str) -> Result<(), Error> {
     let button = format!("document.querySelector('#tasks [data-task={name}]')");
     page.evaluate(&format!("{button}.click()"))?;
     page.wait("the task is done", SOON, &format!("{button}.dataset.done === 'true'"))
 }
 
 /// Takes the needle by its hub, inserts it to `deepest_mm`, rests and draws it out.
-fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Failure> {
+fn insert(page: &mut Page, deepest_mm: f64) -> Result<(), Error> {
     insert_and(page, deepest_mm, &[])
 }
 
 /// The same, with tasks that are done while the needle rests.
-fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Failure> {
+fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Error> {
     let grab = Grab::take(page, false)?;
     let mut way: Vec<f64> =
         (0..).map(|step| grab.begin_mm + 0.5 * f64::from(step)).take_while(|mm| *mm < deepest_mm).collect();
@@ -141,7 +141,7 @@ fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Fa
 }
 
 /// The link appears when a recording has ended, and leads to the debrief of its insertions.
-fn debriefed(page: &mut Page) -> Result<(), Failure> {
+fn debriefed(page: &mut Page) -> Result<(), Error> {
     page.wait("the link to the debrief", SOON, "!document.getElementById('debrief').hidden")?;
     let html = page.text("fetch(document.getElementById('debrief').href).then(answer => answer.text())")?;
     let is_whole = html.contains("<h1>Debrief</h1>") && html.contains("monday.mcap, insertion 3");
@@ -149,7 +149,7 @@ fn debriefed(page: &mut Page) -> Result<(), Failure> {
 }
 
 /// The first file has three insertions, the second none.
-fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Failure> {
+fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Error> {
     let score = |name: &str| {
         let output = Command::new(program).args(["score", name]).current_dir(scratch).output();
         output.map_err(|cause| format!("score does not start: {cause}"))
@@ -167,7 +167,7 @@ fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Failure> {
 }
 
 /// Eight successes in a row pass, seven do not, and a miss puts it off: Kestin's rule at 20 and 40 % failures and errors of 10 %.
-fn pass_mark(page: &mut Page) -> Result<(), Failure> {
+fn pass_mark(page: &mut Page) -> Result<(), Error> {
     let passed = |page: &mut Page, reached: &str| {
         page.number(&format!(
             "import('/learning_curve.js').then(curve => curve.cumulativeSum([...'{reached}'].map(c => c === '1')).passedAfter)"

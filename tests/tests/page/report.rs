@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::process::Command;
 
 use crate::needle::SOON;
-use tests::browser::{Chromium, Failure, Page, Places, check};
+use tests::browser::{Chromium, Error, Page, Places, check};
 
 /// The recorded position, rad, over the time, s.
 fn position(t: f64) -> f64 {
@@ -20,12 +20,12 @@ const PLOT: &str = "const svg = document.querySelector('svg[data-x]'); svg.scrol
 
 #[test]
 fn a_stretch_of_a_plot_is_shown_alone_with_its_values() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-report")?;
     let mut csv = String::from("time_s,command,position_counts\n");
@@ -72,18 +72,18 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// The place in the window at a part of the first plot's width.
-fn place(page: &mut Page, part: f64) -> Result<(f64, f64), Failure> {
+fn place(page: &mut Page, part: f64) -> Result<(f64, f64), Error> {
     let x = page.number(&format!("(() => {{ {PLOT} return box.left + {part} * box.width; }})()"))?;
     let y = page.number(&format!("(() => {{ {PLOT} return box.top + 0.5 * box.height; }})()"))?;
     Ok((x, y))
 }
 
-fn said(page: &mut Page) -> Result<String, Failure> {
+fn said(page: &mut Page) -> Result<String, Error> {
     page.text("document.querySelector('svg[data-x] + output').textContent")
 }
 
 /// True if the readout under the pointer gives the recorded position at the time that it gives.
-fn reads(page: &mut Page, part: f64) -> Result<bool, Failure> {
+fn reads(page: &mut Page, part: f64) -> Result<bool, Error> {
     let at = place(page, part)?;
     page.mouse("mouseMoved", at)?;
     let text = said(page)?;
@@ -96,7 +96,7 @@ fn reads(page: &mut Page, part: f64) -> Result<bool, Failure> {
 }
 
 /// Labels of the ticks along the first plot that are shown.
-fn labels(page: &mut Page) -> Result<String, Failure> {
+fn labels(page: &mut Page) -> Result<String, Error> {
     page.text(
         "[...document.querySelector('svg[data-x]').querySelectorAll('text:not([text-anchor=end])')]\
          .filter((text) => text.style.display !== 'none').map((text) => text.textContent).join(' ')",

@@ -48,7 +48,7 @@ pub(crate) fn carry_out(bootloader: &mut Bootloader, next: &Next) -> Option<Resu
 
 /// Runs an update to its end; why it failed where it did.
 fn run(bootloader: &mut Bootloader, file: &[u8]) -> Result<(), String> {
-    let mut update = Update::new(file, MEMORY).map_err(|failure| failure.to_string())?;
+    let mut update = Update::new(file, MEMORY).map_err(|error| error.to_string())?;
     loop {
         let next = update.advance();
         match carry_out(bootloader, &next) {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
-use tests::browser::{Chromium, Failure, Page, Places, Program};
+use tests::browser::{Chromium, Error, Page, Places, Program};
 
 /// A start on a busy machine; a scripted insertion takes 6 s.
 const SOME_TIME: Duration = Duration::from_secs(60);
@@ -14,12 +14,12 @@ const IN_PLANE: &str = "__body.share > 0.5";
 
 #[test]
 fn limb_and_ultrasound_are_drawn_and_the_folder_needs_no_server() {
-    if let Err(failure) = visit() {
-        panic!("{failure}");
+    if let Err(error) = visit() {
+        panic!("{error}");
     }
 }
 
-fn visit() -> Result<(), Failure> {
+fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-views")?;
     let browser = Chromium::start(&scratch)?;
@@ -32,7 +32,7 @@ fn visit() -> Result<(), Failure> {
 }
 
 /// The recording says where the probe was: the tip was seen in one insertion for some of the time and in another less.
-fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Failure> {
+fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Error> {
     let output = Command::new(program).arg("score").arg(file).arg("--json").output();
     let output = output.map_err(|cause| format!("score does not start: {cause}"))?;
     let score: Value = serde_json::from_slice(&output.stdout).map_err(|cause| format!("score: {cause}"))?;
@@ -43,7 +43,7 @@ fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Failure> {
 }
 
 /// The folder's page: in the target directory, or where `cargo xtask site` put it for this one.
-fn site(target: &Path) -> Result<String, Failure> {
+fn site(target: &Path) -> Result<String, Error> {
     let page: PathBuf = target.join("site/index.html");
     if page.exists() {
         return Ok(format!("file://{}", page.display()));
@@ -52,7 +52,7 @@ fn site(target: &Path) -> Result<String, Failure> {
 }
 
 /// The needle goes in by itself; the second view shows it, in the ultrasound's plane, until the probe is moved away.
-fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Failure> {
+fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Error> {
     let mut page = Page::open(browser, url, 1_440, 900, false)?;
     page.wait("a needle", SOME_TIME, "__stats.depthMm > -100")?;
     page.click("view-body")?;
@@ -75,7 +75,7 @@ fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Failure>
 }
 
 /// Table 1 of Paper 000 replaces the limb, is drawn and imaged, and gives way to the limb again.
-fn table_1(page: &mut Page) -> Result<(), Failure> {
+fn table_1(page: &mut Page) -> Result<(), Error> {
     let choose = |page: &mut Page, value: &str| {
         page.evaluate(&format!(
             "{{ const s = document.getElementById('tissue-model'); s.value = '{value}'; s.dispatchEvent(new Event('change')); }}"

@@ -3,7 +3,7 @@
 use super::programs;
 use super::values::{Values, values_in};
 use super::whole;
-use crate::shell::{self, Failure};
+use crate::shell::{self, Error};
 use crate::workspace_build::built;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,13 +13,13 @@ use std::process::Command;
 const ROWS: usize = 40_000;
 
 /// Our fit alone, for a machine on which the peer is absent.
-pub(crate) fn ours() -> Result<Values, Failure> {
+pub(crate) fn ours() -> Result<Values, Error> {
     let (program, rig, recording) = prepared()?;
     shell::output(Command::new(program).arg(rig).arg(recording)).map(|text| values_in(&text))
 }
 
 /// Both by turns: the script runs our program itself, and prints the row, its peer, and by how much the answers differ.
-pub(crate) fn with_peer() -> Result<Values, Failure> {
+pub(crate) fn with_peer() -> Result<Values, Error> {
     let mut python = programs::python("parameter_fit.py")?;
     let (program, rig, recording) = prepared()?;
     let text = shell::output(python.arg(program).arg(rig).arg(recording))?;
@@ -28,7 +28,7 @@ pub(crate) fn with_peer() -> Result<Values, Failure> {
 }
 
 /// Our program, the rig, and the first rows of a recording of it.
-fn prepared() -> Result<(PathBuf, PathBuf, PathBuf), Failure> {
+fn prepared() -> Result<(PathBuf, PathBuf, PathBuf), Error> {
     let folder = shell::target().join("bench-recordings");
     if !folder.join("fit.csv").is_file() {
         whole::recordings()?;
@@ -39,8 +39,8 @@ fn prepared() -> Result<(PathBuf, PathBuf, PathBuf), Failure> {
     Ok((program, folder.join("rig.toml"), short))
 }
 
-fn shorten(from: &Path, to: &Path) -> Result<(), Failure> {
-    let failed = |error| Failure::new(format!("{} cannot be shortened: {error}", from.display()));
+fn shorten(from: &Path, to: &Path) -> Result<(), Error> {
+    let failed = |error| Error::new(format!("{} cannot be shortened: {error}", from.display()));
     let text = fs::read_to_string(from).map_err(failed)?;
     fs::write(to, first_rows(&text)).map_err(failed)
 }

@@ -2,7 +2,7 @@
 
 use super::values::{BOARD_LINE, Values, board_lines_in, values_in};
 use crate::rows::ROWS;
-use crate::shell::{self, Failure, cargo};
+use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{BUILD, built};
 use crate::{boards, firmware, setup};
 use std::fs;
@@ -20,11 +20,11 @@ pub(crate) struct TestModule {
 }
 
 /// Finds the files of tests.
-pub(crate) fn test_modules() -> Result<Vec<TestModule>, Failure> {
+pub(crate) fn test_modules() -> Result<Vec<TestModule>, Error> {
     let mut modules = vec![];
     for program in TEST_PROGRAMS {
         let folder = shell::top().join("tests/tests").join(program);
-        let unreadable = |error| Failure::new(format!("{} cannot be read: {error}", folder.display()));
+        let unreadable = |error| Error::new(format!("{} cannot be read: {error}", folder.display()));
         for path in fs::read_dir(&folder).map_err(unreadable)?.flatten().map(|entry| entry.path()) {
             let Some(name) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
             let is_source = path.extension().is_some_and(|extension| extension == "rs");
@@ -48,7 +48,7 @@ impl TestModule {
     }
 
     /// Runs the tests of the file.
-    pub(crate) fn run(&self, board_lines: &mut Vec<String>) -> Result<Values, Failure> {
+    pub(crate) fn run(&self, board_lines: &mut Vec<String>) -> Result<Values, Error> {
         let mut run = cargo();
         // As `BENCH` of the crate `tests`.
         run.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT)).env("NEEDLE_BENCH", "1");
@@ -58,7 +58,7 @@ impl TestModule {
         let output = run
             .stderr(Stdio::inherit())
             .output()
-            .map_err(|error| Failure::new(format!("cargo could not be started: {error}")))?;
+            .map_err(|error| Error::new(format!("cargo could not be started: {error}")))?;
         let text = String::from_utf8_lossy(&output.stdout);
         board_lines.extend(board_lines_in(&text));
         Ok(values_in(&text))
@@ -83,7 +83,7 @@ fn mesh() -> PathBuf {
 }
 
 /// Builds an example with the one build of everything, and runs it.
-pub(crate) fn example(name: &str) -> Result<Values, Failure> {
+pub(crate) fn example(name: &str) -> Result<Values, Error> {
     let program = built(&["--example", name], &format!("examples/{name}"))?;
     shell::output(Command::new(program).env(MESH, mesh())).map(|text| values_in(&text))
 }
@@ -95,12 +95,12 @@ pub(crate) const PEERS: [(&str, &str); 3] =
 pub(crate) const PEERS_PACKAGES: [&str; 3] = ["numpy==2.4.6", "mujoco==4.0.0", "scipy==1.17.1"];
 
 /// Runs one of them: it prints the row that it stands beside.
-pub(crate) fn peer(script: &str) -> Result<Values, Failure> {
+pub(crate) fn peer(script: &str) -> Result<Values, Error> {
     shell::output(&mut python(script)?).map(|text| values_in(&text))
 }
 
 /// A peer's program, ready to be run where MuJoCo may leave its log; on one core, as ours.
-pub(crate) fn python(script: &str) -> Result<Command, Failure> {
+pub(crate) fn python(script: &str) -> Result<Command, Error> {
     let mut command = Command::new(setup::python(&PEERS_PACKAGES)?);
     command.current_dir(shell::target());
     command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").env(MESH, mesh());
@@ -109,7 +109,7 @@ pub(crate) fn python(script: &str) -> Result<Command, Failure> {
 }
 
 /// One, ten and thirty devices with their instructor: a build of its own, with Zenoh.
-pub(crate) fn class() -> Result<Values, Failure> {
+pub(crate) fn class() -> Result<Values, Error> {
     let mut test = cargo();
     test.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/class", "--test", "program", "--"]);
     test.args(["--ignored", "--nocapture", "thirty_devices_cost_less_than_a_core"]);

@@ -2,7 +2,7 @@
 
 use super::values::Values;
 use crate::elf::Elf;
-use crate::shell::{self, Failure, cargo};
+use crate::shell::{self, Error, cargo};
 use crate::workspace_build::built;
 use crate::{boards, firmware};
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ const FIRST: &str = "needle";
 const STREAM_SECONDS: &str = "60";
 
 /// Time of the first command's build from nothing, in a folder of its own.
-pub(crate) fn build_time() -> Result<Values, Failure> {
+pub(crate) fn build_time() -> Result<Values, Error> {
     let folder = shell::target().join("bench-build");
     let forget = || {
         // Not there is as good.
@@ -43,7 +43,7 @@ pub(crate) fn build_time() -> Result<Values, Failure> {
 }
 
 /// Packages that the main crate's build needs, itself included.
-pub(crate) fn packages() -> Result<Values, Failure> {
+pub(crate) fn packages() -> Result<Values, Error> {
     let mut tree = cargo();
     tree.args(["tree", "--quiet", "-p", MAIN, "-e", "normal,build", "--prefix", "none", "--format", "{p}"]);
     let text = shell::output(&mut tree)?;
@@ -52,13 +52,13 @@ pub(crate) fn packages() -> Result<Values, Failure> {
 }
 
 /// Bytes of the flash image.
-pub(crate) fn image() -> Result<Values, Failure> {
+pub(crate) fn image() -> Result<Values, Error> {
     let (_, bytes) = Elf::read(&firmware::build(boards::DEFAULT)?)?.flash_image()?;
     Ok(Values::from([("firmware_flash_bytes".into(), bytes.len().to_string())]))
 }
 
 /// The whole way of a sample: plant, control law, frame, bytes, frame again, tallies.
-pub(crate) fn stream() -> Result<Values, Failure> {
+pub(crate) fn stream() -> Result<Values, Error> {
     let program = built(&["--bin", MAIN], MAIN)?;
     let run = |seconds| {
         let mut run = Command::new(&program);
@@ -73,12 +73,12 @@ pub(crate) fn stream() -> Result<Values, Failure> {
     let samples =
         text.split_whitespace().rev().find_map(|word| word.strip_prefix("samples=")?.parse::<f64>().ok());
     let samples =
-        samples.ok_or_else(|| Failure::new("`run --headless` did not print the number of samples"))?;
+        samples.ok_or_else(|| Error::new("`run --headless` did not print the number of samples"))?;
     Ok(Values::from([("stream_samples_per_s".into(), format!("{:.0}", samples / seconds))]))
 }
 
 /// About a minute of recording to fit, and another one to judge, made by the virtual device; their folder.
-pub(crate) fn recordings() -> Result<PathBuf, Failure> {
+pub(crate) fn recordings() -> Result<PathBuf, Error> {
     let folder = shell::target().join("bench-recordings");
     let program = built(&["--bin", MAIN], MAIN)?;
     shell::run(Command::new(program).arg("characterise").arg("--out").arg(&folder))?;
@@ -86,7 +86,7 @@ pub(crate) fn recordings() -> Result<PathBuf, Failure> {
 }
 
 /// Time and memory of a diagnosis.
-pub(crate) fn diagnosis() -> Result<Values, Failure> {
+pub(crate) fn diagnosis() -> Result<Values, Error> {
     let folder = recordings()?;
     let mut diagnose = Command::new(shell::target().join("release").join(MAIN).with_extension(EXE_EXTENSION));
     diagnose.current_dir(shell::top()).arg("diagnose").arg("--rig").arg(folder.join("rig.toml"));
@@ -99,10 +99,10 @@ pub(crate) fn diagnosis() -> Result<Values, Failure> {
 }
 
 /// Runs a program to its end: its time in s, and the most memory that it had, in KiB, where the system counts that.
-fn watched(program: &mut Command) -> Result<(f64, Option<f64>), Failure> {
+fn watched(program: &mut Command) -> Result<(f64, Option<f64>), Error> {
     let begin = Instant::now();
     let mut child =
-        program.spawn().map_err(|error| Failure::new(format!("{MAIN} could not be started: {error}")))?;
+        program.spawn().map_err(|error| Error::new(format!("{MAIN} could not be started: {error}")))?;
     let status_file = format!("/proc/{}/status", child.id());
     let mut peak_kib = None;
     let status = loop {
@@ -111,13 +111,13 @@ fn watched(program: &mut Command) -> Result<(f64, Option<f64>), Failure> {
         match child.try_wait() {
             Ok(None) => std::thread::sleep(Duration::from_millis(20)),
             Ok(Some(status)) => break status,
-            Err(error) => return Err(Failure::new(format!("the diagnosis was lost: {error}"))),
+            Err(error) => return Err(Error::new(format!("the diagnosis was lost: {error}"))),
         }
     };
     if status.success() {
         Ok((begin.elapsed().as_secs_f64(), peak_kib))
     } else {
-        Err(Failure::new(format!("the diagnosis failed ({status})")))
+        Err(Error::new(format!("the diagnosis failed ({status})")))
     }
 }
 

@@ -1,7 +1,7 @@
 //! As much of the Thumb instruction set as tells stack use and calls (ARMv7-M Architecture Reference Manual, chapter A7).
 
 use crate::elf::{Elf, Symbol};
-use crate::shell::Failure;
+use crate::shell::Error;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The facts that a function's instructions tell.
@@ -41,7 +41,7 @@ enum Instruction {
 
 impl<'a> Code<'a> {
     /// The image, with the linker's marks of code (`$t`) and data (`$d`).
-    pub(crate) fn new(elf: &'a Elf, symbols: &[Symbol]) -> Result<Self, Failure> {
+    pub(crate) fn new(elf: &'a Elf, symbols: &[Symbol]) -> Result<Self, Error> {
         let mut memory = vec![];
         for segment in elf.segments()? {
             memory.push((segment.address, elf.contents(&segment)?));

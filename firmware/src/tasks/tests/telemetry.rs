@@ -13,7 +13,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use link::Command;
 use link::codec::MAX_FRAME;
 use link::device::Identity;
-use link::frames::{DeviceFrame, EventKind, PROTOCOL_VERSION, Rejection, SaveFailure};
+use link::frames::{CommandRefusal, DeviceFrame, EventKind, PROTOCOL_VERSION, SaveError};
 use link::host::{Commands, Reception};
 use std::vec::Vec;
 
@@ -63,7 +63,7 @@ impl Desk {
         packets.iter().flatten().filter_map(|&byte| self.reception.push(byte)).collect()
     }
 
-    fn answer(&mut self, command: Command) -> Result<(), Rejection> {
+    fn answer(&mut self, command: Command) -> Result<(), CommandRefusal> {
         let id = self.say(command);
         let mut acks = self.turn().into_iter().filter_map(|frame| match frame {
             DeviceFrame::Ack(ack) if ack.id == id => Some(ack.result),
@@ -76,17 +76,17 @@ impl Desk {
 #[test]
 fn a_start_reaches_the_tick_with_its_session() {
     let mut desk = Desk::new();
-    assert_eq!(desk.answer(Command::Start), Err(Rejection::NoSession));
+    assert_eq!(desk.answer(Command::Start), Err(CommandRefusal::NoSession));
     let mut desk = Desk::in_session();
     desk.shared.session.store(3, Relaxed);
-    let unknown = Err(Rejection::Interlocked(Interlock::NotZeroed));
+    let unknown = Err(CommandRefusal::Interlocked(Interlock::NotZeroed));
     assert_eq!(desk.answer(Command::Start), unknown, "nobody has said where depth 0 is");
     assert_eq!(desk.answer(Command::Zero), Ok(()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: Some(Order::Zero), .. })));
     assert_eq!(desk.answer(Command::Start), Ok(()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { session: 3, order: Some(Order::Start) })));
     desk.shared.conditions.set(Interlock::AmplifierNotReady, true);
-    let refused = Err(Rejection::Interlocked(Interlock::AmplifierNotReady));
+    let refused = Err(CommandRefusal::Interlocked(Interlock::AmplifierNotReady));
     assert_eq!(desk.answer(Command::Start), refused);
     assert!(world().usb_allowed.get(), "there is room again");
 }
@@ -127,7 +127,7 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
     config.limits.fade_in_ms = 445;
     desk.say(Command::ConfigureDevice(config));
     let frames: Vec<DeviceFrame> = (0..3).flat_map(|_| desk.turn()).collect();
-    let wanted = EventKind::NotSaved { cause: SaveFailure::Flash };
+    let wanted = EventKind::NotSaved { cause: SaveError::Flash };
     assert!(
         frames.iter().any(|frame| matches!(frame, DeviceFrame::Event(event) if event.kind == wanted)),
         "{frames:?}"

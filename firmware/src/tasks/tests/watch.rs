@@ -8,7 +8,7 @@ use super::super::usb::Port;
 use super::fake::{Fake, Lines, Part, ends, shared, world};
 use crate::monitor::Readings;
 use crate::supervision::Task;
-use crate::tilt::{Reading, TiltTrouble};
+use crate::tilt::{Reading, TiltError};
 use crate::wire_check::Pull;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
@@ -99,7 +99,7 @@ fn the_tilt_task_gives_what_it_measures_and_trips_under_torque() {
     world().tilt.set(Some(Reading::New(Milliradians(-321))));
     tilt.run();
     assert_eq!(shared.tilt(), Milliradians(-321));
-    world().tilt.set(Some(Reading::Failed(TiltTrouble::Absent)));
+    world().tilt.set(Some(Reading::Failed(TiltError::Absent)));
     (0..100).for_each(|_| tilt.run());
     assert!(shared.trips.is_empty(), "torque is off");
     shared.powered.store(true, Relaxed);

@@ -2,20 +2,20 @@
 
 use super::table::{Column, Log};
 use super::{json, log, mat, npy, text};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::path::Path;
 
 /// Reads a file of any format that is known, told by its first bytes and its name's ending.
-pub(super) fn read(path: &Path) -> Result<Log, Failure> {
+pub(super) fn read(path: &Path) -> Result<Log, Error> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path)
-        .map_err(|cause| Failure::input(format_args!("{file}: cannot be read ({cause}); check its path")))?;
+        .map_err(|cause| Error::input(format_args!("{file}: cannot be read ({cause}); check its path")))?;
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let first = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(0);
     let mut log = if bytes.starts_with(mcap::MAGIC) {
         log::read(&file, &bytes)?
     } else if let Some(advice) = unread(&bytes) {
-        return Err(Failure::input(format_args!("{file}: is {advice}")));
+        return Err(Error::input(format_args!("{file}: is {advice}")));
     } else if bytes.starts_with(ZIP) || bytes.starts_with(b"\x93NUMPY") {
         npy::read(&file, bytes)?
     } else if bytes.starts_with(b"MATLAB 5.0") {
@@ -34,9 +34,7 @@ pub(super) fn read(path: &Path) -> Result<Log, Failure> {
     }
     log.tables.retain(|table| !table.columns.is_empty());
     if log.tables.is_empty() {
-        return Err(Failure::input(format_args!(
-            "{file}: holds no column of numbers; is it the right file?"
-        )));
+        return Err(Error::input(format_args!("{file}: holds no column of numbers; is it the right file?")));
     }
     Ok(log)
 }
@@ -83,13 +81,13 @@ fn unread(bytes: &[u8]) -> Option<&'static str> {
 }
 
 #[cfg(feature = "parquet")]
-fn parquet(file: &str, bytes: Vec<u8>) -> Result<Log, Failure> {
+fn parquet(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     super::parquet::read(file, bytes)
 }
 
 #[cfg(not(feature = "parquet"))]
-fn parquet(file: &str, _: Vec<u8>) -> Result<Log, Failure> {
-    Err(Failure::input(format_args!(
+fn parquet(file: &str, _: Vec<u8>) -> Result<Log, Error> {
+    Err(Error::input(format_args!(
         "{file}: is a Parquet file, which this build does not read; build with `--features parquet` (cargo run --release --features parquet -- import …)"
     )))
 }

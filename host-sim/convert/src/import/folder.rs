@@ -1,10 +1,10 @@
 //! Folders that hold a recording: a ROS 2 bag, or a LeRobot dataset.
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::path::{Path, PathBuf};
 
 /// The files of what was given: files as they are, and those in a folder of a kind that is known.
-pub(super) fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let mut out = Vec::new();
     for path in given {
         if !path.is_dir() {
@@ -16,7 +16,7 @@ pub(super) fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         } else if path.join("meta/info.json").is_file() {
             (path.join("data"), ["parquet", "parquet"])
         } else {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{}: is a folder, and neither a ROS 2 bag (metadata.yaml) nor a LeRobot dataset (meta/info.json); give the files in it",
                 path.display()
             )));
@@ -24,7 +24,7 @@ pub(super) fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         let mut found = Vec::new();
         collect(&inside, &endings, 0, &mut found);
         if found.is_empty() {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{}: has no file that ends in .{}; is it complete?",
                 inside.display(),
                 endings[0]

@@ -2,7 +2,7 @@
 //! orientations; nested objects give names with dots.
 
 use super::table::{Column, Log};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ const DEEPEST: usize = 12;
 /// Elements of an array within a row that become columns.
 const WIDEST: usize = 64;
 
-pub(super) fn read(file: &str, text: &str) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, text: &str) -> Result<Log, Error> {
     let value = match serde_json::from_str(text) {
         Ok(value) => value,
         // Lines of objects: one value after another.
@@ -19,7 +19,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<Log, Failure> {
             match serde_json::Deserializer::from_str(text).into_iter().collect::<Result<Vec<Value>, _>>() {
                 Ok(rows) if rows.len() > 1 => Value::Array(rows),
                 _ => {
-                    return Err(Failure::input(format_args!("{file}: is no JSON ({cause}); write it again")));
+                    return Err(Error::input(format_args!("{file}: is no JSON ({cause}); write it again")));
                 }
             }
         }

@@ -4,7 +4,7 @@
 use super::json;
 use super::table::{Column, Log, Table};
 use super::units;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use mcap::read::{LinearReader, Options};
 use mcap::records::Record;
 use std::collections::BTreeMap;
@@ -24,9 +24,9 @@ struct Topic {
     broken: usize,
 }
 
-pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
-        Failure::input(format_args!("{file}: is no usable MCAP recording ({cause}); record it again"))
+        Error::input(format_args!("{file}: is no usable MCAP recording ({cause}); record it again"))
     };
     let mut found = Found::default();
     let mut notes = Vec::new();
@@ -52,9 +52,9 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
 }
 
 /// The tables of the topics that are read, and notes on the others; an error where there is none.
-fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -> Result<Log, Failure> {
+fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -> Result<Log, Error> {
     if topics.values().any(|t| t.name == "/setup") && topics.values().any(|t| t.name == "/samples") {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{file}: is a recording of this program; `host-sim export {file} --out DIR` gives its files"
         )));
     }
@@ -78,7 +78,7 @@ fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -
         tables.push(table(topic));
     }
     if tables.is_empty() {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{file}: has no messages that are read ({}); {}",
             if foreign.is_empty() { "it has none at all".to_owned() } else { foreign.join(", ") },
             if cfg!(not(feature = "ros")) && foreign.iter().any(|topic| topic.ends_with("(cdr)")) {

@@ -2,7 +2,7 @@
 //! arrays. The layout is that of MathWorks' "MAT-File Format": tagged elements, compressed ones within zlib.
 
 use super::table::{Column, Log};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::io::Read;
 
 const HEADER: usize = 128;
@@ -17,9 +17,9 @@ const STRUCTURE: u8 = 2;
 const OBJECT: u8 = 3;
 const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
 
-pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     let unusable = |cause: &str| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{file}: is no usable MATLAB file ({cause}); save it again with save('FILE.mat', '-v7')"
         ))
     };

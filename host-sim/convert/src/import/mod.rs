@@ -27,7 +27,7 @@ pub use rows::Known;
 pub use runs::Keep;
 pub use writer::RigValues;
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::{Kind, Rig};
 use rows::Rows;
 use std::f64::consts::TAU;
@@ -87,10 +87,10 @@ pub struct Imported {
 }
 
 /// Reads, cleans and writes.
-pub fn import(request: &Request) -> Result<Imported, Failure> {
+pub fn import(request: &Request) -> Result<Imported, Error> {
     let mut notes = Vec::new();
     let rig = match &request.rig {
-        Some(path) => Some(Rig::read(path).map_err(Failure::input)?),
+        Some(path) => Some(Rig::read(path).map_err(Error::input)?),
         None => None,
     };
     let paths = folder::files(&request.files)?;
@@ -107,7 +107,7 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
         all.extend(runs::runs(whole, request.keep, per_turn, &mut notes));
     }
     let Some(first) = all.first() else {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{}: no stretch of at least a second is left ({}); record longer, or check the unit of the time with --column time=NAME:ms",
             request.files.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(", "),
             notes.join("; ")
@@ -140,7 +140,7 @@ pub fn import(request: &Request) -> Result<Imported, Failure> {
 
 /// The rows of the files: each file's own where each has all columns, with one that goes on where another ends joined to it; else those of
 /// all files together.
-fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Vec<Rows>, Failure> {
+fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Vec<Rows>, Error> {
     let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
     let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(logs));
     if one_run || !logs.iter().all(is_whole) {
@@ -162,16 +162,16 @@ fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Ve
 }
 
 /// Checks that all runs measure their positions as the first does, and as the rig has it.
-fn check_positions(runs: &[Rows], first: &Rows, rig: Option<&Rig>) -> Result<(), Failure> {
+fn check_positions(runs: &[Rows], first: &Rows, rig: Option<&Rig>) -> Result<(), Error> {
     if runs.iter().any(|run| run.position != first.position) {
-        return Err(Failure::input(
+        return Err(Error::input(
             "the files measure their positions in different units; import them one by one",
         ));
     }
     if let (Some(rig), false) = (rig, first.position == Quantity::Counts)
         && (rig.kind == Kind::Linear) != (first.position == Quantity::Length)
     {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "the position is in {} and the rig {} is {}; correct one of them",
             first.position.unit(),
             rig.name,

@@ -2,15 +2,13 @@
 
 use super::npy_array::Array;
 use super::table::{Column, Log};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
-pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
-        Failure::input(format_args!(
-            "{file}: is no usable NumPy file ({cause}); write it again with np.savez"
-        ))
+        Error::input(format_args!("{file}: is no usable NumPy file ({cause}); write it again with np.savez"))
     };
     let mut columns = Vec::new();
     let mut left_out = Vec::new();

@@ -2,7 +2,7 @@
 
 use super::table::{Column, Log};
 use super::units::{self, Unit};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use parquet::basic::{LogicalType, TimeUnit};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
@@ -13,9 +13,9 @@ use std::path::Path;
 /// Elements of a list that become columns.
 const WIDEST: usize = 64;
 
-pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: parquet::errors::ParquetError| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{file}: is no usable Parquet file ({cause}); write it again, with no compression or snappy"
         ))
     };

@@ -3,7 +3,7 @@
 use super::table::{Column, Log};
 use super::units::{self, Quantity, Unit};
 use crate::shell::quoted;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::fmt;
 use std::path::Path;
 
@@ -95,14 +95,14 @@ impl Choice {
 }
 
 /// Reads one `--column`.
-pub fn choice(text: &str) -> Result<Choice, Failure> {
+pub fn choice(text: &str) -> Result<Choice, Error> {
     let form = "give it as --column position=theta:deg";
     let Some((role, name)) = text.split_once('=') else {
-        return Err(Failure::input(format_args!("--column {text}: says no role; {form}")));
+        return Err(Error::input(format_args!("--column {text}: says no role; {form}")));
     };
     let Some(role) = Role::ALL.into_iter().find(|known| known.name() == role.trim()) else {
         let known: Vec<&str> = Role::ALL.iter().map(|r| r.name()).collect();
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "--column {text}: \"{role}\" is no role; use one of {}",
             known.join(", ")
         )));
@@ -118,7 +118,7 @@ pub fn choice(text: &str) -> Result<Choice, Failure> {
     if let Some(unit) = unit
         && !role.takes(unit.quantity)
     {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "--column {text}: a {role} is not measured in {}; correct the unit",
             unit.quantity.unit()
         )));
@@ -281,19 +281,19 @@ fn find_in_file(logs: &[Log], wanted: &str) -> Option<Place> {
 }
 
 /// Refuses choices that cannot all hold: a role given twice, or a column given two roles.
-pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Failure> {
+pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Error> {
     for (i, choice) in choices.iter().enumerate() {
         for before in &choices[..i] {
             let (role, name) = (choice.role, &choice.name);
             if before.role == role {
-                return Err(Failure::input(format_args!(
+                return Err(Error::input(format_args!(
                     "--column gives the {role} twice, {} and {name}; leave one of them out",
                     before.name
                 )));
             }
             let at = choice.column(logs).map(|c| c.0);
             if at.is_some() && at == before.column(logs).map(|c| c.0) {
-                return Err(Failure::input(format_args!(
+                return Err(Error::input(format_args!(
                     "--column gives {name} two roles, {} and {role}; a column has one, and where files have columns of one name, say whose it is: --column {role}=FILE/{name}",
                     before.role
                 )));
@@ -304,7 +304,7 @@ pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Failure> {
 }
 
 /// The column of a role: the one that was said, else the one whose name fits best; an error where two fit alike.
-pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Option<Chosen>, Failure> {
+pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Option<Chosen>, Error> {
     let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
     let unit_of = |at: Place| logs[at.0].tables[at.1].columns[at.2].unit;
     if let Some(said) = choices.iter().find(|c| c.role == role) {
@@ -328,7 +328,7 @@ pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Opt
             if matches!(role, Role::Reference | Role::Tilt | Role::Force) {
                 return Ok(None);
             }
-            Err(Failure::input(format_args!(
+            Err(Error::input(format_args!(
                 "{}: {} and {} could both be the {role}; say which with {}",
                 files.join(", "),
                 a.2.name,
@@ -348,7 +348,7 @@ pub(super) fn option(role: Role, name: &str, unit: Option<&str>) -> String {
     format!("--column {}", quoted(&format!("{role}={name}{unit}")))
 }
 
-fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Failure {
+fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Error {
     let name = choice.name.trim_start_matches('-');
     let unit = match name.rsplit_once(':') {
         Some((_, unit)) => format!(
@@ -356,7 +356,7 @@ fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Failure {
         ),
         None => String::new(),
     };
-    Failure::input(format_args!(
+    Error::input(format_args!(
         "{}: has no column \"{name}\"; its columns are {}{unit}",
         files.join(", "),
         listed(logs)
@@ -364,9 +364,9 @@ fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Failure {
 }
 
 /// Which role could not be filled, with what there is.
-pub(super) fn missing(logs: &[Log], role: Role) -> Failure {
+pub(super) fn missing(logs: &[Log], role: Role) -> Error {
     let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
-    Failure::input(format_args!(
+    Error::input(format_args!(
         "{}: no column is known to be the {role}; say which with --column {role}=NAME[:UNIT]; its columns are {}",
         files.join(", "),
         listed(logs)

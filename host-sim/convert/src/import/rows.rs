@@ -3,7 +3,7 @@
 use super::roles::{self, Choice, Chosen, Role};
 use super::table::{Log, Table};
 use super::units::{Quantity, Unit};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A recording in SI units; the position is in `position_unit`. All columns have the same length.
@@ -44,9 +44,9 @@ pub(super) fn median_step(time: &[f64]) -> Option<f64> {
 }
 
 /// The unit of a clock that does not say it, from its usual step; an error where that could be two.
-fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f64, Failure> {
+fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f64, Error> {
     let Some(step) = median_step(time) else {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "the time column {name} never increases; choose another with --column time=NAME:s"
         )));
     };
@@ -54,7 +54,7 @@ fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f6
         d if d < 0.2 => (1.0, "s"),
         d if d < 20.0 => (1e-3, "ms"),
         d if d < 100.0 => {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "the time column {name} has steps of {d}, which could be ms or µs; say which with {} or {}",
                 roles::option(Role::Time, name, Some("ms")),
                 roles::option(Role::Time, name, Some("us"))
@@ -79,7 +79,7 @@ fn clock(
     several: bool,
     known: Known,
     notes: &mut Vec<String>,
-) -> Result<(Vec<f64>, f64), Failure> {
+) -> Result<(Vec<f64>, f64), Error> {
     let said = choices.iter().find(|c| c.role == Role::Time);
     let alone = [Log { file: table.name.clone(), tables: vec![table.clone()], notes: Vec::new() }];
     let logged = table.columns.iter().position(|c| c.name == "log_time");
@@ -92,7 +92,7 @@ fn clock(
     };
     let Some(chosen) = chosen else {
         let Some(rate) = known.rate_hz else {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{}; or give --rate HZ where its rows are evenly spaced",
                 roles::missing(&alone, Role::Time)
             )));
@@ -112,7 +112,7 @@ fn clock(
     Ok((time.into_iter().map(|t| t * factor).collect(), origin * factor))
 }
 
-fn find_all(logs: &[Log], choices: &[Choice]) -> Result<BTreeMap<Role, Chosen>, Failure> {
+fn find_all(logs: &[Log], choices: &[Choice]) -> Result<BTreeMap<Role, Chosen>, Error> {
     let mut found = BTreeMap::new();
     for role in Role::ALL.into_iter().filter(|r| *r != Role::Time) {
         if let Some(chosen) = roles::choose(logs, role, choices)? {
@@ -136,7 +136,7 @@ pub(super) fn gather(
     choices: &[Choice],
     known: Known,
     notes: &mut Vec<String>,
-) -> Result<Rows, Failure> {
+) -> Result<Rows, Error> {
     let mut found = find_all(logs, choices)?;
     let said = |role: Role| choices.iter().any(|c| c.role == role);
     // Everything that only a person can know is asked at once.
@@ -146,7 +146,7 @@ pub(super) fn gather(
     }
     let units = units(logs, &mut found, &said, &mut questions, notes);
     if !questions.is_empty() {
-        return Err(Failure::input(questions.join("; and ")));
+        return Err(Error::input(questions.join("; and ")));
     }
     let base = if found.contains_key(&Role::Position) { Role::Position } else { Role::Velocity };
     let base = found[&base].clone();
@@ -212,7 +212,7 @@ fn clocks(
     choices: &[Choice],
     known: Known,
     notes: &mut Vec<String>,
-) -> Result<Clocks, Failure> {
+) -> Result<Clocks, Error> {
     let several = tables.len() > 1;
     let one =
         |at: &(usize, usize)| Ok((*at, clock(&logs[at.0].tables[at.1], choices, several, known, notes)?));

@@ -4,7 +4,7 @@
 use super::rows::Rows;
 use super::table::Log;
 use super::units;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::path::Path;
 
 /// Clocks that begin with the recording tell two runs apart where their lengths differ by this part.
@@ -15,7 +15,7 @@ const RUNS: &str = "fit holdout train training test val valid validation verify 
                     day night before after first second third one two three monday tuesday wednesday thursday friday";
 
 /// Refuses files of which nothing says whether they are runs; `wholes` holds the rows of each of `logs`.
-pub(super) fn check(logs: &[Log], wholes: &[Rows]) -> Result<(), Failure> {
+pub(super) fn check(logs: &[Log], wholes: &[Rows]) -> Result<(), Error> {
     for (i, a) in logs.iter().enumerate() {
         for (k, b) in logs.iter().enumerate().skip(i + 1) {
             let why = match compare(&wholes[i], &wholes[k]) {
@@ -24,7 +24,7 @@ pub(super) fn check(logs: &[Log], wholes: &[Rows]) -> Result<(), Failure> {
                 Clocks::Unknown if names_are_of_runs(&a.file, &b.file) => continue,
                 Clocks::Unknown => "over the same time",
             };
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{} and {} have the same columns {why}, and their names do not say whether they are two runs; give --runs if they are, else say whose columns are whose: --column position=FILE/NAME --column command=FILE/NAME",
                 a.file, b.file
             )));

@@ -2,7 +2,7 @@
 
 use super::table::{Column, Log, Table};
 use super::units;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 const SEPARATORS: [(char, &str); 5] =
     [(';', "semicolons"), ('\t', "tabs"), (',', "commas"), ('|', "bars"), (' ', "spaces")];
@@ -111,7 +111,7 @@ fn layout(lines: &[(usize, &str)]) -> Layout {
 }
 
 /// Reads a text file.
-pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     let text = decode(bytes);
     let (lines, comments) = lines_and_comments(&text);
     let Layout { separator, count } = layout(&lines);
@@ -124,7 +124,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Failure> {
         row.len() == count && 2 * numbers >= count.max(1) && numbers > 0
     };
     let Some(first) = lines.iter().position(|(_, line)| numeric(line)) else {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{file}: no row of numbers was found; give a table as text, .npz, JSON, MCAP or Parquet"
         )));
     };

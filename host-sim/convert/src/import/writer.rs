@@ -5,7 +5,7 @@ use super::roles::Role;
 use super::rows::Rows;
 use super::units::Quantity;
 use crate::export::write;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -122,9 +122,9 @@ pub(super) fn files(
     rig: Option<&str>,
     runs: &[(String, Rows)],
     scale: Scale,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(dir).map_err(|cause| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}: the folder cannot be made ({cause}); choose another --out",
             dir.display()
         ))

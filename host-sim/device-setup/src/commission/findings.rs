@@ -30,7 +30,7 @@ const LEAST_TILT: f64 = 200.0;
 
 /// The reasons why a device cannot be commissioned as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Trouble {
+pub enum CommissioningError {
     /// No edge at all.
     EncoderSilent,
     /// Up and down again, never on.
@@ -55,42 +55,42 @@ pub enum Trouble {
     Zero(f64),
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for CommissioningError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Trouble::EncoderSilent => f.write_str(
+            CommissioningError::EncoderSilent => f.write_str(
                 "the encoder counted nothing while the roller was turned: check its supply, its plug and both wires",
             ),
-            Trouble::DeadChannel => f.write_str(
+            CommissioningError::DeadChannel => f.write_str(
                 "one of the encoder's channels is dead: the other one's counts go to and fro; check the wires of A and B",
             ),
-            Trouble::UnusualCounts(found) => write!(
+            CommissioningError::UnusualCounts(found) => write!(
                 f,
                 "{found:.0} counts a turn is what no usual encoder has: turn it again by the mark, or give --counts-per-turn"
             ),
-            Trouble::PullNotSeen => {
+            CommissioningError::PullNotSeen => {
                 f.write_str("the roller did not turn during the pull: see that what is drawn does not slip, and commission again")
             }
-            Trouble::Radius(mm) => write!(
+            CommissioningError::Radius(mm) => write!(
                 f,
                 "the pull makes a roller of {mm:.1} mm radius, and it must be from 4 to 25: measure again and give --pull-mm"
             ),
-            Trouble::TiltBackwards => f.write_str(
+            CommissioningError::TiltBackwards => f.write_str(
                 "the tilt falls when the needle points down: the tilt sensor is mounted the wrong way round; turn the board by 180°",
             ),
-            Trouble::TiltSilent => {
+            CommissioningError::TiltSilent => {
                 f.write_str("the tilt did not follow when the needle was pointed down: check how the tilt sensor is mounted")
             }
-            Trouble::NotDriven => f.write_str(
+            CommissioningError::NotDriven => f.write_str(
                 "the motor did not move under 2 mN·m: check its leads and the amplifier's supply and enable, and that nothing brakes the roller",
             ),
-            Trouble::RunsOn => f.write_str(
+            CommissioningError::RunsOn => f.write_str(
                 "the roller ran on by itself: the amplifier's offset is larger than the friction; trim it to zero and commission again",
             ),
-            Trouble::NoFit => f.write_str(
+            CommissioningError::NoFit => f.write_str(
                 "the roller did not move as an inertia with friction does: see that nothing touches it, and commission again",
             ),
-            Trouble::Zero(codes) => write!(
+            CommissioningError::Zero(codes) => write!(
                 f,
                 "the amplifier gives no torque at {codes:.0} codes from the middle: trim its offset to less than 100 and commission again"
             ),
@@ -117,11 +117,11 @@ pub(crate) fn has_moved_and_rests(samples: &[Sample], rest_ticks: usize) -> bool
 }
 
 /// Signed counts of a movement that a hand made, where both channels are alive.
-fn moved(samples: &[Sample]) -> Result<i32, Trouble> {
+fn moved(samples: &[Sample]) -> Result<i32, CommissioningError> {
     let (counts, edges) = travelled(samples);
     match (counts.unsigned_abs(), edges) {
-        (_, edges) if edges < LEAST_EDGES => Err(Trouble::EncoderSilent),
-        (counts, edges) if counts < edges / 4 => Err(Trouble::DeadChannel),
+        (_, edges) if edges < LEAST_EDGES => Err(CommissioningError::EncoderSilent),
+        (counts, edges) if counts < edges / 4 => Err(CommissioningError::DeadChannel),
         _ => Ok(counts),
     }
 }
@@ -132,20 +132,20 @@ pub(crate) fn counts_a_turn(
     samples: &[Sample],
     turns: u32,
     known: Option<u16>,
-) -> Result<(u16, bool), Trouble> {
+) -> Result<(u16, bool), CommissioningError> {
     let counts = moved(samples)?;
     let found = f64::from(counts.unsigned_abs()) / f64::from(turns.max(1));
     let off = |counts: u16| (found / f64::from(counts) - 1.0).abs();
     let usual = USUAL_LINES.iter().map(|lines| lines * 4).min_by(|a, b| off(*a).total_cmp(&off(*b)));
     let best = known.or(usual.filter(|&counts| off(counts) <= HAND_ACCURACY));
-    best.map(|counts_per_turn| (counts_per_turn, counts < 0)).ok_or(Trouble::UnusualCounts(found))
+    best.map(|counts_per_turn| (counts_per_turn, counts < 0)).ok_or(CommissioningError::UnusualCounts(found))
 }
 
 /// The roller's radius in mm from a pull of `mm`.
-pub fn roller_radius(samples: &[Sample], mm: f64, counts_per_turn: u16) -> Result<f64, Trouble> {
-    let counts = moved(samples).map_err(|_| Trouble::PullNotSeen)?;
+pub fn roller_radius(samples: &[Sample], mm: f64, counts_per_turn: u16) -> Result<f64, CommissioningError> {
+    let counts = moved(samples).map_err(|_| CommissioningError::PullNotSeen)?;
     let radius = mm * f64::from(counts_per_turn) / (TAU * f64::from(counts.abs()));
-    if (4.0..=25.0).contains(&radius) { Ok(radius) } else { Err(Trouble::Radius(radius)) }
+    if (4.0..=25.0).contains(&radius) { Ok(radius) } else { Err(CommissioningError::Radius(radius)) }
 }
 
 /// Mean tilt of the last `ticks`, mrad.
@@ -155,10 +155,10 @@ pub(crate) fn mean_tilt(samples: &[Sample], ticks: usize) -> f64 {
 }
 
 /// Checks that the tilt follows a needle that is pointed down, from `flat` to `down` in mrad.
-pub(crate) fn check_tilt(flat: f64, down: f64) -> Result<(), Trouble> {
+pub(crate) fn check_tilt(flat: f64, down: f64) -> Result<(), CommissioningError> {
     match down - flat {
-        turned if turned <= -LEAST_TILT => Err(Trouble::TiltBackwards),
-        turned if turned < LEAST_TILT => Err(Trouble::TiltSilent),
+        turned if turned <= -LEAST_TILT => Err(CommissioningError::TiltBackwards),
+        turned if turned < LEAST_TILT => Err(CommissioningError::TiltSilent),
         _ => Ok(()),
     }
 }
@@ -178,7 +178,7 @@ pub struct Mechanism {
 
 /// `J·dω = ∫(τ + offset − dry·sign(ω) − viscous·ω)·dt` over every 10 ms in which the roller moved one way, by least
 /// squares.
-pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Trouble> {
+pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, CommissioningError> {
     let (middle, span) = (f64::from(device.dac.mid_scale()), f64::from(device.dac.span()));
     let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;
     let rad = TAU / f64::from(device.counts_per_turn);
@@ -188,7 +188,7 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
     let half = SPEED_TICKS / 2;
     let speed = |at: usize| (angle(at + half) - angle(at - half)) / (SPEED_TICKS as f64 * dt);
     if travelled(samples).1 < LEAST_EDGES {
-        return Err(Trouble::NotDriven);
+        return Err(CommissioningError::NotDriven);
     }
     let (mut rows, mut at) = (Vec::new(), half);
     while at + WINDOW_TICKS + half < samples.len() {
@@ -203,7 +203,7 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Troub
         at += half;
     }
     let [inertia, viscous, dry, offset] =
-        least_squares(&rows).filter(|_| rows.len() >= LEAST_WINDOWS).ok_or(Trouble::NoFit)?;
+        least_squares(&rows).filter(|_| rows.len() >= LEAST_WINDOWS).ok_or(CommissioningError::NoFit)?;
     Ok(Mechanism { inertia, viscous, dry, offset })
 }
 
@@ -226,12 +226,12 @@ pub(crate) fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
 }
 
 /// The code of zero torque for a device that has `offset` N·m too much, where a code is `code` N·m.
-pub(crate) fn converter_zero(device: &Device, offset: f64) -> Result<i16, Trouble> {
+pub(crate) fn converter_zero(device: &Device, offset: f64) -> Result<i16, CommissioningError> {
     let code = device.full_scale_torque.0.to_num::<f64>() * 1e-3 / f64::from(device.dac.span());
     let sign = if device.motor_reversed { -1.0 } else { 1.0 };
     let zero = f64::from(device.dac_zero) - sign * offset / code;
     let most = f64::from(device.dac.span() / 16);
-    if zero.abs() <= most { Ok(zero.round() as i16) } else { Err(Trouble::Zero(zero)) }
+    if zero.abs() <= most { Ok(zero.round() as i16) } else { Err(CommissioningError::Zero(zero)) }
 }
 
 /// Four unknowns from the normal equations, by elimination with the largest pivot; none where the rows say too little.

@@ -11,8 +11,8 @@ use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
 use control_core::{Device, stiffest};
 use device_sim::device::device_config;
-use device_sim::failure::Failure;
-use findings::{Mechanism, Trouble};
+use device_sim::error::Error;
+use findings::{CommissioningError, Mechanism};
 use fixed::types::I16F16;
 use link::commissioning::Record;
 use std::fmt;
@@ -143,15 +143,15 @@ impl Outcome {
     }
 
     /// The device's part as a file, with what was found beside it.
-    pub fn to_toml(&self, name: &str) -> Result<String, Failure> {
+    pub fn to_toml(&self, name: &str) -> Result<String, Error> {
         let found: String = self.lines().iter().map(|line| format!("# {line}\n")).collect();
         Ok(found + &device_config::to_toml(name, &self.record)?)
     }
 }
 
-impl From<Trouble> for Failure {
-    fn from(trouble: Trouble) -> Self {
-        Failure::failed(trouble)
+impl From<CommissioningError> for Error {
+    fn from(error: CommissioningError) -> Self {
+        Error::failed(error)
     }
 }
 
@@ -159,8 +159,8 @@ impl From<Trouble> for Failure {
 pub async fn commission(
     line: &mut dyn Line,
     wish: &Wish,
-    mut ask: impl AsyncFnMut(Step) -> Result<(), Failure>,
-) -> Result<Outcome, Failure> {
+    mut ask: impl AsyncFnMut(Step) -> Result<(), Error>,
+) -> Result<Outcome, Error> {
     let mut bench = Bench::open(line).await?;
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is none, and what was found of its forces is another device's.
@@ -206,19 +206,19 @@ pub async fn commission(
 }
 
 /// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device drives it the other way from now on.
-async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(Mechanism, bool), Failure> {
+async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(Mechanism, bool), Error> {
     if let Some(mechanism) = pulses(bench, device).await? {
         return Ok((mechanism, false));
     }
     device.motor_reversed = !device.motor_reversed;
     bench.configure(device).await?;
     // Otherwise it turns against its torque whichever way it is driven.
-    let mechanism = pulses(bench, device).await?.ok_or(Trouble::NoFit)?;
+    let mechanism = pulses(bench, device).await?.ok_or(CommissioningError::NoFit)?;
     Ok((mechanism, true))
 }
 
 /// Plays the pulses and returns the mechanism; `None` if the motor turns against its torque.
-async fn pulses(bench: &mut Bench<'_>, device: &Device) -> Result<Option<Mechanism>, Failure> {
+async fn pulses(bench: &mut Bench<'_>, device: &Device) -> Result<Option<Mechanism>, Error> {
     let excitation = Excitation {
         signal: Signal::BreakawayRamps { torque: GENTLE_TORQUE, ramp_ms: PULSE_MS },
         duration_ms: 2 * PULSES * u32::from(PULSE_MS),
@@ -229,10 +229,10 @@ async fn pulses(bench: &mut Bench<'_>, device: &Device) -> Result<Option<Mechani
     let (samples, fault) = bench.play(&excitation).await?;
     match fault {
         Some(Fault::WrongWay) => return Ok(None),
-        Some(Fault::EncoderChannel) => return Err(Trouble::DeadChannel.into()),
-        Some(Fault::Travel | Fault::EncoderJump) => return Err(Trouble::RunsOn.into()),
+        Some(Fault::EncoderChannel) => return Err(CommissioningError::DeadChannel.into()),
+        Some(Fault::Travel | Fault::EncoderJump) => return Err(CommissioningError::RunsOn.into()),
         Some(fault) => {
-            return Err(Failure::failed(format_args!(
+            return Err(Error::failed(format_args!(
                 "{fault}; see that nothing holds the roller and commission again"
             )));
         }

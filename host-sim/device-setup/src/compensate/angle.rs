@@ -6,7 +6,7 @@
 
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::f64::consts::TAU;
 
 /// Agreement that is believed: the cosine between what was diagnosed and what the slow turn shows.
@@ -34,7 +34,7 @@ pub fn find(
     samples: &[Sample],
     waves: &[(u16, f64, f64)],
     (counts_per_turn, torque_per_code, middle, inertia): (f64, f64, f64, f64),
-) -> Result<Angle, Failure> {
+) -> Result<Angle, Error> {
     let rad = TAU / counts_per_turn;
     let rows = rows(samples, rad, |code| (code - middle) * torque_per_code, inertia);
     let seen = seen_waves(&rows, waves);
@@ -59,7 +59,7 @@ pub fn find(
             best.agreement >= BELIEVED && SIZE.contains(&(best.agreement * norm / expected.powi(2)))
         });
     best.ok_or_else(|| {
-        Failure::failed(
+        Error::failed(
             "the rotor's angle was not found: a slow turn does not show the cogging that was diagnosed; characterise and diagnose again",
         )
     })

@@ -5,7 +5,7 @@ use control_core::kinematics::WINDOW_TICKS;
 use control_core::units::{Damping, MillimetresPerSecond, MillinewtonMetres};
 use control_core::{Device, TICK_HZ};
 use device_sim::device::compensated::gain;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::rig::{Kind, Rig};
 use fixed::types::{I8F24, I16F16};
@@ -36,9 +36,9 @@ pub struct Found {
 }
 
 /// Returns the coefficients that `rig` gives for `device`, every gain at `share` of the usual one.
-pub fn found(rig: &Rig, device: &Device, share: f64) -> Result<Found, Failure> {
+pub fn found(rig: &Rig, device: &Device, share: f64) -> Result<Found, Error> {
     if rig.kind != Kind::Rotary || rig.actuator.command_unit != "dac" {
-        return Err(Failure::input(
+        return Err(Error::input(
             "the report is not of this device: a device is rotary and commanded in DAC steps; diagnose what characterise has recorded",
         ));
     }
@@ -134,14 +134,14 @@ impl Sums {
         read
     }
 
-    fn finish(mut self, device: &Device, share: f64, inertia: f64) -> Result<Found, Failure> {
+    fn finish(mut self, device: &Device, share: f64, inertia: f64) -> Result<Found, Error> {
         // Less than half a code is nothing that the drive could give.
         let waves =
             strongest::<{ control_core::compensation::MAX_WAVES }>(&mut self.waves, 0.5 * self.per_code);
         let ripple = strongest::<{ control_core::compensation::MAX_RIPPLES }>(&mut self.ripple, 1e-3);
         let radius = device.roller_radius.0.to_num::<f64>();
         let mnm = |torque: f64| fixed(torque * 1e3).map(MillinewtonMetres);
-        let friction = |direction: usize| -> Result<Friction, Failure> {
+        let friction = |direction: usize| -> Result<Friction, Error> {
             // N·m·s/rad over the radius squared in mm² is N·s/mm over a thousand.
             let viscous = self.viscous[direction].max(0.0) * 1e3 / (radius * radius);
             let viscous = I8F24::checked_from_num(viscous).ok_or_else(|| not_a_size(viscous))?;
@@ -170,7 +170,7 @@ impl Sums {
             ..Compensation::NONE
         };
         if !compensation.is_some() {
-            return Err(Failure::input(
+            return Err(Error::input(
                 "the report found nothing that a device can feed forward; see report.html for what it found",
             ));
         }
@@ -185,7 +185,7 @@ fn strongest<const N: usize>(waves: &mut Vec<(u16, f64, f64)>, least: f64) -> Ve
     waves.iter().take(N).copied().collect()
 }
 
-fn fixed_waves<const N: usize>(waves: &[(u16, f64, f64)], unit: f64) -> Result<[Wave; N], Failure> {
+fn fixed_waves<const N: usize>(waves: &[(u16, f64, f64)], unit: f64) -> Result<[Wave; N], Error> {
     let mut fixed_waves = [Wave::default(); N];
     for (wave, &(order, amplitude, phase)) in fixed_waves.iter_mut().zip(waves) {
         let phase = device_sim::device::compensated::phase((phase / TAU) * 360.0);
@@ -194,12 +194,10 @@ fn fixed_waves<const N: usize>(waves: &[(u16, f64, f64)], unit: f64) -> Result<[
     Ok(fixed_waves)
 }
 
-fn fixed(value: f64) -> Result<I16F16, Failure> {
+fn fixed(value: f64) -> Result<I16F16, Error> {
     I16F16::checked_from_num(value).ok_or_else(|| not_a_size(value))
 }
 
-fn not_a_size(value: f64) -> Failure {
-    Failure::input(format_args!(
-        "the report has a value of {value}, which no device can give; diagnose again"
-    ))
+fn not_a_size(value: f64) -> Error {
+    Error::input(format_args!("the report has a value of {value}, which no device can give; diagnose again"))
 }

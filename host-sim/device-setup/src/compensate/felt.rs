@@ -8,7 +8,7 @@ use control_core::controller::{LargeOrder, Sample, TickInput};
 use control_core::excitation::{Excitation, Reference};
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Plan};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 /// Ticks until torque has faded in; they do not count.
 const FADED: usize = 5_000;
@@ -60,7 +60,7 @@ pub fn felt(
     plan: &Plan,
     turns: (&Excitation, &[Sample]),
     hold: (&Excitation, &[Sample]),
-) -> Result<Felt, Failure> {
+) -> Result<Felt, Error> {
     let (mut inwards, mut outwards, mut held) = (Squares::default(), Squares::default(), Squares::default());
     let mut tenths = [Squares::default(); PARTS];
     let moves = forces(plan, turns.0, turns.1)?;
@@ -89,9 +89,8 @@ struct Step {
 }
 
 /// The servo's force in each tick.
-fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Vec<Step>, Failure> {
-    let refuse =
-        |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));
+fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Vec<Step>, Error> {
+    let refuse = |why: control_core::Refusal| Error::input(format_args!("this excitation is refused: {why}"));
     let device = *plan.device();
     // Counts are in the direction of insertion already.
     let plain = control_core::Device {

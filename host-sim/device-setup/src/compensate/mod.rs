@@ -16,7 +16,7 @@ use control_core::controller::Sample;
 use control_core::excitation::{Excitation, Signal};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use control_core::{Device, Patient, Plan};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use felt::Felt;
 use fixed::types::I16F16;
@@ -82,9 +82,9 @@ impl Outcome {
     }
 
     /// Returns the reason why nothing is fed forward, where everything was taken back.
-    pub fn refusal(&self) -> Option<Failure> {
+    pub fn refusal(&self) -> Option<Error> {
         (!self.is_compensated).then(|| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "the device is as it was before: {}; characterise and diagnose again",
                 self.taken_back.join("; ")
             ))
@@ -99,12 +99,12 @@ pub async fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
     share: f64,
-    mut ask: impl AsyncFnMut(Step) -> Result<(), Failure>,
-) -> Result<Outcome, Failure> {
+    mut ask: impl AsyncFnMut(Step) -> Result<(), Error>,
+) -> Result<Outcome, Error> {
     let mut bench = Bench::open(line).await?;
     let device = bench.device().await?;
     if !device.commissioned {
-        return Err(Failure::failed("the device has not been commissioned; run host-sim commission first"));
+        return Err(Error::failed("the device has not been commissioned; run host-sim commission first"));
     }
     let found = coefficients::found(rig, &device, share)?;
     plan(&Device { compensation: found.compensation, ..device })?;
@@ -117,9 +117,9 @@ pub async fn compensate(
     outcome
 }
 
-fn plan(device: &Device) -> Result<Plan, Failure> {
+fn plan(device: &Device) -> Result<Plan, Error> {
     Plan::new(device, &Patient::nobody())
-        .map_err(|why| Failure::input(format_args!("the device would refuse this: {why}")))
+        .map_err(|why| Error::input(format_args!("the device would refuse this: {why}")))
 }
 
 /// The device while it is compensated.
@@ -137,8 +137,8 @@ struct Trial {
     felt: Felt,
 }
 
-impl<A: AsyncFnMut(Step) -> Result<(), Failure>> Work<'_, '_, A> {
-    async fn run(&mut self) -> Result<Outcome, Failure> {
+impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
+    async fn run(&mut self) -> Result<Outcome, Error> {
         let radius = self.before.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, false);
         let level = if self.found.has_weight { None } else { Some(self.turn_level(&turns).await?) };
@@ -173,7 +173,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Failure>> Work<'_, '_, A> {
     }
 
     /// The slow turns with the device level.
-    async fn turn_level(&mut self, turns: &Excitation) -> Result<Vec<Sample>, Failure> {
+    async fn turn_level(&mut self, turns: &Excitation) -> Result<Vec<Sample>, Error> {
         (self.ask)(Step::Level).await?;
         self.bench.settle().await?;
         self.bench.watch(Act::Tilt(0.0), TILTING, |_| false).await?;
@@ -202,7 +202,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Failure>> Work<'_, '_, A> {
         full: &Device,
         before: &Felt,
         angle: Option<angle::Angle>,
-    ) -> Result<(Option<Trial>, Vec<String>), Failure> {
+    ) -> Result<(Option<Trial>, Vec<String>), Error> {
         let mut taken_back = Vec::new();
         let mut kept = self.try_it(full, angle, Step::After).await?;
         while excess(before, &kept.felt) > 0.0 {
@@ -237,7 +237,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Failure>> Work<'_, '_, A> {
         device: &Device,
         angle: Option<angle::Angle>,
         step: Step,
-    ) -> Result<Trial, Failure> {
+    ) -> Result<Trial, Error> {
         let radius = device.roller_radius.0.to_num::<f64>();
         self.bench.settle().await?;
         self.configure(device, angle).await?;
@@ -248,7 +248,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Failure>> Work<'_, '_, A> {
         Ok(Trial { device: *device, felt })
     }
 
-    async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Failure> {
+    async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Error> {
         self.bench.configure(device).await?;
         match angle {
             Some(angle) => self.bench.index(angle.count).await,
@@ -277,12 +277,12 @@ fn said(part: Part, before: &Felt, after: &Felt) -> String {
 }
 
 /// Finds the rotor's angle again on a device that was compensated and then restarted.
-pub async fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Failure> {
+pub async fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Error> {
     let mut bench = Bench::open(line).await?;
     let device = bench.device().await?;
     let found = coefficients::found(rig, &device, 1.0)?;
     if !device.compensation.needs_angle() {
-        return Err(Failure::failed("nothing that this device feeds forward depends on the rotor's angle"));
+        return Err(Error::failed("nothing that this device feeds forward depends on the rotor's angle"));
     }
     let (turns, _) = excitations(found.inertia, device.roller_radius.0.to_num(), false);
     let samples = played(&mut bench, &turns).await?;
@@ -291,7 +291,7 @@ pub async fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Failu
     Ok(angle)
 }
 
-fn find_angle(device: &Device, found: &Found, samples: &[Sample]) -> Result<angle::Angle, Failure> {
+fn find_angle(device: &Device, found: &Found, samples: &[Sample]) -> Result<angle::Angle, Error> {
     let per_code = device.full_scale_torque.0.to_num::<f64>() * 1e-3 / f64::from(device.dac.span());
     let scale =
         (f64::from(device.counts_per_turn), per_code, f64::from(device.dac.mid_scale()), found.inertia);
@@ -319,16 +319,16 @@ async fn play(
     bench: &mut Bench<'_>,
     turns: &Excitation,
     hold: &Excitation,
-) -> Result<(Vec<Sample>, Vec<Sample>), Failure> {
+) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
     Ok((played(bench, turns).await?, played(bench, hold).await?))
 }
 
-async fn played(bench: &mut Bench<'_>, excitation: &Excitation) -> Result<Vec<Sample>, Failure> {
+async fn played(bench: &mut Bench<'_>, excitation: &Excitation) -> Result<Vec<Sample>, Error> {
     bench.settle().await?;
     let longest = Duration::from_millis(u64::from(excitation.duration_ms) + 5_000);
     match bench.play_within(excitation, longest).await? {
         (samples, None) => Ok(samples),
-        (_, Some(fault)) => Err(Failure::failed(format_args!(
+        (_, Some(fault)) => Err(Error::failed(format_args!(
             "{fault}; see that nothing holds the roller and compensate again"
         ))),
     }

@@ -5,7 +5,7 @@
 use super::compensated::Compensated;
 use super::grip::Grip;
 use super::winding::Winding;
-use crate::failure::Failure;
+use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::profile::fix;
 use control_core::config::{DacWidth, Mechanism, SafetyConfig, SpeedMethod};
@@ -39,14 +39,14 @@ pub struct DeviceConfig {
 
 impl DeviceConfig {
     /// Reads a file, or one that comes with the program by its name.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         Self::parse(named_files::find("device", &path.display().to_string(), &BUILT_IN)?)
     }
 
     /// Checks the text of one.
-    pub fn parse(source: Text) -> Result<Self, Failure> {
+    pub fn parse(source: Text) -> Result<Self, Error> {
         let file: File = named_files::parse(&source)?;
-        let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
+        let refuse = |what: String| Error::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
@@ -64,8 +64,8 @@ impl DeviceConfig {
 }
 
 /// The text of a device's part as the device told it, which [`DeviceConfig::parse`] reads again to the last place.
-pub fn to_toml(name: &str, record: &Record) -> Result<String, Failure> {
-    toml::to_string(&File::new(name, record)).map_err(Failure::failed)
+pub fn to_toml(name: &str, record: &Record) -> Result<String, Error> {
+    toml::to_string(&File::new(name, record)).map_err(Error::failed)
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -295,7 +295,7 @@ mod tests {
     use control_core::units::MillimetresPerSecond;
     use fixed::types::I16F16;
 
-    fn parse(text: &str) -> Result<DeviceConfig, Failure> {
+    fn parse(text: &str) -> Result<DeviceConfig, Error> {
         DeviceConfig::parse(Text { origin: "device.toml".into(), text: text.into() })
     }
 

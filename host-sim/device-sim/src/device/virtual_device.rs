@@ -4,7 +4,7 @@
 use super::deformed::Deformed;
 use super::device_config::DeviceConfig;
 use super::grip::Grip;
-use crate::failure::Failure;
+use crate::error::Error;
 use crate::plant::{Plant, PlantConfig};
 use crate::procedure::{Procedure, Target};
 use crate::profile::Profile;
@@ -120,8 +120,8 @@ impl VirtualDevice {
 
     /// Lets the law count depth from the surface of the deformed tissue instead of from where it was at rest: the law xr, on a patient with
     /// a vessel and its far wall.
-    pub fn with_deformed(self, profile: &Profile) -> Result<Self, Failure> {
-        let deformed = Deformed::new(profile).map_err(Failure::input)?;
+    pub fn with_deformed(self, profile: &Profile) -> Result<Self, Error> {
+        let deformed = Deformed::new(profile).map_err(Error::input)?;
         Ok(Self { deformed: Some(deformed), ..self })
     }
 

@@ -70,7 +70,7 @@ mod tests {
     use crate::device::device_config::DeviceConfig;
     use crate::named_files::Text;
 
-    fn parse(text: &str) -> Result<DeviceConfig, crate::failure::Failure> {
+    fn parse(text: &str) -> Result<DeviceConfig, crate::error::Error> {
         DeviceConfig::parse(Text { origin: "device.toml".into(), text: text.into() })
     }
 

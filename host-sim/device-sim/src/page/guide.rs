@@ -114,7 +114,7 @@ impl GuideState {
             self.finish_last();
         }
         let well = outcome.is_ok();
-        let lines = outcome.unwrap_or_else(|failure| vec![failure]);
+        let lines = outcome.unwrap_or_else(|error| vec![error]);
         self.end = Some(End { well, lines });
     }
 

@@ -2,7 +2,7 @@
 //! then say what each tissue feels like, and the line through the body says which are met and where.
 
 use super::{File, Layer, Profile, TissueName};
-use crate::failure::Failure;
+use crate::error::Error;
 use crate::named_files::Text;
 use crate::session::{SceneBody, SceneOutline};
 use anatomy::{Body, Line, Piece, Place, Site, Tissue};
@@ -196,9 +196,9 @@ impl InBody {
 
 impl Profile {
     /// The same patient with other numbers in its file, at its top and in its `[body]`: what the line through a body meets follows from them.
-    pub fn with_keys(&self, top: &[(&str, f64)], body: &[(&str, f64)]) -> Result<Self, Failure> {
+    pub fn with_keys(&self, top: &[(&str, f64)], body: &[(&str, f64)]) -> Result<Self, Error> {
         let unreadable =
-            |cause: &dyn std::fmt::Display| Failure::input(format_args!("{}: {cause}", self.source.origin));
+            |cause: &dyn std::fmt::Display| Error::input(format_args!("{}: {cause}", self.source.origin));
         let mut table: toml::Table =
             self.source.text.parse().map_err(|cause: toml::de::Error| unreadable(&cause))?;
         for (key, value) in top {

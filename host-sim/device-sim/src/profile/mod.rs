@@ -12,7 +12,7 @@ mod refusal;
 mod rupture;
 mod tissues;
 
-use crate::failure::Failure;
+use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
@@ -73,24 +73,24 @@ pub struct Profile {
 
 impl Profile {
     /// A built-in profile by its name, or a file by its path, for the built-in device.
-    pub fn find(wanted: &str) -> Result<Self, Failure> {
+    pub fn find(wanted: &str) -> Result<Self, Error> {
         Self::find_for(wanted, &Device::commissioned_virtual())
     }
 
     /// A built-in profile by its name, or a file by its path, for `device`.
-    pub fn find_for(wanted: &str, device: &Device) -> Result<Self, Failure> {
+    pub fn find_for(wanted: &str, device: &Device) -> Result<Self, Error> {
         Self::parse_for(named_files::find("profile", wanted, &BUILT_IN)?, device)
     }
 
     /// Checks the text of a profile for the built-in device.
-    pub fn parse(source: Text) -> Result<Self, Failure> {
+    pub fn parse(source: Text) -> Result<Self, Error> {
         Self::parse_for(source, &Device::commissioned_virtual())
     }
 
     /// Checks the text of a profile for `device`.
-    pub fn parse_for(source: Text, device: &Device) -> Result<Self, Failure> {
+    pub fn parse_for(source: Text, device: &Device) -> Result<Self, Error> {
         let mut file: File = named_files::parse(&source)?;
-        let refuse = |what: String| Failure::input(format_args!("{}: {what}", source.origin));
+        let refuse = |what: String| Error::input(format_args!("{}: {what}", source.origin));
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
@@ -166,8 +166,8 @@ impl Profile {
     }
 
     /// The same patient with another angle to the skin at entry, 5 to 90°.
-    pub fn at_angle(self, degrees: f64) -> Result<Self, Failure> {
-        check_angle("--angle", degrees).map_err(Failure::input)?;
+    pub fn at_angle(self, degrees: f64) -> Result<Self, Error> {
+        check_angle("--angle", degrees).map_err(Error::input)?;
         if self.body.is_some() {
             return self.with_keys(&[("entry_deg", degrees)], &[]);
         }

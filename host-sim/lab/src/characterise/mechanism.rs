@@ -8,7 +8,7 @@ use diagnosis::simulation::{Plant, Surroundings};
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 /// Physics steps in a tick.
 const STEPS_PER_TICK: u32 = 20;
@@ -70,13 +70,13 @@ pub struct BareDevice {
 
 impl BareDevice {
     /// At rest, powered down. The rig's command is in DAC steps away from mid-scale, and its coordinate an angle.
-    pub fn new(rig: &Rig, file: &str) -> Result<Self, Failure> {
+    pub fn new(rig: &Rig, file: &str) -> Result<Self, Error> {
         if rig.kind != Kind::Rotary || rig.actuator.command_unit != "dac" {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{file}: the virtual device is rotary and commanded in DAC steps; give a rig with kind = \"rotary\" and command_unit = \"dac\", such as one that characterise has written"
             )));
         }
-        let plan = super::configuration().plan().map_err(Failure::failed)?;
+        let plan = super::configuration().plan().map_err(Error::failed)?;
         Ok(Self {
             plant: Plant::new(rig),
             wiring: Wiring::default(),
@@ -89,9 +89,9 @@ impl BareDevice {
     }
 
     /// The same before anybody has commissioned it, wired as `wiring`.
-    pub fn uncommissioned(self, wiring: Wiring) -> Result<Self, Failure> {
+    pub fn uncommissioned(self, wiring: Wiring) -> Result<Self, Error> {
         let device = Device::default();
-        let plan = Plan::new(&device, &Patient::nobody()).map_err(Failure::failed)?;
+        let plan = Plan::new(&device, &Patient::nobody()).map_err(Error::failed)?;
         let endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
         Ok(Self { wiring, endpoint, controller: Controller::new(plan), ..self })
     }

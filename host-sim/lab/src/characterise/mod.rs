@@ -9,7 +9,7 @@ pub mod written;
 
 use control_core::Config;
 use device_sim::device::{Port, Wire};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::lockstep;
 use link::device::{Endpoint, Identity};
 use mechanism::BareDevice;
@@ -29,8 +29,8 @@ pub fn configuration() -> Config {
 }
 
 /// The scale of a device that is configured with `config`.
-pub fn scale(config: &Config) -> Result<Hello, Failure> {
-    let plan = config.plan().map_err(Failure::failed)?;
+pub fn scale(config: &Config) -> Result<Hello, Error> {
+    let plan = config.plan().map_err(Error::failed)?;
     let device = Endpoint::new(Identity::VIRTUAL, &plan, None);
     Ok(Hello::from(&device.hello()))
 }
@@ -51,7 +51,7 @@ pub fn on_virtual(
     device: &mut BareDevice,
     programmes: &[Programme],
     mut news: impl FnMut(News),
-) -> Result<Vec<Track>, Failure> {
+) -> Result<Vec<Track>, Error> {
     let mut tracks = Vec::new();
     for programme in programmes {
         news(News::Recording(programme));
@@ -86,9 +86,9 @@ pub fn on_port(
     programmes: &[Programme],
     stop: &AtomicBool,
     mut news: impl FnMut(News),
-) -> Result<Vec<Track>, Failure> {
+) -> Result<Vec<Track>, Error> {
     let gone = |cause: std::io::Error| {
-        Failure::failed(format_args!("the device went away ({cause}); plug it in and characterise again"))
+        Error::failed(format_args!("the device went away ({cause}); plug it in and characterise again"))
     };
     let mut wire: Box<dyn Wire> = port.open().map_err(gone)?;
     let mut bytes = vec![0; 1 << 14];
@@ -102,7 +102,7 @@ pub fn on_port(
             if stop.load(Ordering::Relaxed) {
                 let out = sequencer.stop(begin.elapsed()).to_vec();
                 let _ = wire.write(&out);
-                return Err(Failure::failed("stopped before the end; nothing was written"));
+                return Err(Error::failed("stopped before the end; nothing was written"));
             }
             let now = begin.elapsed();
             let out = sequencer.transmit(now, |step| device_tilt(step, &mut news)).to_vec();
@@ -119,9 +119,8 @@ pub fn on_port(
 }
 
 /// Checks that every step may be played under `config`; the device checks it again, and the sequences too.
-pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Failure> {
-    let refuse =
-        |why: control_core::Refusal| Failure::input(format_args!("this excitation is refused: {why}"));
+pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Error> {
+    let refuse = |why: control_core::Refusal| Error::input(format_args!("this excitation is refused: {why}"));
     let plan = config.plan().map_err(refuse)?;
     programmes.iter().flat_map(|p| &p.steps).try_for_each(|step| step.excitation.check(&plan).map_err(refuse))
 }

@@ -9,7 +9,7 @@ use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::{Config, TICK_HZ};
 use device_sim::driver::Driver;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use link::frames::{DeviceFrame, EventKind, SampleBlock};
 use recording::messages::Hello;
 use std::time::Duration;
@@ -46,7 +46,7 @@ pub struct Sequencer<'a> {
     reference: Vec<f64>,
     following: Option<Following<'a>>,
     next_tick: Option<u64>,
-    failure: Option<Failure>,
+    error: Option<Error>,
 }
 
 impl<'a> Sequencer<'a> {
@@ -54,8 +54,8 @@ impl<'a> Sequencer<'a> {
     ///
     /// # Errors
     /// A sentence if `config` is unsound.
-    pub fn new(config: Config, programme: &'a Programme) -> Result<Self, Failure> {
-        let plan = config.plan().map_err(Failure::failed)?;
+    pub fn new(config: Config, programme: &'a Programme) -> Result<Self, Error> {
+        let plan = config.plan().map_err(Error::failed)?;
         let mut steps = programme.steps.as_slice();
         let parts = programme.parts(&plan).into_iter().map(|count| {
             let (part, rest) = steps.split_at(count);
@@ -74,7 +74,7 @@ impl<'a> Sequencer<'a> {
             reference: Vec::new(),
             following: None,
             next_tick: None,
-            failure: None,
+            error: None,
         })
     }
 
@@ -146,16 +146,16 @@ impl<'a> Sequencer<'a> {
 
     /// True if there is nothing left to do.
     pub fn is_over(&self) -> bool {
-        self.phase == Phase::Over || self.failure.is_some()
+        self.phase == Phase::Over || self.error.is_some()
     }
 
     /// The recording, or why there is none.
-    pub fn finish(self) -> Result<Track, Failure> {
-        if let Some(failure) = self.failure {
-            return Err(failure);
+    pub fn finish(self) -> Result<Track, Error> {
+        if let Some(error) = self.error {
+            return Err(error);
         }
         let Some(hello) = self.hello else {
-            return Err(Failure::failed("the device did not identify itself; restart it"));
+            return Err(Error::failed("the device did not identify itself; restart it"));
         };
         Ok(Track { file: self.file, hello, samples: self.samples, reference: self.reference })
     }
@@ -171,7 +171,7 @@ impl<'a> Sequencer<'a> {
     }
 
     fn fail(&mut self, why: impl std::fmt::Display) {
-        self.failure.get_or_insert_with(|| Failure::failed(why));
+        self.error.get_or_insert_with(|| Error::failed(why));
     }
 
     fn frame(&mut self, frame: &DeviceFrame) {

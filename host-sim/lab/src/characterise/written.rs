@@ -3,7 +3,7 @@
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use convert::export::{self, write};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use recording::messages::Hello;
 use std::fmt::Write as _;
@@ -33,10 +33,10 @@ pub fn nominal_rig(hello: &Hello) -> Rig {
 }
 
 /// Writes `rig.toml` and the recordings to `dir`; the paths, the rig's first.
-pub fn write_all(dir: &Path, tracks: &[Track]) -> Result<Vec<PathBuf>, Failure> {
+pub fn write_all(dir: &Path, tracks: &[Track]) -> Result<Vec<PathBuf>, Error> {
     let Some(first) = tracks.first() else { return Ok(Vec::new()) };
     std::fs::create_dir_all(dir).map_err(|cause| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}: the folder cannot be made ({cause}); choose another --out",
             dir.display()
         ))

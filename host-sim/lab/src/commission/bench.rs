@@ -4,7 +4,7 @@ pub use device_setup::bench::{Act, Line};
 
 use control_core::controller::Sample;
 use device_sim::device::Wire;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use link::crash::Crash;
 use server::guide::{Guide, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,7 +22,7 @@ pub struct GuidedLine<L> {
 }
 
 impl<L: Line> Line for GuidedLine<L> {
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         self.line.exchange(out, into)
     }
 
@@ -57,13 +57,13 @@ impl<'a> WireLine<'a> {
 }
 
 impl Line for WireLine<'_> {
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         let gone = |cause: std::io::Error| {
-            Failure::failed(format_args!("the device went away ({cause}); plug it in and begin again"))
+            Error::failed(format_args!("the device went away ({cause}); plug it in and begin again"))
         };
         if self.stop.load(Ordering::Relaxed) {
             // A device whose heartbeat ends takes its torque away by itself.
-            return Err(Failure::failed("stopped before the end; begin again from the first step"));
+            return Err(Error::failed("stopped before the end; begin again from the first step"));
         }
         if !out.is_empty() {
             self.wire.write(out).map_err(gone)?;

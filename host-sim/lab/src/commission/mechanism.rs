@@ -4,7 +4,7 @@
 use super::bench::{Act, Line};
 use crate::characterise::mechanism::{BareDevice, Wiring};
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::lockstep;
 use diagnosis::rig::Rig;
 use std::f64::consts::TAU;
@@ -31,13 +31,13 @@ pub struct VirtualLine {
 
 impl VirtualLine {
     /// The plant of `rig`, uncommissioned, wired as `wiring`, with a roller of `radius_mm`.
-    pub fn new(rig: &Rig, file: &str, wiring: Wiring, radius_mm: f64) -> Result<Self, Failure> {
+    pub fn new(rig: &Rig, file: &str, wiring: Wiring, radius_mm: f64) -> Result<Self, Error> {
         let line = Self::commissioned(rig, file, radius_mm)?;
         Ok(Self { device: line.device.uncommissioned(wiring)?, ..line })
     }
 
     /// The plant of `rig` on a device that has been commissioned.
-    pub fn commissioned(rig: &Rig, file: &str, radius_mm: f64) -> Result<Self, Failure> {
+    pub fn commissioned(rig: &Rig, file: &str, radius_mm: f64) -> Result<Self, Error> {
         let device = BareDevice::new(rig, file)?;
         Ok(Self { device, radius_mm, act: Act::HandsOff, held: None, tilt: 0.0, sensor: (0.0, 1.0) })
     }
@@ -67,7 +67,7 @@ impl VirtualLine {
 }
 
 impl Line for VirtualLine {
-    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Failure> {
+    fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         self.device.receive(out);
         (0..lockstep::TICKS).for_each(|_| self.tick());
         lockstep::empty(|frame| self.device.transmit(frame), |bytes| into.extend(bytes));

@@ -8,13 +8,13 @@ pub use device_setup::commission::{Outcome, Step, Wish, findings};
 
 use bench::Line;
 use device_setup::pause::block_on;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 
 /// Commissions the device behind `line`; `ask` is told each step before it is done, and may end it.
 pub fn commission(
     line: &mut dyn Line,
     wish: &Wish,
-    mut ask: impl FnMut(Step) -> Result<(), Failure>,
-) -> Result<Outcome, Failure> {
+    mut ask: impl FnMut(Step) -> Result<(), Error>,
+) -> Result<Outcome, Error> {
     block_on(device_setup::commission::commission(line, wish, async |step| ask(step)))
 }

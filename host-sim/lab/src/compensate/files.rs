@@ -2,16 +2,16 @@
 
 use super::{Outcome, page};
 use device_sim::device::device_config;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::path::{Path, PathBuf};
 
 /// Writes `compensation.html` and `device.toml` of the device called `device` to a folder, which is made; returns their paths.
 ///
 /// # Errors
 /// A sentence if they cannot be written.
-pub fn write(folder: &Path, device: &str, outcome: &Outcome) -> Result<Vec<PathBuf>, Failure> {
+pub fn write(folder: &Path, device: &str, outcome: &Outcome) -> Result<Vec<PathBuf>, Error> {
     let refuse = |cause: std::io::Error| {
-        Failure::input(format_args!(
+        Error::input(format_args!(
             "{}: cannot be written ({cause}); the device keeps its compensation; choose another --out",
             folder.display()
         ))

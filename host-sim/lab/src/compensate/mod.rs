@@ -8,20 +8,20 @@ pub use device_setup::compensate::{Outcome, Part, Step, angle, coefficients, fel
 
 use crate::commission::bench::Line;
 use device_setup::pause::block_on;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use std::path::Path;
 
 /// The rig that a diagnosis' report folder holds.
-pub fn read_report(dir: &Path) -> Result<Rig, Failure> {
+pub fn read_report(dir: &Path) -> Result<Rig, Error> {
     let path = dir.join("patched-rig.toml");
     if !path.is_file() {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{}: no report of diagnose; give the folder that its --out wrote",
             dir.display()
         )));
     }
-    Rig::read(&path).map_err(Failure::input)
+    Rig::read(&path).map_err(Error::input)
 }
 
 /// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most that is usual; `ask` is told each
@@ -30,12 +30,12 @@ pub fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
     share: f64,
-    mut ask: impl FnMut(Step) -> Result<(), Failure>,
-) -> Result<Outcome, Failure> {
+    mut ask: impl FnMut(Step) -> Result<(), Error>,
+) -> Result<Outcome, Error> {
     block_on(device_setup::compensate::compensate(line, rig, share, async |step| ask(step)))
 }
 
 /// Finds the rotor's angle again on a device that was compensated and then restarted.
-pub fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Failure> {
+pub fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Error> {
     block_on(device_setup::compensate::align(line, rig))
 }

@@ -2,7 +2,7 @@
 //! in at an even speed, and becomes (perpendicular depth, force) at one speed and one angle.
 
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use recording::read::Recording;
 use recording::stretches::stretches;
 use std::path::Path;
@@ -45,18 +45,16 @@ pub struct Insertion {
 }
 
 /// All insertions of a file, MCAP or CSV by what is in it.
-pub fn read(path: &Path) -> Result<Vec<Insertion>, Failure> {
+pub fn read(path: &Path) -> Result<Vec<Insertion>, Error> {
     let shown = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|cause| {
-        Failure::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
+        Error::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
     })?;
     let series = if bytes.starts_with(mcap::MAGIC) {
         from_recording(&Recording::parse(shown.clone(), &bytes)?)
     } else {
         let text = String::from_utf8(bytes).map_err(|_| {
-            Failure::input(format_args!(
-                "{shown}: neither an MCAP recording nor a CSV file; give one of these"
-            ))
+            Error::input(format_args!("{shown}: neither an MCAP recording nor a CSV file; give one of these"))
         })?;
         vec![parse_csv(&shown, &text)?]
     };
@@ -71,7 +69,7 @@ pub fn read(path: &Path) -> Result<Vec<Insertion>, Failure> {
         })
         .collect();
     if found.is_empty() {
-        return Err(Failure::input(format_args!(
+        return Err(Error::input(format_args!(
             "{shown}: no insertion in it: the depth never goes inwards from 0 by {SHORTEST_MM} mm at an even speed"
         )));
     }
@@ -95,14 +93,14 @@ fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {
 }
 
 /// `time_s,depth_mm,force_n` and `angle_deg` or `tilt_rad`, in any order; other columns are ignored.
-fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Failure> {
+fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Error> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line).trim_start_matches('\u{feff}');
     let names: Vec<&str> = header.split(',').map(str::trim).collect();
     let column = |name: &str| names.iter().position(|n| *n == name);
     let needed = |name: &str| {
         column(name).ok_or_else(|| {
-            Failure::input(format_args!(
+            Error::input(format_args!(
                 "{file}, line 1: has no column {name}; time_s, depth_mm, force_n and angle_deg are needed"
             ))
         })
@@ -120,7 +118,7 @@ fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Failure> {
             let value = field.parse::<f64>().ok().filter(|v| v.is_finite());
             value.ok_or_else(|| {
                 let name = names[column];
-                Failure::input(format_args!(
+                Error::input(format_args!(
                     "{file}, line {}: {name} is \"{field}\"; it must be a number",
                     index + 1
                 ))
@@ -133,7 +131,7 @@ fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Failure> {
             angle_deg: number(angle)? * to_degrees,
         };
         if moments.last().is_some_and(|last| last.time_s >= moment.time_s) {
-            return Err(Failure::input(format_args!(
+            return Err(Error::input(format_args!(
                 "{file}, line {}: time_s does not increase; rows must be in their order in time",
                 index + 1
             )));

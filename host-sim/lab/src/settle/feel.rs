@@ -5,7 +5,7 @@ use super::subject::Subject;
 use super::{Progress, Settings};
 use crate::compensate::felt::Felt;
 use crate::compensate::{self, files};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use std::path::Path;
 
 /// The force that the mechanism adds to a hand, before and after.
@@ -29,21 +29,21 @@ pub(super) fn feel(
     report: &Path,
     settings: &Settings,
     radius_mm: f64,
-    progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
-) -> Result<Result<Feel, String>, Failure> {
+    progress: &mut impl FnMut(Progress) -> Result<(), Error>,
+) -> Result<Result<Feel, String>, Error> {
     let rig = compensate::read_report(report)?;
     let mut ended = None;
     let outcome = subject.talk(radius_mm, |line| {
         compensate::compensate(line, &rig, 1.0, |step| {
-            progress(Progress::Feeds(step)).map_err(|failure| {
-                let sentence = failure.to_string();
-                ended = Some(failure);
-                Failure::failed(sentence)
+            progress(Progress::Feeds(step)).map_err(|error| {
+                let sentence = error.to_string();
+                ended = Some(error);
+                Error::failed(sentence)
             })
         })
     });
-    if let Some(failure) = ended {
-        return Err(failure);
+    if let Some(error) = ended {
+        return Err(error);
     }
     let outcome = match outcome {
         Ok(outcome) => outcome,

@@ -2,7 +2,7 @@
 
 use super::play::Limited;
 use super::{Asked, Inputs, Settings, Settled};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::report::{Report, Verdict};
 use experiment::{Case, design};
 use std::path::Path;
@@ -19,7 +19,7 @@ pub(super) fn following(
     folder: &Path,
     settings: &Settings,
     settled: &Settled,
-) -> Result<Result<Asked, String>, Failure> {
+) -> Result<Result<Asked, String>, Error> {
     let (played, rounds) = (settled.motion_s(), settled.rounds.len());
     let left_s = settings.motion_s - played;
     let is_sure = settled.unsure.is_empty() || settings.inputs != Inputs::Designed;
@@ -63,7 +63,7 @@ fn next(
     folder: &Path,
     settings: &Settings,
     (seed, left_s): (u64, f64),
-) -> Result<Result<Asked, String>, Failure> {
+) -> Result<Result<Asked, String>, Error> {
     let most_s = INPUT_S.min(0.5 * left_s);
     match settings.inputs {
         Inputs::Characterise => {

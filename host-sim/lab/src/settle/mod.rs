@@ -15,7 +15,7 @@ pub use subject::Subject;
 use crate::characterise::programme::{Programme, programmes};
 use crate::characterise::written;
 use crate::compensate;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::report::Report;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request};
@@ -174,8 +174,8 @@ pub fn settle(
     subject: &mut Subject,
     rig: &Rig,
     settings: &Settings,
-    mut progress: impl FnMut(Progress) -> Result<(), Failure>,
-) -> Result<Settled, Failure> {
+    mut progress: impl FnMut(Progress) -> Result<(), Error>,
+) -> Result<Settled, Error> {
     let limited = Limited::new(rig, subject.config()?)?;
     let mut run = Run { limited, rig, settings, request: Request::default() };
     let mut settled = Settled::default();
@@ -203,8 +203,8 @@ impl Run<'_> {
         &mut self,
         subject: &mut Subject,
         settled: &mut Settled,
-        progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
-    ) -> Result<Option<PathBuf>, Failure> {
+        progress: &mut impl FnMut(Progress) -> Result<(), Error>,
+    ) -> Result<Option<PathBuf>, Error> {
         let mut asked = first(&self.limited, self.rig, self.settings)?;
         let mut last = None;
         loop {
@@ -212,16 +212,15 @@ impl Run<'_> {
             let folder = self.settings.out.join(format!("round-{number}"));
             progress(Progress::Asked(number, &asked.words, &asked.why))?;
             if let Some(design) = &asked.design {
-                design.write(&folder.join("experiment")).map_err(Failure::failed)?;
+                design.write(&folder.join("experiment")).map_err(Error::failed)?;
             }
             self.record(subject, &asked.programmes, &folder, progress)?;
             let report = match diagnosed(&self.request, &folder.join("report")) {
                 Ok(outcome) => outcome.report,
-                Err(failure) if number == 1 => return Err(failure),
-                Err(failure) => {
+                Err(error) if number == 1 => return Err(error),
+                Err(error) => {
                     // The names of the round before stand.
-                    settled.conclusion =
-                        format!("the recordings of round {number} cannot be used: {failure}");
+                    settled.conclusion = format!("the recordings of round {number} cannot be used: {error}");
                     return Ok(last);
                 }
             };
@@ -248,8 +247,8 @@ impl Run<'_> {
         subject: &mut Subject,
         programmes: &[Programme],
         folder: &Path,
-        progress: &mut impl FnMut(Progress) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        progress: &mut impl FnMut(Progress) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let mut shown = Ok(());
         let tracks = subject.play(programmes, |seconds| {
             if shown.is_ok() {
@@ -266,7 +265,7 @@ impl Run<'_> {
         // Not the rig of the data sheets but the simulation as its author believes it.
         self.request.rig = paths[0].clone();
         std::fs::write(&self.request.rig, self.rig.to_toml()).map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: the rig cannot be written ({cause}); free some space or choose another --out",
                 self.request.rig.display()
             ))
@@ -274,7 +273,7 @@ impl Run<'_> {
     }
 }
 
-fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Failure> {
+fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Error> {
     match settings.inputs {
         Inputs::Designed => {
             limited.general("no recording yet: speeds, reversals and frequencies of every kind", GENERAL_S)
@@ -299,10 +298,10 @@ fn shortened(mut all: Vec<Programme>, most_s: f64) -> Vec<Programme> {
     all
 }
 
-fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Failure> {
-    let outcome = diagnosis::diagnose(request, &|_, _| {}).map_err(Failure::failed)?;
+fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Error> {
+    let outcome = diagnosis::diagnose(request, &|_, _| {}).map_err(Error::failed)?;
     outcome.write(folder).map_err(|cause| {
-        Failure::failed(format_args!(
+        Error::failed(format_args!(
             "{}: the report cannot be written ({cause}); free some space or choose another --out",
             folder.display()
         ))

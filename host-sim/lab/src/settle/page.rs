@@ -2,16 +2,16 @@
 
 use super::{Feel, Name, Round, Settled};
 use crate::compensate::felt::Felt;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use html_report::{Cell, Sheet};
 use std::path::Path;
 
 /// Writes `settle.json` and `settle.html`.
-pub(super) fn write(settled: &Settled, folder: &Path) -> Result<(), Failure> {
+pub(super) fn write(settled: &Settled, folder: &Path) -> Result<(), Error> {
     for (name, text) in [("settle.json", json(settled)), ("settle.html", html(settled))] {
         let path = folder.join(name);
         std::fs::write(&path, text).map_err(|cause| {
-            Failure::failed(format_args!(
+            Error::failed(format_args!(
                 "{}: it cannot be written ({cause}); free some space or choose another --out",
                 path.display()
             ))

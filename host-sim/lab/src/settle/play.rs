@@ -7,7 +7,7 @@ use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use device_setup::servo::servo;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
 use fixed::types::I16F16;
@@ -28,7 +28,7 @@ pub(super) struct Limited {
 }
 
 impl Limited {
-    pub(super) fn new(rig: &Rig, config: Config) -> Result<Self, Failure> {
+    pub(super) fn new(rig: &Rig, config: Config) -> Result<Self, Error> {
         let hello = characterise::scale(&config)?;
         let radius_mm = hello.roller_radius_mm;
         Ok(Self {
@@ -50,7 +50,7 @@ impl Limited {
     }
 
     /// A round of some of everything.
-    pub(super) fn general(&self, why: &str, most_s: f64) -> Result<Asked, Failure> {
+    pub(super) fn general(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
         let rad = |mm: f64| mm / self.radius_mm;
         let part = most_s / 12.0;
         let segment = |signal, seconds: f64| Segment { signal, seconds: seconds * part };
@@ -66,7 +66,7 @@ impl Limited {
     }
 
     /// A round of a random multisine.
-    pub(super) fn multisine(&self, seed: u64, most_s: f64) -> Result<Asked, Failure> {
+    pub(super) fn multisine(&self, seed: u64, most_s: f64) -> Result<Asked, Error> {
         let (travel, speed, force) = self.limits();
         // A recording that travels nowhere is refused, so strokes precede the sines.
         let stroke = Signal::Triangle { stroke: 0.1 * travel, speed: 0.1 * speed };
@@ -77,7 +77,7 @@ impl Limited {
     }
 
     /// A round of a designed input.
-    pub(super) fn designed(&self, design: Design) -> Result<Asked, Failure> {
+    pub(super) fn designed(&self, design: Design) -> Result<Asked, Error> {
         let why = design.chosen.nearest().map_or(String::new(), |pair| {
             format!(
                 "of {} inputs it best tells {} rivals apart; the nearest pair, {} and {}, by {:.0} nats",
@@ -93,7 +93,7 @@ impl Limited {
     }
 
     /// An input twice: once to fit, once with other numbers to judge.
-    fn of_input(&self, input: &Input, why: String, design: Option<Box<Design>>) -> Result<Asked, Failure> {
+    fn of_input(&self, input: &Input, why: String, design: Option<Box<Design>>) -> Result<Asked, Error> {
         let programme = |file, input: &Input| {
             let steps = input.segments.iter().map(|segment| self.step(segment)).collect();
             Programme { file, steps }
@@ -103,7 +103,7 @@ impl Limited {
     }
 
     /// The same, if the device may play it: it is refused here, before anything moves.
-    pub(super) fn checked(&self, asked: Asked) -> Result<Asked, Failure> {
+    pub(super) fn checked(&self, asked: Asked) -> Result<Asked, Error> {
         characterise::check(&self.config, &asked.programmes)?;
         Ok(asked)
     }
@@ -194,7 +194,7 @@ mod tests {
         let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "concealed".into() }));
         let asked = limited().of_input(input, String::new(), None).expect("it is within the limits");
         let tracks = subject.play(&asked.programmes, |_| {});
-        tracks.map(drop).map_err(|failure| failure.to_string())
+        tracks.map(drop).map_err(|error| error.to_string())
     }
 
     fn multisine(newton_metres: f64, frequencies: [u16; 12]) -> Input {

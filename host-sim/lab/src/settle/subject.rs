@@ -11,7 +11,7 @@ use control_core::Config;
 use device_setup::bench::Bench;
 use device_setup::pause::block_on;
 use device_sim::device::{Port, Wire};
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use std::sync::atomic::AtomicBool;
 
@@ -33,19 +33,17 @@ impl Subject<'_> {
     ///
     /// # Errors
     /// A sentence if a real device does not answer or has not been commissioned.
-    pub fn data_sheet_rig(&mut self) -> Result<Rig, Failure> {
+    pub fn data_sheet_rig(&mut self) -> Result<Rig, Error> {
         Ok(nominal_rig(&characterise::scale(&self.config()?)?))
     }
 
     /// Its configuration, with a patient that it does not use.
-    pub(super) fn config(&mut self) -> Result<Config, Failure> {
+    pub(super) fn config(&mut self) -> Result<Config, Error> {
         let Self::Real { port, stop } = self else { return Ok(configuration()) };
         let mut line = WireLine::new(opened(*port)?, stop);
         let device = block_on(async { Bench::open(&mut line).await?.device().await })?;
         if !device.commissioned {
-            return Err(Failure::failed(
-                "the device has not been commissioned; run host-sim commission first",
-            ));
+            return Err(Error::failed("the device has not been commissioned; run host-sim commission first"));
         }
         Ok(Config { device, ..configuration() })
     }
@@ -55,7 +53,7 @@ impl Subject<'_> {
         &mut self,
         programmes: &[Programme],
         mut played: impl FnMut(f64),
-    ) -> Result<Vec<Track>, Failure> {
+    ) -> Result<Vec<Track>, Error> {
         let mut news = |news: News| {
             if let News::Played(seconds) = news {
                 played(seconds);
@@ -82,8 +80,8 @@ impl Subject<'_> {
     pub(super) fn talk<T>(
         &mut self,
         radius_mm: f64,
-        talk: impl FnOnce(&mut dyn Line) -> Result<T, Failure>,
-    ) -> Result<T, Failure> {
+        talk: impl FnOnce(&mut dyn Line) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         match self {
             Self::Real { port, stop } => talk(&mut WireLine::new(opened(*port)?, stop)),
             Self::Virtual(plant) => talk(&mut VirtualLine::commissioned(&plant.rig, &plant.file, radius_mm)?),
@@ -91,8 +89,8 @@ impl Subject<'_> {
     }
 }
 
-fn opened(port: &mut dyn Port) -> Result<Box<dyn Wire>, Failure> {
+fn opened(port: &mut dyn Port) -> Result<Box<dyn Wire>, Error> {
     port.open().map_err(|cause| {
-        Failure::failed(format_args!("the device cannot be opened ({cause}); plug it in and try again"))
+        Error::failed(format_args!("the device cannot be opened ({cause}); plug it in and try again"))
     })
 }

@@ -5,13 +5,13 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::session::Session;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Makes the page of a recording's file.
-pub type Debrief = Arc<dyn Fn(&Path) -> Result<String, Failure> + Send + Sync>;
+pub type Debrief = Arc<dyn Fn(&Path) -> Result<String, Error> + Send + Sync>;
 
 /// Serves what `write` makes of the file that the session names as recorded last.
 pub(super) fn router(session: Session, write: Debrief) -> Router {
@@ -30,7 +30,7 @@ async fn page(State((session, write)): State<(Session, Debrief)>) -> Response {
             let headers = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
             (headers, Html(html)).into_response()
         }
-        Ok(Err(failure)) => (StatusCode::UNPROCESSABLE_ENTITY, failure.to_string()).into_response(),
+        Ok(Err(error)) => (StatusCode::UNPROCESSABLE_ENTITY, error.to_string()).into_response(),
         Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "the debrief could not be made").into_response(),
     }
 }

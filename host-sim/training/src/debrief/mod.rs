@@ -8,7 +8,7 @@ use crate::score::target::{Outcome, Reached};
 use crate::score::tasks::TaskResult;
 use crate::score::{Insertion, Judge, Span, each};
 use control_core::TICK_HZ;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::profile::Profile;
 use device_sim::session::{Scene, SceneNeedle, SceneVessel, Source};
 use html_report::chart::{Chart, Curve};
@@ -34,7 +34,7 @@ pub struct Attempt {
 }
 
 /// All insertions of a recording, judged by one profile or each by the one that it was recorded with.
-pub fn attempts(recording: &Recording, by: Option<&Profile>) -> Result<Vec<Attempt>, Failure> {
+pub fn attempts(recording: &Recording, by: Option<&Profile>) -> Result<Vec<Attempt>, Error> {
     let mut attempts = Vec::new();
     each(recording, by, |span, judge, profile| {
         attempts.push(attempt(recording, profile, judge, attempts.len(), span));

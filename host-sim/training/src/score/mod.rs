@@ -12,7 +12,7 @@ pub mod vessel;
 use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
-use device_sim::failure::Failure;
+use device_sim::error::Error;
 use device_sim::procedure::task::Task;
 use device_sim::profile::{Beside, Goal, Profile};
 use gesture::{Gesture, Place};
@@ -110,7 +110,7 @@ pub struct Span<'a> {
 }
 
 /// All insertions of a recording, judged by one profile or each by the one that it was recorded with.
-pub fn score(recording: &Recording, by: Option<&Profile>) -> Result<Score, Failure> {
+pub fn score(recording: &Recording, by: Option<&Profile>) -> Result<Score, Error> {
     let mut insertions = Vec::new();
     each(recording, by, |span, judge, _| insertions.push(judge.insertion(span)))?;
     Ok(Score { insertions })
@@ -121,7 +121,7 @@ pub fn each(
     recording: &Recording,
     by: Option<&Profile>,
     mut see: impl FnMut(Span<'_>, &Judge, &Rc<Profile>),
-) -> Result<(), Failure> {
+) -> Result<(), Error> {
     let stretches = stretches(recording);
     let zero_tick = stretches.first().map_or(0, |s| s.first_tick);
     let given = by.map(|profile| Rc::new(profile.clone()));

@@ -1,17 +1,17 @@
-//! The failures that a person meets: one sentence and an exit status.
+//! The errors that a person meets: one sentence and an exit status.
 
 use std::fmt;
 
 /// One sentence that says what is wrong, where, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Failure {
+pub enum Error {
     /// Unusable input: exit status 2.
     Input(String),
     /// A request that could not be carried out: exit status 1.
     Failed(String),
 }
 
-impl Failure {
+impl Error {
     /// Unusable input.
     pub fn input(sentence: impl fmt::Display) -> Self {
         Self::Input(one_line(&sentence.to_string()))
@@ -25,8 +25,8 @@ impl Failure {
     /// The process's exit status.
     pub fn status(&self) -> u8 {
         match self {
-            Failure::Failed(_) => 1,
-            Failure::Input(_) => 2,
+            Error::Failed(_) => 1,
+            Error::Input(_) => 2,
         }
     }
 }
@@ -36,11 +36,11 @@ fn one_line(sentence: &str) -> String {
     sentence.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-impl fmt::Display for Failure {
+impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (Failure::Input(sentence) | Failure::Failed(sentence)) = self;
+        let (Error::Input(sentence) | Error::Failed(sentence)) = self;
         f.write_str(sentence)
     }
 }
 
-impl std::error::Error for Failure {}
+impl std::error::Error for Error {}
