@@ -29,7 +29,7 @@ const LOOK_TURN: u32 = 4;
 
 /// The control law with its memory, but for the segments that play.
 #[derive(Clone, Debug)]
-// In this order: on the board the longest tick takes 836 instructions with it and 863 with the compiler's, because the nearer a field is to
+// In this order: on the board the longest tick takes some 27 instructions fewer than in the compiler's own, because the nearer a field is to
 // the beginning, the fewer instructions it takes to reach it.
 #[repr(C)]
 pub(crate) struct Core {
