@@ -4,6 +4,7 @@ use super::sight::{Scale, Sight};
 use crate::effects::definition::FREE;
 use crate::effects::{CommandLaw, Effect};
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::input::Input;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
 use std::sync::OnceLock;
@@ -53,7 +54,7 @@ impl Asked {
     }
 }
 
-/// Returns the columns of an effect; none where a regression has no law of it.
+/// Returns the columns of an effect; none where a regression has no law of it or cannot see it.
 pub(crate) fn columns(
     effect: &Effect,
     sights: &[Sight],
@@ -81,8 +82,13 @@ pub(crate) fn columns(
     let rests_on_command = is_by_command(effect) || effect.value("of_drive") > 0.5;
     let with_asked = rests_on_command.then(|| asked.tracks(sights, scale));
     let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
-    let of: Vec<Vec<Vec<f64>>> =
-        sights.iter().enumerate().map(|(r, sight)| seen(effect, sight, track(r))).collect();
+    let inputs: Vec<Vec<Input>> = (0..sights.len()).map(|r| inputs_of(effect, track(r))).collect();
+    let all = || sights.iter().zip(&inputs);
+    if all().all(|(sight, inputs)| inputs.iter().all(|input| sight.is_constant(input))) {
+        // Dry friction on an axis that runs one way is a constant, as is each recording's own offset.
+        return None;
+    }
+    let of: Vec<Vec<Vec<f64>>> = all().map(|(sight, inputs)| seen(effect, sight, inputs)).collect();
     let terms = of.first()?.len();
     if terms == 0 {
         return None;
@@ -107,12 +113,16 @@ pub(crate) fn is_by_command(effect: &Effect) -> bool {
 }
 
 /// The columns of a law on force or reading, with the signs of the drive's side, per unit of force.
-fn seen(effect: &Effect, sight: &Sight, track: &BlockedRecording) -> Vec<Vec<f64>> {
+fn seen(effect: &Effect, sight: &Sight, inputs: &[Input]) -> Vec<Vec<f64>> {
     let sensor = effect.name.definition().in_sensor() || effect.name.definition().is_of_jumps();
     let sign = if sensor { 1.0 } else { -1.0 };
-    let inputs = effect_inputs(track, effect, &track.rows.command, track.bias, || track.drive(None));
     let see = |input| sight.see_input(input).into_iter().map(|x| sign * x).collect();
     inputs.iter().map(see).collect()
+}
+
+/// The inputs of a law on force or reading, per term.
+fn inputs_of(effect: &Effect, track: &BlockedRecording) -> Vec<Input> {
+    effect_inputs(track, effect, &track.rows.command, track.bias, || track.drive(None))
 }
 
 /// Additional command of each block, for a law of the command to let pass what the motion asks for.
@@ -157,24 +167,38 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
-    #[test]
-    fn a_gears_loss_rests_on_the_force_that_the_motion_needs() {
+    /// The columns of an effect on an axis that swings while it advances with a mean speed, counts/s, on which the motion asks for one force.
+    fn of_axis(effect: &Effect, advances: f64, asked: f64) -> Option<Columns> {
         let time_s: Vec<f64> = (0..6000).map(|row| f64::from(row) * 1e-3).collect();
+        let counts = |t: &f64| (9000.0 * (3.0 * t).sin() + advances * t).round();
         let recording = Recording {
             command: time_s.iter().map(|t| (40.0 * t).sin()).collect(),
-            position_counts: time_s.iter().map(|t| (9000.0 * (3.0 * t).sin()).round()).collect(),
+            position_counts: time_s.iter().map(counts).collect(),
             time_s,
             ..Recording::default()
         };
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let (mut track, nominal) = (BlockedRecording::new(&recording, &rig), Nominal::of(&rig));
-        track.motion.v = track.blocks.start.iter().map(|t| (3.0 * t).cos()).collect();
+        let speed = |t: &f64| (27_000.0 * (3.0 * t).cos() + advances) / rig.encoder.counts_per_unit;
+        track.motion.v = track.blocks.start.iter().map(speed).collect();
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1.0, tau: 0.1, rest: 1.0, blur: 0.0 };
         let sights = [Sight::new(&track, 0, &nominal, &noise, Estimator { bandwidth_hz: 12.0 })];
+        columns(effect, &sights, &nominal, &Asked::new(vec![vec![asked; track.block_count()]]))
+    }
+
+    #[test]
+    fn dry_friction_of_an_axis_that_runs_one_way_is_not_judged() {
+        let is_judged = |name, advances| of_axis(&Effect::shaped(name, &[]), advances, 0.0).is_some();
+        assert!(is_judged(N::CoulombFriction, 0.0), "it turns back");
+        assert!(!is_judged(N::CoulombFriction, 40_000.0), "a constant is each recording's own offset");
+        assert!(is_judged(N::QuadraticDrag, 40_000.0), "it changes with the speed");
+    }
+
+    #[test]
+    fn a_gears_loss_rests_on_the_force_that_the_motion_needs() {
         let loss = Effect::shaped(N::LoadDependentFriction, &[("of_drive", 1.0)]);
         let largest = |asked: f64| {
-            let asked = Asked::new(vec![vec![asked; track.block_count()]]);
-            let columns = columns(&loss, &sights, &nominal, &asked).expect("a regression has this law");
+            let columns = of_axis(&loss, 0.0, asked).expect("a regression has this law");
             columns.of[0][0].iter().fold(0.0, |most: f64, x| most.max(x.abs()))
         };
         // Whatever was recorded: a motion that asks for no force loses none.

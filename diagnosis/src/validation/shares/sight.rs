@@ -13,6 +13,8 @@ use crate::selection::predictive::fold_of;
 const ROWS_PER_PERIOD: f64 = 4.0;
 /// Most rows that are used of a recording.
 const MOST_ROWS: usize = 4000;
+/// Part of a column's square that swings about its mean below which the column is constant.
+const CONSTANT: f64 = 1e-3;
 /// Fewest rows of a recording that can tell anything.
 pub(crate) const FEWEST_ROWS: usize = 25;
 
@@ -130,12 +132,28 @@ impl<'a> Sight<'a> {
 
     /// An input as the regression sees it, an acceleration at the kept rows.
     pub(crate) fn see_input(&self, input: &Input) -> Vec<f64> {
-        let Input::Sensor(read) = input else { return self.see(&self.blocks_of(input)) };
+        self.centred(self.in_band(input))
+    }
+
+    /// True if an input is the same force on all kept rows, so that the regression cannot see it.
+    pub(crate) fn is_constant(&self, input: &Input) -> bool {
+        let square = |column: &[f64]| column.iter().map(|x| x * x).sum::<f64>();
+        let column = self.in_band(input);
+        let all = square(&column);
+        all > 0.0 && square(&self.centred(column)) <= CONSTANT * all
+    }
+
+    /// An input in the band at the kept rows.
+    fn in_band(&self, input: &Input) -> Vec<f64> {
+        let Input::Sensor(read) = input else {
+            let blocks = self.blocks_of(input);
+            return self.kept.iter().map(|j| self.at(&blocks, *j)).collect();
+        };
         let mut total = Total::zero(read.len());
         total.dz.clone_from(read);
         let with = self.estimator.residual(self.track, &total);
         // The reading's error is taken for motion.
-        self.centred(self.kept.iter().map(|j| with[*j] - self.acceleration[*j]).collect())
+        self.kept.iter().map(|j| with[*j] - self.acceleration[*j]).collect()
     }
 
     /// A column of blocks in the band at the kept rows, its mean taken off: an offset is each recording's own.
