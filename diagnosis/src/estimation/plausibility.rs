@@ -76,62 +76,94 @@ fn wrapped(recording: &Recording, rig: &Rig) -> Option<String> {
     })
 }
 
-/// The force against the recorded motion: what inertia it asks for, with friction and a constant beside, and how much of it
-/// that explains.
-fn asked(recording: &Recording, rig: &Rig, motion: &Motion) -> Option<(f64, f64, f64)> {
-    let force: Vec<f64> = recording.command.iter().map(|u| rig.actuator.gain * u).collect();
-    let force = motion.smoothed(&force);
-    let acceleration = motion.smoothed(&motion.accelerations());
-    let slow = 0.02 * motion.velocity.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let rows: Vec<[f64; 4]> = motion
-        .velocity
-        .iter()
-        .zip(&acceleration)
-        .map(|(v, a)| [*a, *v, if v.abs() > slow { v.signum() } else { 0.0 }, 1.0])
-        .collect();
-    let norm: Vec<f64> = (0..4).map(|k| rows.iter().map(|r| r[k] * r[k]).sum::<f64>().sqrt()).collect();
+/// Smoothed force and motion of a recording, to be regressed on each other.
+struct Smoothed {
+    force: Vec<f64>,
+    acceleration: Vec<f64>,
+    velocity: Vec<f64>,
+    /// The sign of the speed, zero where it is slow.
+    direction: Vec<f64>,
+    /// rad or m, from its mean.
+    position: Vec<f64>,
+}
+
+impl Smoothed {
+    fn new(recording: &Recording, rig: &Rig) -> Self {
+        let motion = Motion::new(recording, rig);
+        let force: Vec<f64> = recording.command.iter().map(|u| rig.actuator.gain * u).collect();
+        let slow = 0.02 * motion.velocity.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let mean = motion.position.iter().sum::<f64>() / motion.position.len() as f64;
+        Self {
+            force: motion.smoothed(&force),
+            acceleration: motion.smoothed(&motion.accelerations()),
+            direction: motion
+                .velocity
+                .iter()
+                .map(|v| if v.abs() > slow { v.signum() } else { 0.0 })
+                .collect(),
+            position: motion.position.iter().map(|q| q - mean).collect(),
+            velocity: motion.velocity,
+        }
+    }
+
+    /// The inertia for which the motion asks, with friction and a constant beside, and the part of the force's variance that they
+    /// explain; none where acceleration explains too little for its scale to say anything.
+    fn inertia(&self) -> Option<(f64, f64)> {
+        let force = &self.force;
+        let constant = vec![1.0; force.len()];
+        let columns = [&self.acceleration, &self.velocity, &self.direction, &constant];
+        let factors = least_squares(&columns, force)?;
+        let mean = force.iter().sum::<f64>() / force.len() as f64;
+        let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
+        let left: f64 = force.iter().enumerate().map(|(row, f)| (f - of(row)).powi(2)).sum();
+        let all: f64 = force.iter().map(|f| (f - mean).powi(2)).sum();
+        let by_acceleration = factors[0] * factors[0] * self.acceleration.iter().map(|a| a * a).sum::<f64>();
+        (all > 0.0 && by_acceleration > 0.3 * all).then(|| (factors[0], 1.0 - left / all))
+    }
+
+    /// True if the axis gives energy to its drive and would gain it by friction: a spring gives back what it stored.
+    fn gains_by_friction(&self) -> bool {
+        let constant = vec![1.0; self.force.len()];
+        let columns = [&self.acceleration, &self.velocity, &self.direction, &constant, &self.position];
+        least_squares(&columns, &self.force).is_some_and(|factors| {
+            let rows = self.velocity.iter().zip(&self.direction);
+            let work = self.force.iter().zip(&self.velocity).map(|(f, v)| (f - factors[3]) * v).sum::<f64>();
+            work < 0.0 && rows.map(|(v, sign)| (factors[1] * v + factors[2] * sign) * v).sum::<f64>() < 0.0
+        })
+    }
+}
+
+/// The factors of columns whose sum is nearest to `y`; none where a column is zero.
+fn least_squares(columns: &[&Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let norm: Vec<f64> = columns.iter().map(|column| product(column, column).sqrt()).collect();
     if norm.contains(&0.0) {
         return None;
     }
-    let (mut information, mut score) = (Square::zero(4), vec![0.0; 4]);
-    for (row, f) in rows.iter().zip(&force) {
-        for i in 0..4 {
-            score[i] += row[i] / norm[i] * f;
-            for j in 0..4 {
-                information.add(i, j, row[i] / norm[i] * row[j] / norm[j]);
-            }
+    let mut information = Square::zero(columns.len());
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
+            information.add(i, j, product(a, b) / (norm[i] * norm[j]));
         }
     }
-    let theta: Vec<f64> =
-        Factor::new(&information).solve(&score).iter().zip(&norm).map(|(x, n)| x / n).collect();
-    let n = force.len() as f64;
-    let mean = force.iter().sum::<f64>() / n;
-    let (mut left, mut all, mut work) = (0.0, 0.0, 0.0);
-    for ((row, f), v) in rows.iter().zip(&force).zip(&motion.velocity) {
-        left += (f - row.iter().zip(&theta).map(|(a, b)| a * b).sum::<f64>()).powi(2);
-        all += (f - mean).powi(2);
-        work += (f - theta[3]) * v;
-    }
-    // Without the acceleration, what would be left: only where it matters does its scale say anything.
-    let by_acceleration = theta[0] * theta[0] * acceleration.iter().map(|a| a * a).sum::<f64>();
-    let matters = by_acceleration > 0.3 * all;
-    (all > 0.0 && matters).then(|| (theta[0], 1.0 - left / all, work))
+    let score: Vec<f64> = columns.iter().zip(&norm).map(|(column, n)| product(column, y) / n).collect();
+    Some(Factor::new(&information).solve(&score).iter().zip(&norm).map(|(x, n)| x / n).collect())
 }
 
 fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
     if !rig.effects.is_empty() || recording.force.is_some() {
         return None;
     }
-    let motion = Motion::new(recording, rig);
-    let (inertia, explained, work) = asked(recording, rig, &motion)?;
+    let smoothed = Smoothed::new(recording, rig);
+    let (inertia, explained) = smoothed.inertia()?;
     if explained < EXPLAINED {
         return None;
     }
     let file = &recording.file;
     let ratio = inertia / rig.model.inertia;
-    if ratio < -0.1 && work < 0.0 {
+    if ratio < -0.1 && smoothed.gains_by_friction() {
         return Some(format!(
-            "the axis of {file} moves against its command, whose work is negative: a sign is wrong; change the sign of actuator.gain, or of one column"
+            "the axis of {file} moves against its command and would gain energy by friction: a sign is wrong; change the sign of actuator.gain, or of one column"
         ));
     }
     if (OFF..FAR).contains(&ratio) {

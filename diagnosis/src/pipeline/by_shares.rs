@@ -53,21 +53,28 @@ pub(crate) enum ByShares {
 /// together.
 pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let regime = Regime::of(prepared, found);
-    if regime == Regime::Noise {
-        return ByShares::Nothing;
-    }
     let context = prepared.context(&prepared.fit);
     let Some(selection) = Selection::new(&context, prepared.noise, &prepared.holdout.smoothed) else {
         return ByShares::Nothing;
     };
     let own: &[Effect] = &found.standing.model.model.effects;
-    let mut selected = selection.select(TAKEN_SHARE, own);
+    let grown = selection.grown(TAKEN_SHARE, own);
+    let all: Vec<&Effect> = grown.iter().map(|law| &law.effect).collect();
+    // The filter's band may be wider than the regression's: what is little beside the noise in one may be all there is in the other.
+    if regime == Regime::Noise && !leaves_clearly_less(&all, own, &selection) {
+        return ByShares::Nothing;
+    }
+    let mut selected = selection.judged(grown, TAKEN_SHARE);
     let together: Vec<&Effect> = selected.iter().map(|one| &one.share.effect).collect();
     if is_foreign(prepared, found) && selection.is_rather_unnamed(&together) {
         return ByShares::Nothing;
     }
     selected.retain(|one| one.is_named() && one.class().len() <= MOST_IN_CLASS);
-    let regime = if is_most_of_rest(&selected, own) { Regime::Physics } else { regime };
+    let beside_noise = regime != Regime::Physics;
+    let regime = if explains_more(&selected, own, &selection) { Regime::Physics } else { regime };
+    if regime == Regime::Noise {
+        return ByShares::Nothing;
+    }
     let in_own = |one: &Selected| {
         let class = one.class();
         own.iter().find(|effect| class.contains(&effect.name) && may_confirm(effect, one))
@@ -78,7 +85,7 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
         let same = in_own(one).filter(|_| regime == Regime::Explained);
         let name = same.map_or(one.share.effect.name, |effect| effect.name);
         let twins = name.definition().twins(&one.share.effect, &shown);
-        Material { name, share: one.share.least(), class: class_of(name, twins, one.class()) }
+        Material { name, share: one.share.least(), class: class_of(name, twins, one.class()), beside_noise }
     };
     let materials: Vec<Material> = selected.iter().map(material).collect();
     match regime {
@@ -101,14 +108,27 @@ fn shown(prepared: &Prepared, found: &Found) -> Shown {
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
-/// True if shares name all that was found and besides something that takes most of what is left then, so that noise does not limit. A law
-/// that reshapes the command may have been found because it shrinks what is to be explained, so it need not be among them.
-fn is_most_of_rest(selected: &[Selected], own: &[Effect]) -> bool {
+/// True if shares name something new and leave clearly less of the force than what was found, so that noise does not limit. Where a law
+/// that reshapes the command was found, which shrinks what is to be explained, they have to name every other effect found too.
+fn explains_more(selected: &[Selected], own: &[Effect], selection: &Selection) -> bool {
     let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
     let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));
-    let mut to_name = own.iter().filter(|effect| CommandLaw::new(effect).is_none());
-    to_name.all(|effect| selected.iter().any(|one| is_same(one, effect)))
-        && selected.iter().any(|one| is_new(one) && one.share.least() >= MOST_OF_REST)
+    let reshapes = |effect: &Effect| CommandLaw::new(effect).is_some();
+    let is_kept = |effect: &Effect| reshapes(effect) || selected.iter().any(|one| is_same(one, effect));
+    let named: Vec<&Effect> = selected.iter().map(|one| &one.share.effect).collect();
+    selected.iter().any(is_new)
+        && (!own.iter().any(reshapes) || own.iter().all(is_kept))
+        && leaves_clearly_less(&named, own, selection)
+}
+
+/// True if effects leave clearly less of the force than what was found. A law that reshapes the command may stand for what is new, which
+/// then has to be most of the rest.
+fn leaves_clearly_less(effects: &[&Effect], own: &[Effect], selection: &Selection) -> bool {
+    let reshapes = |effect: &Effect| CommandLaw::new(effect).is_some();
+    let has_law = |effect: &&Effect| !reshapes(effect) || selection.judges(std::slice::from_ref(*effect));
+    let own_laws: Vec<&Effect> = own.iter().filter(has_law).collect();
+    let least = if own.iter().any(reshapes) { 1.0 - MOST_OF_REST } else { CLEARLY_LESS };
+    selection.leaves_over(effects, &own_laws).is_some_and(|ratio| ratio < least)
 }
 
 /// The recordings with the effects selected, unless what was found leaves clearly less.

@@ -195,7 +195,7 @@ pub(crate) struct Rival {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     fn gain(sum: f64, low: f64, z: f64) -> Gain {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     /// An effect that is sure everywhere.
-    fn found() -> EffectEvidence {
+    pub(crate) fn found() -> EffectEvidence {
         EffectEvidence {
             effect: Effect::shaped(EffectName::QuadraticDrag, &[]),
             score_z: 0.0,

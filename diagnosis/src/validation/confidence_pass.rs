@@ -146,16 +146,10 @@ impl WeighedModel {
         })
     }
 
-    /// Returns what rules out an effect that shares of the force error name; none if nothing does. Physics without a name was weighed by
-    /// shares then.
-    fn contradiction_of_material(assessed: &WeighedEffect) -> Option<Rejection> {
-        if assessed.is_there { immaterial(&assessed.found) } else { Some(Rejection::NoSize) }
-    }
-
     /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
-        if assessed.found.material.is_some() {
-            return Self::contradiction_of_material(assessed);
+        if let Some(material) = &assessed.found.material {
+            return contradiction_of_material(&assessed.found, assessed.is_there, material);
         }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
@@ -176,6 +170,23 @@ impl WeighedModel {
         } else {
             None
         }
+    }
+}
+
+/// Returns what rules out an effect that shares of the force error name, `is_there` if its size is sure; none if nothing does. Physics
+/// without a name was weighed by shares then.
+fn contradiction_of_material(
+    found: &EffectEvidence,
+    is_there: bool,
+    material: &Material,
+) -> Option<Rejection> {
+    let held_out = found.holdout.sum;
+    if !is_there {
+        Some(Rejection::NoSize)
+    } else if material.beside_noise && held_out <= 0.0 {
+        Some(Rejection::LessLikely { nats: -held_out })
+    } else {
+        immaterial(found)
     }
 }
 
@@ -428,6 +439,27 @@ fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tona
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::validation::acceptance_criteria::tests::found;
+
+    #[test]
+    fn beside_noise_a_share_needs_a_held_out_gain_too() {
+        let mut less_likely = found();
+        less_likely.holdout.sum = -2.5;
+        let material = |beside_noise| Material {
+            name: EffectName::FrictionDrift,
+            share: 0.3,
+            class: Vec::new(),
+            beside_noise,
+        };
+        let why = |found: &EffectEvidence, beside_noise| {
+            contradiction_of_material(found, true, &material(beside_noise))
+        };
+        assert_eq!(why(&less_likely, true), Some(Rejection::LessLikely { nats: 2.5 }));
+        assert_eq!(why(&less_likely, false), None, "other physics limits there");
+        assert_eq!(why(&found(), true), None);
+        let nowhere = contradiction_of_material(&found(), false, &material(false));
+        assert_eq!(nowhere, Some(Rejection::NoSize));
+    }
 
     #[test]
     fn what_does_not_stand_alone_is_no_surer_than_what_it_rests_on() {

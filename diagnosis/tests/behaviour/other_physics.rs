@@ -49,3 +49,12 @@ fn a_drive_that_loses_more_than_half_its_force_drifts() {
     let outcome = pushed(Machine { push: 4.0, fades: 0.6, ..AXIS }, crate::axis::WHOLE);
     assert!(names(&outcome).contains(&N::GainDrift), "{}", outcome.report.sentence);
 }
+
+#[test]
+fn friction_beside_gravity_a_thousand_times_larger_is_named() {
+    let machine = Machine { gravity: 400.0, forward: 1.5, backward: 1.5, disturbance: 0.002, ..AXIS };
+    let taken = |seed: u64| record(machine, Taken { counts: 2e4, ..BENCH }, seed, mixed(300.0, seed as f64));
+    let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", 2e4);
+    let outcome = diagnosed(&rig, &[taken(1), taken(2)], &[taken(3)]);
+    assert!(names(&outcome).contains(&N::CoulombFriction), "{}", outcome.report.sentence);
+}

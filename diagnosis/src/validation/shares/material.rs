@@ -11,6 +11,8 @@ pub(crate) struct Material {
     pub(crate) share: f64,
     /// Every effect that takes nearly as much instead, itself first.
     pub(crate) class: Vec<EffectName>,
+    /// True where the filter finds hardly more than noise, so that its likelihood counts.
+    pub(crate) beside_noise: bool,
 }
 
 impl Material {
@@ -38,7 +40,10 @@ mod tests {
 
     #[test]
     fn a_larger_share_is_surer_and_the_least_is_sure_enough() {
-        let at = |share| Material { name: EffectName::QuadraticDrag, share, class: Vec::new() }.confidence();
+        let at = |share| {
+            Material { name: EffectName::QuadraticDrag, share, class: Vec::new(), beside_noise: false }
+                .confidence()
+        };
         assert!(at(NAMED_SHARE) >= NAMED && at(0.5) > at(0.3) && at(0.9) < 1.0);
     }
 }

@@ -45,21 +45,32 @@ impl Selected {
 }
 
 impl Selection<'_> {
-    /// Selects effects that take `least` of the force error, from nothing and from what was found; the selection that leaves less stands.
-    pub(crate) fn select(&self, least: f64, found: &[Effect]) -> Vec<Selected> {
+    /// Laws that take `least` of the force error, from nothing or from what was found, whichever leaves less.
+    pub(crate) fn grown(&self, least: f64, found: &[Effect]) -> Vec<Columns> {
         let first = State::new(self, Vec::new());
         let known = found
             .iter()
             .filter_map(|effect| columns(effect, &self.sights, self.context.nominal, &first.asked));
         let known: Vec<Columns> = known.take(MOST).collect();
-        let mut taken = self.grown(Vec::new(), least);
-        if !known.is_empty() {
-            let other = self.grown(self.kept_of(known, least), least);
-            if self.left(&other) < (1.0 - SURELY) * self.left(&taken) {
-                taken = other;
-            }
+        let taken = self.grown_from(Vec::new(), least);
+        if known.is_empty() {
+            return taken;
         }
-        self.judged(taken)
+        let other = self.grown_from(self.kept_of(known, least, &Share::fits), least);
+        if self.left(&other) < (1.0 - SURELY) * self.left(&taken) { other } else { taken }
+    }
+
+    /// Judges laws without those that, beside the rest, take less than `least`.
+    pub(crate) fn judged(&self, mut taken: Vec<Columns>, least: f64) -> Vec<Selected> {
+        loop {
+            let judged = self.swapped(&mut taken);
+            let worst = judged.iter().min_by(|a, b| a.share.least().total_cmp(&b.share.least()));
+            let Some(worst) = worst.filter(|one| judged.len() > 1 && one.share.least() < least) else {
+                return judged;
+            };
+            let name = worst.share.effect.name;
+            taken.retain(|law| law.effect.name != name);
+        }
     }
 
     /// Geometric mean of what laws leave on folds of the fitted recordings and on held-out ones, root mean square.
@@ -68,12 +79,17 @@ impl Selection<'_> {
         (fit.sqrt() * holdout.sqrt()).sqrt()
     }
 
-    /// The laws that take `least` beside the others, without those that take less, the least first.
-    fn kept_of(&self, mut laws: Vec<Columns>, least: f64) -> Vec<Columns> {
+    /// The laws that take `least` beside the others and count, without the rest, the least first.
+    fn kept_of(
+        &self,
+        mut laws: Vec<Columns>,
+        least: f64,
+        counts: &(dyn Fn(&Share) -> bool + Sync),
+    ) -> Vec<Columns> {
         loop {
             let part = |i: usize| {
                 let others = laws.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, law)| law).collect();
-                let share = State::new(self, others).share(&laws[i]).filter(Share::fits);
+                let share = State::new(self, others).share(&laws[i]).filter(counts);
                 share.map_or(f64::NEG_INFINITY, |share| share.least())
             };
             let parts = parallel::map(laws.len(), part);
@@ -86,21 +102,22 @@ impl Selection<'_> {
     }
 
     /// Adds effects one after another while the best takes `least` of the force error.
-    fn grown(&self, mut taken: Vec<Columns>, least: f64) -> Vec<Columns> {
+    fn grown_from(&self, mut taken: Vec<Columns>, least: f64) -> Vec<Columns> {
         while taken.len() < MOST {
             let state = State::new(self, taken.iter().collect());
             let best = state.ranked(&|_| true).into_iter().find(|(share, _)| share.fits());
             let Some((_, tried)) = best.filter(|(share, _)| share.least() >= least) else { break };
             taken.push(tried);
         }
-        taken
+        // What came first may have stood for two that came after it.
+        self.kept_of(taken, least, &|_| true)
     }
 
     /// Swaps each effect once for what takes more, and judges all.
-    fn judged(&self, mut taken: Vec<Columns>) -> Vec<Selected> {
+    fn swapped(&self, taken: &mut [Columns]) -> Vec<Selected> {
         let mut ranked: Vec<Option<Ranked>> = taken.iter().map(|_| None).collect();
         for i in 0..taken.len() {
-            let mut place = self.in_place_of(&taken, i);
+            let mut place = self.in_place_of(taken, i);
             if let Some(better) = place.as_mut().and_then(|ranked| ranked.better.take()) {
                 taken[i] = better;
                 // What was ranked before stood beside another effect.
@@ -110,9 +127,9 @@ impl Selection<'_> {
             ranked[i] = place;
         }
         let again = |(i, ranked): (usize, Option<Ranked>)| {
-            let Ranked { share, rivals, .. } = ranked.or_else(|| self.in_place_of(&taken, i))?;
-            let form = self.form_in_place_of(&taken, i, &share);
-            let unnamed = self.unnamed_in_place_of(&taken, i);
+            let Ranked { share, rivals, .. } = ranked.or_else(|| self.in_place_of(taken, i))?;
+            let form = self.form_in_place_of(taken, i, &share);
+            let unnamed = self.unnamed_in_place_of(taken, i);
             Some(Selected { share, rivals, form, unnamed })
         };
         ranked.into_iter().enumerate().filter_map(again).collect()
@@ -123,6 +140,18 @@ impl Selection<'_> {
         let first = State::new(self, Vec::new());
         let nominal = self.context.nominal;
         effects.iter().all(|effect| columns(effect, &self.sights, nominal, &first.asked).is_some())
+    }
+
+    /// Root mean square that effects leave over what others leave, on folds of the fitted recordings or on held-out ones, whichever is
+    /// more; none where a regression has no law of one of them.
+    pub(crate) fn leaves_over(&self, effects: &[&Effect], others: &[&Effect]) -> Option<f64> {
+        let first = State::new(self, Vec::new());
+        let of = |effect: &&Effect| columns(effect, &self.sights, self.context.nominal, &first.asked);
+        let laws = |effects: &[&Effect]| effects.iter().map(of).collect::<Option<Vec<Columns>>>();
+        let left = |laws: &[Columns]| State::new(self, laws.iter().collect()).left;
+        let (with, without) = (left(&laws(effects)?), left(&laws(others)?));
+        let ratio = |with: f64, without: f64| (with / without.max(1e-300)).sqrt();
+        Some(ratio(with.0, without.0).max(ratio(with.1, without.1)))
     }
 
     /// True if physics without a name takes more alone than effects take together.
