@@ -4,7 +4,7 @@
 use crate::effects::{Effect, EffectName};
 use crate::numerics::bootstrap::Gain;
 use crate::thresholds::{
-    CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MOST_SHARE,
+    CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MATERIAL, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
 use crate::validation::rejection::Rejection;
@@ -163,6 +163,25 @@ impl EffectEvidence {
         })
     }
 
+    /// Returns why the simulation is right without an effect, however sure it is; none if it is not.
+    pub(crate) fn immaterial(&self) -> Option<Rejection> {
+        let part = self.off_force;
+        (part < MATERIAL).then_some(Rejection::Immaterial { part })
+    }
+
+    /// Returns why an effect that shares of the force error name may not be named, `is_there` if its size is sure; none if it may.
+    /// Physics without a name was weighed by shares then.
+    pub(crate) fn rejection_by_shares(&self, is_there: bool) -> Option<Rejection> {
+        let beside_noise = self.material.as_ref().is_some_and(|material| material.beside_noise);
+        if !is_there {
+            Some(Rejection::NoSize)
+        } else if beside_noise && self.holdout.sum <= 0.0 {
+            Some(Rejection::LessLikely { nats: -self.holdout.sum })
+        } else {
+            self.immaterial()
+        }
+    }
+
     /// Returns why an effect may not be named: the first requirement that it does not meet; none if it meets all.
     pub(crate) fn rejection(&self) -> Option<Rejection> {
         if !self.generalises() {
@@ -195,7 +214,7 @@ pub(crate) struct Rival {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
 
     fn gain(sum: f64, low: f64, z: f64) -> Gain {
@@ -203,7 +222,7 @@ pub(crate) mod tests {
     }
 
     /// An effect that is sure everywhere.
-    pub(crate) fn found() -> EffectEvidence {
+    fn found() -> EffectEvidence {
         EffectEvidence {
             effect: Effect::shaped(EffectName::QuadraticDrag, &[]),
             score_z: 0.0,
@@ -224,6 +243,20 @@ pub(crate) mod tests {
         let mut found = found();
         change(&mut found);
         found.rejection().is_none()
+    }
+
+    #[test]
+    fn beside_noise_a_share_needs_a_held_out_gain_too() {
+        let by_share = |beside_noise, held_out| {
+            let (name, class) = (EffectName::FrictionDrift, Vec::new());
+            let material = Some(Material { name, share: 0.3, class, beside_noise });
+            EffectEvidence { material, holdout: gain(held_out, 0.0, 1.0), ..found() }
+        };
+        let less_likely = by_share(true, -2.5);
+        assert_eq!(less_likely.rejection_by_shares(true), Some(Rejection::LessLikely { nats: 2.5 }));
+        assert_eq!(by_share(false, -2.5).rejection_by_shares(true), None, "other physics limits there");
+        assert_eq!(by_share(true, 2.5).rejection_by_shares(true), None);
+        assert_eq!(by_share(true, 2.5).rejection_by_shares(false), Some(Rejection::NoSize));
     }
 
     #[test]

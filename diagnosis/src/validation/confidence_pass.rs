@@ -11,8 +11,8 @@ use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::thresholds::{
-    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MATERIAL, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS,
-    UNDECIDED, UNDERSTOOD,
+    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS, UNDECIDED,
+    UNDERSTOOD,
 };
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::alternatives;
@@ -148,14 +148,14 @@ impl WeighedModel {
 
     /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
-        if let Some(material) = &assessed.found.material {
-            return contradiction_of_material(&assessed.found, assessed.is_there, material);
+        if assessed.found.material.is_some() {
+            return assessed.found.rejection_by_shares(assessed.is_there);
         }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
             Some(Rejection::NoSize)
-        } else if let Some(why) = immaterial(&assessed.found) {
+        } else if let Some(why) = assessed.found.immaterial() {
             Some(why)
         } else if let Some(part) = assessed.creeps {
             Some(Rejection::Creeps { part })
@@ -171,29 +171,6 @@ impl WeighedModel {
             None
         }
     }
-}
-
-/// Returns what rules out an effect that shares of the force error name, `is_there` if its size is sure; none if nothing does. Physics
-/// without a name was weighed by shares then.
-fn contradiction_of_material(
-    found: &EffectEvidence,
-    is_there: bool,
-    material: &Material,
-) -> Option<Rejection> {
-    let held_out = found.holdout.sum;
-    if !is_there {
-        Some(Rejection::NoSize)
-    } else if material.beside_noise && held_out <= 0.0 {
-        Some(Rejection::LessLikely { nats: -held_out })
-    } else {
-        immaterial(found)
-    }
-}
-
-/// Returns why the simulation is right without an effect, however sure it is; none if it is not.
-fn immaterial(found: &EffectEvidence) -> Option<Rejection> {
-    let part = found.off_force;
-    (part < MATERIAL).then_some(Rejection::Immaterial { part })
 }
 
 /// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at
@@ -439,27 +416,6 @@ fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tona
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validation::acceptance_criteria::tests::found;
-
-    #[test]
-    fn beside_noise_a_share_needs_a_held_out_gain_too() {
-        let mut less_likely = found();
-        less_likely.holdout.sum = -2.5;
-        let material = |beside_noise| Material {
-            name: EffectName::FrictionDrift,
-            share: 0.3,
-            class: Vec::new(),
-            beside_noise,
-        };
-        let why = |found: &EffectEvidence, beside_noise| {
-            contradiction_of_material(found, true, &material(beside_noise))
-        };
-        assert_eq!(why(&less_likely, true), Some(Rejection::LessLikely { nats: 2.5 }));
-        assert_eq!(why(&less_likely, false), None, "other physics limits there");
-        assert_eq!(why(&found(), true), None);
-        let nowhere = contradiction_of_material(&found(), false, &material(false));
-        assert_eq!(nowhere, Some(Rejection::NoSize));
-    }
 
     #[test]
     fn what_does_not_stand_alone_is_no_surer_than_what_it_rests_on() {
