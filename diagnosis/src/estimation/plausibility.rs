@@ -179,3 +179,38 @@ fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIG: &str = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 2.0e-3\nviscous = 2.0e-3\n[actuator]\ngain = 1.0\n\
+                       command_unit = \"N·m\"\n[encoder]\ncounts_per_unit = 1.0e5\n";
+
+    /// A swing from 2 rad that dies out, and the torque that it takes against a spring of `stiffness` N·m/rad.
+    fn swing(stiffness: f64) -> Recording {
+        let mut out = Recording { file: "fit.csv".into(), ..Recording::default() };
+        for row in 0..8000 {
+            let t = f64::from(row) * 1e-3;
+            let (height, (sine, cosine)) = (2.0 * (-0.3 * t).exp(), (3.0 * t).sin_cos());
+            let (fast_sine, fast_cosine) = (11.0 * t).sin_cos();
+            let position = height * cosine + 0.03 * fast_sine;
+            let velocity = -height * (0.3 * cosine + 3.0 * sine) + 0.33 * fast_cosine;
+            let acceleration = height * (1.8 * sine - 8.91 * cosine) - 3.63 * fast_sine;
+            out.time_s.push(t);
+            out.position_counts.push((position * 1e5).floor());
+            out.command.push(2.0e-3 * acceleration + 2.0e-3 * velocity + stiffness * position);
+        }
+        out
+    }
+
+    #[test]
+    fn a_spring_that_gives_energy_back_is_no_turned_sign() {
+        let rig = Rig::parse(RIG, "rig.toml").expect("the rig is right");
+        assert_eq!(mistake(&swing(0.5), &rig), None);
+        let mut turned = swing(0.0);
+        turned.command.iter_mut().for_each(|u| *u = -*u);
+        let sentence = mistake(&turned, &rig).expect("its sign is wrong");
+        assert!(sentence.contains("a sign is wrong"), "{sentence}");
+    }
+}

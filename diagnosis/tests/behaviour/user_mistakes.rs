@@ -155,17 +155,6 @@ fn wrong_units_signs_and_columns_get_a_sentence_that_helps() {
     helps("at rest", &rig(), |r| r.position_counts.fill(17.0), "is at rest");
 }
 
-#[test]
-fn a_spring_that_gives_energy_back_is_no_turned_sign() {
-    let outcome = said(&rig(), |r| {
-        for (u, q) in r.command.iter_mut().zip(&r.position_counts) {
-            *u += 0.5 * q / 636.62;
-        }
-    });
-    let named: Vec<_> = outcome.report.effects.iter().map(|effect| effect.name.as_str()).collect();
-    assert_eq!(named, ["position_spring"], "{}", outcome.summary());
-}
-
 fn folder(name: &str) -> PathBuf {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&dir).expect("the target folder can be written");
