@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 pub(crate) enum CommandLaw {
     /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass whole.
     Deadband { half_width: f64, shift: bool },
-    /// Commands beyond the limit are held at it.
-    Clip { limit: f64 },
+    /// Commands beyond the limit are held at it. With `softness` s > 0 they approach it: `u/(1 + |u/limit|^(1/s))^s`.
+    Clip { limit: f64, softness: f64 },
     /// A transport delay, s; the queue holds (length, command) of what is under way.
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },
     /// A first-order lag, s.
@@ -44,7 +44,7 @@ impl CommandLaw {
                     command
                 }
             }
-            Self::Clip { limit } => command.clamp(-*limit, *limit),
+            Self::Clip { limit, softness } => clip(command, *limit, *softness),
             Self::Delay { delay, queue, waiting } => {
                 if queue.is_empty() {
                     // Before the first row the command is taken to have stood still.
@@ -75,5 +75,31 @@ impl CommandLaw {
                 command + (before - command) * mean
             }
         }
+    }
+}
+
+/// A command held at a limit, which it approaches where `softness` is above zero.
+fn clip(command: f64, limit: f64, softness: f64) -> f64 {
+    if softness <= 0.0 {
+        return command.clamp(-limit, limit);
+    }
+    let (power, ratio) = (softness.recip(), command.abs() / limit);
+    // The smaller of the two and their ratio, so that no power overflows.
+    let (least, over) = if ratio < 1.0 { (command.abs(), ratio) } else { (limit, ratio.recip()) };
+    (least / (1.0 + over.powf(power)).powf(softness)).copysign(command)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_soft_clip_passes_what_is_small_and_never_exceeds_its_limit() {
+        // At the limit itself a power of 8 leaves 2^(-1/8) of it.
+        assert!((clip(0.5, 0.5, 0.125) - 0.5 * 0.917_004_043_204_671_2).abs() < 1e-15);
+        assert!((clip(-0.1, 0.5, 0.125) + 0.1).abs() < 1e-6, "{}", clip(-0.1, 0.5, 0.125));
+        assert_eq!(clip(-1e300, 0.5, 1e-3), -0.5);
+        assert_eq!((clip(2.0, 0.5, 0.0), clip(0.4, 0.5, 0.0)), (0.5, 0.4));
+        assert_eq!(clip(0.0, 0.5, 0.1), 0.0);
     }
 }

@@ -185,11 +185,15 @@ impl BlockedRecording {
         sum / m as f64 * count
     }
 
-    /// True if dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides.
+    /// True if dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides, but not
+    /// so much faster that it is driven through a reversal with twice the friction.
     pub(crate) fn stops_within(&self, block: usize) -> bool {
         let near = [block.saturating_sub(2), (block + 2).min(self.block_count() - 1)];
-        let speed = self.motion.v[block].abs();
-        speed < self.blocks.stops_from && near.iter().all(|other| speed < 0.5 * self.motion.v[*other].abs())
+        let [before, after] = near.map(|other| self.motion.v[other]);
+        let (speed, stops_from) = (self.motion.v[block].abs(), self.blocks.stops_from);
+        // In two blocks friction alone takes off four times what it stops within half a block.
+        let is_driven = before * after < 0.0 && before.abs().min(after.abs()) >= 4.0 * stops_from;
+        speed < stops_from && speed < 0.5 * before.abs().min(after.abs()) && !is_driven
     }
 
     /// Says of each segment whether the model knows all but a few of its blocks.
@@ -226,6 +230,12 @@ mod tests {
         track.motion.v[70] = 0.3;
         assert!(track.stops_within(50));
         assert!(!track.stops_within(49) && !track.stops_within(70));
+        // 12.5 mrad/s are what friction takes off in a block.
+        let turns_at = |speed: f64| (-2..=2).map(move |k| (50 + k, 0.004 + speed * k as f64));
+        turns_at(0.015).for_each(|(block, v)| track.motion.v[block as usize] = v);
+        assert!(!track.stops_within(50), "it is driven through with more than twice the friction");
+        turns_at(0.008).for_each(|(block, v)| track.motion.v[block as usize] = v);
+        assert!(track.stops_within(50));
         track.motion.v.fill(0.004);
         assert!((0..100).all(|block| !track.stops_within(block)));
     }

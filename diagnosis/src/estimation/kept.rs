@@ -28,6 +28,29 @@ pub(crate) struct BlockMotion {
     pub(crate) speed_floor: f64,
 }
 
+/// A part of a block on one side of a reversal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Side {
+    /// Its part of the block's length.
+    pub(crate) part: f64,
+    /// Mean velocity over it, rad/s or m/s.
+    pub(crate) velocity: f64,
+}
+
+impl BlockMotion {
+    /// Returns both sides of a reversal within a block; none where the axis does not turn back there, or rests.
+    pub(crate) fn sides(&self, block: usize) -> Option<[Side; 2]> {
+        let last = self.v.len() - 1;
+        let near = [block.saturating_sub(1), (block + 1).min(last)];
+        let [start, end] = near.map(|other| 0.5 * (self.v[block] + self.v[other]));
+        if self.rest[block] || start * end >= 0.0 {
+            return None;
+        }
+        let before = start / (start - end);
+        Some([Side { part: before, velocity: 0.5 * start }, Side { part: 1.0 - before, velocity: 0.5 * end }])
+    }
+}
+
 /// The nominal columns of a recording under one noise, with all that they rest on.
 #[derive(Debug)]
 pub(crate) struct Whitened {
@@ -118,5 +141,28 @@ impl Kept {
             inputs.known.insert(0, (effect.clone(), bias, Arc::new(new.clone())));
         }
         new
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reversal_divides_its_block_where_the_speed_is_zero() {
+        let mut motion = BlockMotion {
+            x: vec![0.0; 5],
+            // Zero a quarter into the block in the middle, at a constant acceleration.
+            v: vec![-1.75, -0.75, 0.25, 1.25, 2.25],
+            rest: vec![false; 5],
+            stuck: vec![false; 5],
+            speed_floor: 0.0,
+        };
+        let [before, after] = motion.sides(2).expect("it turns back there");
+        assert_eq!((before.part, before.velocity), (0.25, -0.125));
+        assert_eq!((after.part, after.velocity), (0.75, 0.375));
+        assert!([0, 1, 3, 4].into_iter().all(|block| motion.sides(block).is_none()));
+        motion.rest[2] = true;
+        assert!(motion.sides(2).is_none());
     }
 }

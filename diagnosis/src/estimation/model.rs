@@ -28,15 +28,15 @@ pub(crate) struct Model {
     pub(crate) bias: Vec<f64>,
 }
 
-/// Sign of the velocity where it is known, per block.
+/// Sign of the velocity where it is known, the mean over each block.
 pub(crate) fn direction(track: &BlockedRecording) -> Vec<f64> {
-    track
-        .motion
-        .v
-        .iter()
-        .zip(&track.motion.rest)
-        .map(|(v, rest)| if *rest { 0.0 } else { v.signum() })
-        .collect()
+    let motion = &track.motion;
+    let mean = |j: usize| match motion.sides(j) {
+        _ if motion.rest[j] => 0.0,
+        Some(sides) => sides.iter().map(|side| side.part * side.velocity.signum()).sum(),
+        None => motion.v[j].signum(),
+    };
+    (0..motion.v.len()).map(mean).collect()
 }
 
 impl Model {

@@ -59,6 +59,25 @@ fn held(track: &BlockedRecording, fast: f64) -> Vec<bool> {
     (0..n).map(is_held).collect()
 }
 
+/// Multiple of the slowest speed that noise lets be seen which an axis has a block before and a block after a reversal that it sweeps
+/// through.
+const SWEPT: f64 = 3.0;
+
+/// Blocks on both sides of a reversal through which the axis is driven without a stop, so that the direction is known: its speed `v` is
+/// large before and after, and it is not held in between. `floor` is the slowest speed that is seen.
+fn swept(v: &[f64], holds: &[bool], floor: f64) -> Vec<bool> {
+    let mut out = vec![false; v.len()];
+    for k in 1..v.len().saturating_sub(2) {
+        let (before, after) = (v[k - 1], v[k + 2]);
+        let is_fast = before.abs().min(after.abs()) >= SWEPT * floor;
+        let turns = v[k] * v[k + 1] <= 0.0 && before * after < 0.0;
+        if turns && is_fast && !holds[k - 1..=k + 2].contains(&true) {
+            out[k..=k + 1].fill(true);
+        }
+    }
+    out
+}
+
 /// Estimates the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
 /// encoder's.
 pub(crate) fn estimate_motion(
@@ -90,11 +109,15 @@ pub(crate) fn estimate_motion(
         let still = still(track, &state.v, count);
         let n = still.len();
         let held = held(track, fast);
-        let slow: Vec<bool> = (0..n).map(|j| still[j] || held[j] || state.v[j].abs() < floor).collect();
+        let holds: Vec<bool> = (0..n).map(|j| still[j] || held[j]).collect();
+        let swept = swept(&state.v, &holds, floor);
+        let slow: Vec<bool> = (0..n).map(|j| holds[j] || (state.v[j].abs() < floor && !swept[j])).collect();
         track.motion.rest = (0..n)
             .map(|j| {
                 let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
-                slow[a..=b].iter().any(|slow| *slow) || state.v[a] * state.v[b] <= 0.0
+                let is_swept = |k: usize| state.v[k] * state.v[k + 1] > 0.0 || (swept[k] && swept[k + 1]);
+                let turns = state.v[a] * state.v[b] <= 0.0 && !(a..b).all(is_swept);
+                turns || slow[a..=b].contains(&true)
             })
             .collect();
         track.motion.stuck = still;
@@ -277,5 +300,22 @@ mod tests {
         let resting = |at: &[bool]| (0..at.len()).filter(|j| at[*j]).collect::<Vec<_>>();
         assert_eq!(resting(&at(0.6)), [40, 41, 42, 43, 44, 45], "3.6 counts promised");
         assert!(resting(&at(0.2)).is_empty(), "1.2 counts are one more block's");
+    }
+
+    #[test]
+    fn an_axis_driven_through_a_reversal_does_not_rest_there() {
+        let v = |of: [f64; 8]| swept(&of, &[false; 8], 0.1);
+        let swept_at = |of: [f64; 8]| (0..8).filter(|j| v(of)[*j]).collect::<Vec<_>>();
+        assert_eq!(swept_at([-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0]), [3, 4]);
+        assert!(
+            swept_at([-3.0, -1.0, -0.2, 0.0, 0.0, 0.0, 0.2, 1.0]).is_empty(),
+            "it stops for three blocks"
+        );
+        assert!(swept_at([3.0, 1.0, 0.2, -0.01, 0.2, 1.0, 3.0, 5.0]).is_empty(), "it does not turn back");
+        assert!(swept_at([-0.7, -0.5, -0.3, -0.1, 0.1, 0.2, 0.3, 0.5]).is_empty(), "too slow to be sure");
+        let of = [-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0];
+        let mut holds = [false; 8];
+        holds[4] = true;
+        assert!(!swept(&of, &holds, 0.1).contains(&true), "the encoder gives no count there");
     }
 }

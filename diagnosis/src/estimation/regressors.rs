@@ -4,6 +4,7 @@ use crate::effects::definition::Coupling;
 use crate::effects::{Effect, Law, State, Variable};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::input::Input;
+use crate::estimation::kept::Side;
 
 /// The same inputs, kept from one model to the next where they are costly and rest on the command as recorded.
 pub(crate) fn kept_inputs(
@@ -65,9 +66,15 @@ pub(crate) fn effect_inputs(
             dt: track.blocks.span[j],
             ..State::default()
         };
-        law.terms(&state, &mut out);
-        for (column, term) in columns.iter_mut().zip(&out) {
-            column.push(*term);
+        let Some(sides) = track.motion.sides(j) else {
+            law.terms(&state, &mut out);
+            columns.iter_mut().zip(&out).for_each(|(column, term)| column.push(*term));
+            continue;
+        };
+        columns.iter_mut().for_each(|column| column.push(0.0));
+        for Side { part, velocity } in sides {
+            law.terms(&State { velocity, dt: part * state.dt, ..state }, &mut out);
+            columns.iter_mut().zip(&out).for_each(|(column, term)| column[j] += part * term);
         }
     }
     let sensor = law.in_sensor();

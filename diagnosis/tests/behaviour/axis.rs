@@ -24,6 +24,8 @@ pub struct Machine {
     pub lag_s: f64,
     pub filter_s: f64,
     pub limit: f64,
+    /// Power with which the drive approaches its limit; none where it clips at once.
+    pub soft_power: Option<f64>,
     pub slow_grip: f64,
     pub cogging: f64,
     pub push: f64,
@@ -45,6 +47,7 @@ pub const AXIS: Machine = Machine {
     lag_s: 0.0,
     filter_s: 0.0,
     limit: f64::INFINITY,
+    soft_power: None,
     slow_grip: 0.0,
     cogging: 0.0,
     push: 0.0,
@@ -96,7 +99,11 @@ pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -
             // In rows, and a little on, so that rounding does not make the row before of it.
             let rows = f64::from(row) + f64::from(i) / f64::from(steps) - machine.delay_s * taken.rate;
             let u = command((rows + 1e-9).floor() / taken.rate);
-            driven += (u.clamp(-machine.limit, machine.limit) - driven) * follow(machine.lag_s);
+            let passed = match machine.soft_power {
+                Some(p) => u / (1.0 + (u / machine.limit).abs().powf(p)).powf(1.0 / p),
+                None => u.clamp(-machine.limit, machine.limit),
+            };
+            driven += (passed - driven) * follow(machine.lag_s);
             let warm = 1.0 - (-t / 3.0).exp();
             let free = driven * (1.0 - machine.fades * warm) + machine.offset + disturbance
                 - machine.gravity * q.sin()

@@ -288,6 +288,19 @@ fn a_drive_that_is_limited_in_few_rows_is_no_outlier() {
     assert!((26.0..28.0).contains(&limit), "{limit}");
 }
 
+/// The axis swings at up to 12 Hz: nearly all that the drive withholds it withholds within 10 ms of a reversal.
+#[test]
+fn a_drive_that_clips_softly_at_reversals_is_named() {
+    let swings = |f: f64| move |t: f64| 30.0 * (TAU * f * t).sin() * (0.55 + 0.45 * (TAU * 0.4 * t).sin());
+    let machine = Machine { limit: 24.0, soft_power: Some(8.0), ..AXIS };
+    let take = |seed, f| record(machine, BENCH, seed, swings(f));
+    let (fit, holdout) = ([take(1, 9.0), take(2, 12.0)], [take(3, 11.0)]);
+    let outcome = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &fit, &holdout);
+    assert_eq!(names(&outcome), [N::CommandSaturation], "{}", outcome.report.sentence);
+    let limit = outcome.report.effects[0].parameters["limit"].value;
+    assert!((23.0..25.0).contains(&limit), "{limit}");
+}
+
 #[test]
 #[ignore = "nightly: 15 s"]
 fn unmodelled_friction_is_not_reported_as_a_command_effect() {

@@ -4,6 +4,9 @@ use std::time::{Duration, Instant};
 
 /// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught up with.
 const LARGEST_LAG: Duration = Duration::from_millis(200);
+/// A device may be this far ahead of the clock on the wall before it waits: waking every millisecond would cost thirty
+/// devices on one computer more than their ticks do. Not longer than a frame of 32 samples takes to fill.
+const LARGEST_LEAD: Duration = Duration::from_millis(3);
 
 /// The speed of a simulated device.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +30,8 @@ impl RealtimeClock {
         Self::RealTime { zero: Instant::now() }
     }
 
-    /// Waits until it is `elapsed` on the device's own clock.
+    /// Waits until it is `elapsed` on the device's own clock, unless that is hardly ahead of the clock on the wall: the next
+    /// call then waits for both.
     pub fn wait(&mut self, elapsed: Duration) -> Result<(), Late> {
         let Self::RealTime { zero } = self else { return Ok(()) };
         let now = Instant::now();
@@ -36,7 +40,10 @@ impl RealtimeClock {
             *zero += now - due;
             return Err(Late);
         }
-        std::thread::sleep(due.saturating_duration_since(now));
+        let lead = due.saturating_duration_since(now);
+        if lead >= LARGEST_LEAD {
+            std::thread::sleep(lead);
+        }
         Ok(())
     }
 }
@@ -44,6 +51,17 @@ impl RealtimeClock {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_device_runs_ahead_for_less_than_a_frame() {
+        let begin = Instant::now();
+        let mut clock = RealtimeClock::real_time();
+        for elapsed_ms in 1..=100 {
+            let elapsed = Duration::from_millis(elapsed_ms);
+            assert_eq!(clock.wait(elapsed), Ok(()));
+            assert!(begin.elapsed() + LARGEST_LEAD > elapsed);
+        }
+    }
 
     #[test]
     fn a_computer_that_slept_is_late_once_and_goes_on_from_there() {
