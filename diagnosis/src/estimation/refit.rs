@@ -63,15 +63,25 @@ fn held(track: &BlockedRecording, fast: f64) -> Vec<bool> {
 /// through.
 const SWEPT: f64 = 3.0;
 
+/// Blocks before and after such a reversal in which the axis runs one way: shorter swings turn back within a block.
+const ONE_WAY: usize = 4;
+
+/// Multiple of the change of speed that the rig's dry friction makes over the same time which the drive makes there: when exactly the
+/// friction changes its sign then hardly matters.
+const DRIVEN: f64 = 10.0;
+
 /// Blocks on both sides of a reversal through which the axis is driven without a stop, so that the direction is known: its speed `v` is
-/// large before and after, and it is not held in between. `floor` is the slowest speed that is seen.
-fn swept(v: &[f64], holds: &[bool], floor: f64) -> Vec<bool> {
+/// large before and after, and it is not held in between. `floor` is the slowest speed that is seen, `by_friction` the change of speed
+/// over a block that dry friction makes.
+fn swept(v: &[f64], holds: &[bool], floor: f64, by_friction: f64) -> Vec<bool> {
     let mut out = vec![false; v.len()];
-    for k in 1..v.len().saturating_sub(2) {
+    for k in ONE_WAY - 1..v.len().saturating_sub(ONE_WAY) {
         let (before, after) = (v[k - 1], v[k + 2]);
         let is_fast = before.abs().min(after.abs()) >= SWEPT * floor;
-        let turns = v[k] * v[k + 1] <= 0.0 && before * after < 0.0;
-        if turns && is_fast && !holds[k - 1..=k + 2].contains(&true) {
+        let is_driven = (after - before).abs() >= 3.0 * DRIVEN * by_friction;
+        let runs = |blocks: &[f64], way: f64| blocks.iter().all(|v| v * way > 0.0);
+        let turns = runs(&v[k + 1 - ONE_WAY..=k], before) && runs(&v[k + 1..=k + ONE_WAY], -before);
+        if turns && is_fast && is_driven && !holds[k - 1..=k + 2].contains(&true) {
             out[k..=k + 1].fill(true);
         }
     }
@@ -110,7 +120,7 @@ pub(crate) fn estimate_motion(
         let n = still.len();
         let held = held(track, fast);
         let holds: Vec<bool> = (0..n).map(|j| still[j] || held[j]).collect();
-        let swept = swept(&state.v, &holds, floor);
+        let swept = swept(&state.v, &holds, floor, 2.0 * track.blocks.stops_from);
         let slow: Vec<bool> = (0..n).map(|j| holds[j] || (state.v[j].abs() < floor && !swept[j])).collect();
         track.motion.rest = (0..n)
             .map(|j| {
@@ -304,18 +314,27 @@ mod tests {
 
     #[test]
     fn an_axis_driven_through_a_reversal_does_not_rest_there() {
-        let v = |of: [f64; 8]| swept(&of, &[false; 8], 0.1);
-        let swept_at = |of: [f64; 8]| (0..8).filter(|j| v(of)[*j]).collect::<Vec<_>>();
-        assert_eq!(swept_at([-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0]), [3, 4]);
+        let swept_at = |of: [f64; 8], by_friction: f64| {
+            let swept = swept(&of, &[false; 8], 0.1, by_friction);
+            (0..8).filter(|j| swept[*j]).collect::<Vec<_>>()
+        };
+        let driven = [-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0];
+        assert_eq!(swept_at(driven, 0.1), [3, 4]);
+        assert!(swept_at(driven, 0.3).is_empty(), "friction changes the speed by more than a tenth as much");
         assert!(
-            swept_at([-3.0, -1.0, -0.2, 0.0, 0.0, 0.0, 0.2, 1.0]).is_empty(),
+            swept_at([-7.0, -5.0, 3.0, -1.0, 1.0, 3.0, 5.0, 7.0], 0.0).is_empty(),
+            "it has just turned back"
+        );
+        assert!(
+            swept_at([-3.0, -1.0, -0.2, 0.0, 0.0, 0.0, 0.2, 1.0], 0.0).is_empty(),
             "it stops for three blocks"
         );
-        assert!(swept_at([3.0, 1.0, 0.2, -0.01, 0.2, 1.0, 3.0, 5.0]).is_empty(), "it does not turn back");
-        assert!(swept_at([-0.7, -0.5, -0.3, -0.1, 0.1, 0.2, 0.3, 0.5]).is_empty(), "too slow to be sure");
-        let of = [-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0];
+        assert!(
+            swept_at([-0.7, -0.5, -0.3, -0.1, 0.1, 0.2, 0.3, 0.5], 0.0).is_empty(),
+            "too slow to be sure"
+        );
         let mut holds = [false; 8];
         holds[4] = true;
-        assert!(!swept(&of, &holds, 0.1).contains(&true), "the encoder gives no count there");
+        assert!(!swept(&driven, &holds, 0.1, 0.1).contains(&true), "the encoder gives no count there");
     }
 }
