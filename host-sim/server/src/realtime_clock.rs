@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 /// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught up with.
 const LARGEST_LAG: Duration = Duration::from_millis(200);
-/// A device may be this far ahead of the clock on the wall before it waits: waking every millisecond would cost thirty
-/// devices on one computer more than their ticks do. Not longer than a frame of 32 samples takes to fill.
+/// A device may be this far ahead of the clock on the wall before it waits: waking every millisecond cost a fifth of what it
+/// uses of a core. Not longer than a frame of 32 samples takes to fill.
 const LARGEST_LEAD: Duration = Duration::from_millis(3);
 
 /// The speed of a simulated device.
