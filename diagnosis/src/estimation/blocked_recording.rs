@@ -59,6 +59,7 @@ impl BlockedRecording {
             x: blocks.z.clone(),
             v: vec![0.0; n],
             rest: vec![false; n],
+            any_force: vec![false; n],
             stuck: vec![false; n],
             speed_floor: 0.0,
         };
@@ -82,8 +83,8 @@ impl BlockedRecording {
     /// Returns the view of the recording that the filter needs.
     pub(crate) fn observed(&self) -> Observed<'_> {
         let Blocks { start, span, tau1, tau2, reading_lag, z, quantum, .. } = &*self.blocks;
-        let BlockMotion { rest, stuck, .. } = &self.motion;
-        Observed { start, span, tau1, tau2, reading_lag, z, quantum, rest, stuck }
+        let BlockMotion { any_force, stuck, .. } = &self.motion;
+        Observed { start, span, tau1, tau2, reading_lag, z, quantum, any_force, stuck }
     }
 
     /// Number of blocks.

@@ -41,8 +41,8 @@ pub(crate) struct Observed<'a> {
     /// Mean reading, and its variance from quantisation alone.
     pub(crate) z: &'a [f64],
     pub(crate) quantum: &'a [f64],
-    /// Blocks where the axis rests, and where it is stuck.
-    pub(crate) rest: &'a [bool],
+    /// Blocks in which any force may act, and those where the axis is stuck.
+    pub(crate) any_force: &'a [bool],
     pub(crate) stuck: &'a [bool],
 }
 
@@ -81,7 +81,7 @@ impl<const N: usize> Step<N> {
     /// The same where the part of the disturbance that is left after the block is known.
     fn with_rho(track: &Observed, noise: &Noise, j: usize, rho: f64) -> Self {
         let h = track.span[j];
-        let white = if track.rest[j] { noise.rest.max(noise.white) } else { noise.white };
+        let white = if track.any_force[j] { noise.rest.max(noise.white) } else { noise.white };
         let mut step = Self { transition: [[0.0; N]; N], seen: [0.0; N], noise: [[0.0; N]; N] };
         step.transition[0][..3].copy_from_slice(&[1.0, h, 0.5 * h * h]);
         step.transition[1][..3].copy_from_slice(&[0.0, 1.0, h]);

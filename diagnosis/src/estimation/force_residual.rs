@@ -44,7 +44,7 @@ impl Estimator {
         // The same filter everywhere: neither quantisation nor rest changes it.
         let h = 1.0 / track.block_rate();
         let n = track.block_count();
-        let even = Observed { z, quantum: &vec![1.0; n], rest: &vec![false; n], ..track.observed() };
+        let even = Observed { z, quantum: &vec![1.0; n], any_force: &vec![false; n], ..track.observed() };
         let tau = 1e3;
         let walk = (TAU * self.bandwidth_hz).powi(6) * h;
         let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0, blur: 0.0 };

@@ -22,6 +22,9 @@ pub(crate) struct BlockMotion {
     pub(crate) v: Vec<f64>,
     /// Blocks where the axis rests or the sign of its speed is not known.
     pub(crate) rest: Vec<bool>,
+    /// Blocks in which the filter allows any force: at rest, and at a reversal, because the row in which friction changes its sign and
+    /// what a solver makes of that row are in no recording.
+    pub(crate) any_force: Vec<bool>,
     /// Blocks in the middle of a rest: friction is a reaction there and cancels every input.
     pub(crate) stuck: Vec<bool>,
     /// Speed below which its sign is not known.
@@ -55,7 +58,7 @@ impl BlockMotion {
 #[derive(Debug)]
 pub(crate) struct Whitened {
     pub(super) noise: Noise,
-    pub(super) rest: Vec<bool>,
+    pub(super) any_force: Vec<bool>,
     pub(super) stuck: Vec<bool>,
     pub(super) inputs: Vec<Input>,
     /// Coefficients about which residuals are taken.
@@ -155,6 +158,7 @@ mod tests {
             // Zero a quarter into the block in the middle, at a constant acceleration.
             v: vec![-1.75, -0.75, 0.25, 1.25, 2.25],
             rest: vec![false; 5],
+            any_force: vec![false; 5],
             stuck: vec![false; 5],
             speed_floor: 0.0,
         };

@@ -56,7 +56,7 @@ impl<'a> Excerpt<'a> {
     }
 
     fn observed(&self) -> Observed<'_> {
-        let Observed { span, tau1, tau2, reading_lag, quantum, rest, stuck, .. } = self.track.observed();
+        let Observed { span, tau1, tau2, reading_lag, quantum, any_force, stuck, .. } = self.track.observed();
         let over = self.over.clone();
         Observed {
             start: &self.start,
@@ -66,7 +66,7 @@ impl<'a> Excerpt<'a> {
             reading_lag: reading_lag.get(over.clone()).unwrap_or_default(),
             z: &self.z,
             quantum: &quantum[over.clone()],
-            rest: &rest[over.clone()],
+            any_force: &any_force[over.clone()],
             stuck: &stuck[over],
         }
     }

@@ -1,7 +1,7 @@
 //! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::filter::Noise;
+use crate::estimation::filter::{Noise, Observed};
 use crate::estimation::fit::Fit;
 use crate::estimation::input::Total;
 use crate::estimation::model::Model;
@@ -88,6 +88,18 @@ fn swept(v: &[f64], holds: &[bool], floor: f64, by_friction: f64) -> Vec<bool> {
     out
 }
 
+/// Blocks beside one that is `slow` or beside a change of the sign of the speed `v`, but for what is `swept`.
+fn near_rest(v: &[f64], slow: &[bool], swept: &[bool]) -> Vec<bool> {
+    let n = v.len();
+    let is_beside = |j: usize| {
+        let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
+        let is_swept = |k: usize| v[k] * v[k + 1] > 0.0 || (swept[k] && swept[k + 1]);
+        let turns = v[a] * v[b] <= 0.0 && !(a..b).all(is_swept);
+        turns || (a..=b).any(|k| slow[k] && !swept[k])
+    };
+    (0..n).map(is_beside).collect()
+}
+
 /// Estimates the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
 /// encoder's.
 pub(crate) fn estimate_motion(
@@ -98,7 +110,9 @@ pub(crate) fn estimate_motion(
     knows: Knows,
 ) {
     for (track, total) in tracks.iter_mut().zip(totals) {
-        let state = motion(&track.observed(), noise, total, knows);
+        // The fit allows any force at a reversal, the motion does not: where the axis is driven through, its speed is known there.
+        let observed = Observed { any_force: &track.motion.rest, ..track.observed() };
+        let state = motion(&observed, noise, total, knows);
         let mut sd: Vec<f64> = state
             .v_sd
             .iter()
@@ -121,15 +135,9 @@ pub(crate) fn estimate_motion(
         let held = held(track, fast);
         let holds: Vec<bool> = (0..n).map(|j| still[j] || held[j]).collect();
         let swept = swept(&state.v, &holds, floor, 2.0 * track.blocks.stops_from);
-        let slow: Vec<bool> = (0..n).map(|j| holds[j] || (state.v[j].abs() < floor && !swept[j])).collect();
-        track.motion.rest = (0..n)
-            .map(|j| {
-                let (a, b) = (j.saturating_sub(MARGIN), (j + MARGIN).min(n - 1));
-                let is_swept = |k: usize| state.v[k] * state.v[k + 1] > 0.0 || (swept[k] && swept[k + 1]);
-                let turns = state.v[a] * state.v[b] <= 0.0 && !(a..b).all(is_swept);
-                turns || slow[a..=b].contains(&true)
-            })
-            .collect();
+        let slow: Vec<bool> = (0..n).map(|j| holds[j] || state.v[j].abs() < floor).collect();
+        track.motion.rest = near_rest(&state.v, &slow, &swept);
+        track.motion.any_force = near_rest(&state.v, &slow, &vec![false; n]);
         track.motion.stuck = still;
         track.motion.speed_floor = floor;
         track.motion.x = state.x;

@@ -26,14 +26,14 @@ fn whitened(track: &BlockedRecording, noise: &Noise, nominal: &[Column]) -> Whit
     let responses = gains.all_responses(&observed, &inputs);
     let segments = grams(track, &responses, &residual, None);
     let inputs = inputs.into_iter().cloned().collect();
-    let (rest, stuck) = (track.motion.rest.clone(), track.motion.stuck.clone());
-    Whitened { noise: *noise, rest, stuck, inputs, reference, gains, residual, responses, segments }
+    let (any_force, stuck) = (track.motion.any_force.clone(), track.motion.stuck.clone());
+    Whitened { noise: *noise, any_force, stuck, inputs, reference, gains, residual, responses, segments }
 }
 
 /// True if nominal columns are those of a recording as it is now.
 fn is_of(known: &Whitened, track: &BlockedRecording, noise: &Noise, nominal: &[Column]) -> bool {
     known.noise == *noise
-        && known.rest == track.motion.rest
+        && known.any_force == track.motion.any_force
         && known.stuck == track.motion.stuck
         && known.reference.len() == nominal.len()
         && known.reference.iter().zip(nominal).all(|(mean, column)| *mean == column.prior.mean)
@@ -97,6 +97,7 @@ mod tests {
     fn move_at(track: &mut BlockedRecording, speed: f64) {
         track.motion.v = track.blocks.start.iter().map(|t| speed * (3.0 * t).cos()).collect();
         track.motion.rest = track.motion.v.iter().map(|v| v.abs() < 0.1).collect();
+        track.motion.any_force.clone_from(&track.motion.rest);
     }
 
     fn values(track: &BlockedRecording, white: f64) -> Vec<f64> {
