@@ -321,6 +321,28 @@ mod tests {
     }
 
     #[test]
+    fn a_reversal_that_is_driven_through_allows_any_force() {
+        // Half a radian at 8 rad/s by the command that this takes, against a friction of a thirtieth of it.
+        let recording = Recording {
+            time_s: (0..800).map(|row| f64::from(row) * 2.5e-3).collect(),
+            command: (0..800).map(|row| -0.01 * 32.0 / 0.1 * (f64::from(row) * 0.02).cos()).collect(),
+            position_counts: (0..800).map(|row| (500.0 * (f64::from(row) * 0.02).cos()).round()).collect(),
+            ..Recording::default()
+        };
+        let rig = Rig::of_values(0.01, 0.0, 0.01);
+        let mut tracks = [BlockedRecording::new(&recording, &rig)];
+        let (_, fit) = settle(&mut Nominal::of(&rig), &mut tracks);
+        assert!(fit.log_likelihood.is_finite());
+        let motion = &tracks[0].motion;
+        let turns: Vec<usize> =
+            (4..motion.v.len() - 5).filter(|j| motion.v[*j] * motion.v[j + 1] < 0.0).collect();
+        assert!(turns.len() >= 3, "{turns:?}");
+        for turn in turns {
+            assert!(!motion.rest[turn] && motion.any_force[turn], "block {turn}");
+        }
+    }
+
+    #[test]
     fn an_axis_driven_through_a_reversal_does_not_rest_there() {
         let swept_at = |of: [f64; 8], by_friction: f64| {
             let swept = swept(&of, &[false; 8], 0.1, by_friction);
