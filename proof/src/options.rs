@@ -117,7 +117,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
                 several of is repeated with the flag before it
   --write DIR   write the recordings to DIR/cases and the key to DIR/key.json, and run nothing
   --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
-  --out DIR     folder for proof.json and proof.md, of a folder of cases proof-NAME.json and proof-NAME.md (target)
+  --out DIR     folder for proof.json and proof.md, of a folder of cases proof-NAME.json and proof-NAME.md (target); those of
+                --settle and --inject are written anew after every case
 ";
 
 impl Options {

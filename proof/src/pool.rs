@@ -14,6 +14,19 @@ pub(crate) fn map<T: Sync, R: Send>(
     items: &[T],
     work: impl Fn(&T) -> R + Sync,
 ) -> Vec<Option<R>> {
+    map_and_save(jobs, budget, label, items, work, |_| ())
+}
+
+/// As [`map`]; `save` gets the results so far after each item, one call at a time, so that a run that is stopped has
+/// not been for nothing.
+pub(crate) fn map_and_save<T: Sync, R: Send>(
+    jobs: usize,
+    budget: Option<Duration>,
+    label: &str,
+    items: &[T],
+    work: impl Fn(&T) -> R + Sync,
+    save: impl Fn(&[Option<R>]) + Sync,
+) -> Vec<Option<R>> {
     let next = AtomicUsize::new(0);
     let done = AtomicUsize::new(0);
     let results: Mutex<Vec<Option<R>>> = Mutex::new(items.iter().map(|_| None).collect());
@@ -26,7 +39,11 @@ pub(crate) fn map<T: Sync, R: Send>(
                     let i = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(i) else { break };
                     let result = work(item);
-                    results.lock().expect("no holder of the lock panics")[i] = Some(result);
+                    {
+                        let mut results = results.lock().expect("no holder of the lock panics");
+                        results[i] = Some(result);
+                        save(&results);
+                    }
                     let count = done.fetch_add(1, Ordering::Relaxed) + 1;
                     if watched {
                         let spent = start.elapsed().as_secs_f64();
@@ -53,6 +70,14 @@ mod tests {
         let items: Vec<usize> = (0..100).collect();
         let squares: Vec<Option<usize>> = items.iter().map(|i| Some(i * i)).collect();
         assert_eq!(super::map(3, None, "", &items, |i| i * i), squares);
+    }
+
+    #[test]
+    fn every_result_is_saved_when_it_is_there() {
+        let saved = std::sync::Mutex::new(Vec::new());
+        let save = |results: &[Option<usize>]| saved.lock().unwrap().push(results.to_vec());
+        super::map_and_save(1, None, "", &[1, 2], |i| i * 2, save);
+        assert_eq!(saved.into_inner().unwrap(), [[Some(2), None], [Some(2), Some(4)]]);
     }
 
     #[test]

@@ -96,31 +96,50 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
     }
     let wishes = wishes(options);
     let scratch = Scratch::new()?;
-    let done = pool::map(options.jobs, options.budget(), "concealed effects", &wishes, |wish| {
-        run_case(wish, &known, options, tool, &scratch.0)
-    });
-    let mut cases = Vec::new();
-    let mut impossible = 0;
-    for case in done.into_iter().flatten() {
-        match case? {
-            Some(case) => cases.push(case),
-            None => impossible += 1,
-        }
+    let report = Report { options, carriers: known.len(), without, planned: wishes.len(), start };
+    let work = |wish: &Wish| run_case(wish, &known, options, tool, &scratch.0);
+    // A report that cannot be written now is tried again after the next case; the last failure is told.
+    let save = |done: &[Option<Outcome>]| drop(report.write(done));
+    let done = pool::map_and_save(options.jobs, options.budget(), "concealed effects", &wishes, work, save);
+    print!("{}", report.write(&done)?);
+    Ok(())
+}
+
+/// A case, `None` if no carrier holds the effect, or why it could not be run.
+type Outcome = Result<Option<Case>, String>;
+
+/// What every report of this run says beside its cases.
+struct Report<'a> {
+    options: &'a Options,
+    carriers: usize,
+    /// Carriers without a fit, with the reason.
+    without: Vec<String>,
+    planned: usize,
+    start: Instant,
+}
+
+impl Report<'_> {
+    /// Writes `inject.json` and `inject.md` about the cases that are done; returns the latter.
+    fn write(&self, done: &[Option<Outcome>]) -> Result<String, String> {
+        let done: Vec<Option<&Case>> =
+            done.iter().flatten().map(|o| o.as_ref().map(Option::as_ref)).collect::<Result<_, _>>()?;
+        let cases: Vec<&Case> = done.iter().flatten().copied().collect();
+        let head = format!(
+            "{} cases of {}, seed {}, of {} planned ({} that no carrier holds); {} carriers, {} without a fit; {:.0} s.",
+            cases.len(),
+            self.options.inject.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+            self.options.seed,
+            self.planned,
+            done.len() - cases.len(),
+            self.carriers,
+            self.without.len(),
+            self.start.elapsed().as_secs_f64()
+        );
+        let text = table::markdown(&head, &cases, &self.without);
+        crate::write_out(self.options, "inject.md", &text)?;
+        crate::write_out(self.options, "inject.json", &crate::pretty(&table::json(&head, &cases))?)?;
+        Ok(text)
     }
-    let head = format!(
-        "{} cases of {}, seed {}, of {} planned ({impossible} that no carrier holds); {} carriers, {} without a fit; {:.0} s.",
-        cases.len(),
-        options.inject.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
-        options.seed,
-        wishes.len(),
-        known.len(),
-        without.len(),
-        start.elapsed().as_secs_f64()
-    );
-    let text = table::markdown(&head, &cases, &without);
-    print!("{text}");
-    crate::write_out(options, "inject.md", &text)?;
-    crate::write_out(options, "inject.json", &crate::pretty(&table::json(&head, &cases))?)
 }
 
 /// The effects one after the other, at one size and then the other, in an order that mixes them.

@@ -59,13 +59,13 @@ impl Method {
 }
 
 /// Everything as markdown.
-pub(crate) fn markdown(first: &str, cases: &[Case], without: &[String]) -> String {
+pub(crate) fn markdown(first: &str, cases: &[&Case], without: &[String]) -> String {
     let mut out = format!("{first} Rates with Wilson's 95 % interval.\n");
     if !without.is_empty() {
         let _ = writeln!(out, "\nWithout a fit: {}.", without.join(", "));
     }
     overall(&mut out, cases);
-    let solved: Vec<&Case> = cases.iter().filter(|c| c.oracle.solves()).collect();
+    let solved: Vec<&Case> = cases.iter().copied().filter(|c| c.oracle.solves()).collect();
     grouped(&mut out, "By effect, of those that the oracle solves", &solved, |c| c.hidden.into());
     grouped(&mut out, "By machine, of those that the oracle solves", &solved, |c| c.machine.clone());
     reliability(&mut out, cases);
@@ -74,7 +74,7 @@ pub(crate) fn markdown(first: &str, cases: &[Case], without: &[String]) -> Strin
     out
 }
 
-fn overall(out: &mut String, cases: &[Case]) {
+fn overall(out: &mut String, cases: &[&Case]) {
     head(
         out,
         "Concealed effects",
@@ -87,7 +87,11 @@ fn overall(out: &mut String, cases: &[Case]) {
         ],
     );
     let part = |factor: f64, solved: bool| -> Vec<&Case> {
-        cases.iter().filter(|c| c.oracle.solves() == solved && (c.factor == factor || !solved)).collect()
+        cases
+            .iter()
+            .copied()
+            .filter(|c| c.oracle.solves() == solved && (c.factor == factor || !solved))
+            .collect()
     };
     for method in [Method::Tool].into_iter().chain(PLAIN_SHARES.map(Method::Plain)) {
         let found = |list: &[&Case]| rate(list, |c| method.said(c) == Said::Found).text();
@@ -129,7 +133,7 @@ fn grouped(out: &mut String, title: &str, cases: &[&Case], key: impl Fn(&Case) -
     }
 }
 
-fn reliability(out: &mut String, cases: &[Case]) {
+fn reliability(out: &mut String, cases: &[&Case]) {
     let names: Vec<(f64, bool)> = cases
         .iter()
         .flat_map(|c| c.new_names().into_iter().map(|(n, right)| (n.confidence, right)))
@@ -192,7 +196,7 @@ fn answer(case: &Case) -> String {
     }
 }
 
-fn every(out: &mut String, cases: &[Case]) {
+fn every(out: &mut String, cases: &[&Case]) {
     head(
         out,
         "Every case",
@@ -227,8 +231,8 @@ fn every(out: &mut String, cases: &[Case]) {
 }
 
 /// Everything as JSON, for further work.
-pub(crate) fn json(first: &str, cases: &[Case]) -> Value {
-    let one = |c: &Case| {
+pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
+    let one = |c: &&Case| {
         let names: Vec<Value> = c
             .new_names()
             .iter()
@@ -268,6 +272,7 @@ mod tests {
             case("cogging", &[("backlash", 0.92)], &[]),
             case("cogging", &[], &[]),
         ];
+        let cases: Vec<&Case> = cases.iter().collect();
         let text = markdown("three", &cases, &[]);
         assert!(
             text.contains("| the tool | 33.3 % (1/3, 6.1–79.2) | no case | no case | 50.0 % (1/2"),

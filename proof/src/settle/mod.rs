@@ -117,7 +117,7 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         .filter(|(index, plant)| is_wanted(options.only.as_deref(), *index, plant))
         .collect();
     let inputs = &options.inputs;
-    let judged = pool::map(options.jobs, options.budget(), "settled", &plants, |(index, plant)| {
+    let work = |(index, plant): &(usize, Plant)| {
         let folder = out.join(format!("plant-{index}"));
         let answers = settle(&program, plant, inputs, options.seed + *index as u64, &folder);
         if options.keep.is_none() {
@@ -125,17 +125,23 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
             let _ = std::fs::remove_dir_all(&folder);
         }
         Judged { kind: plant.kind, names: plant.names.clone(), answers }
-    });
-    let judged: Vec<Judged> = judged.into_iter().flatten().collect();
-    let text = table::markdown(&judged, inputs, options.seed, count);
-    print!("{text}");
-    let all: Vec<Value> = judged.iter().map(|plant| json_of(plant, inputs)).collect();
-    let json = json!({ "seed": options.seed, "drawn": count, "plants": all });
-    for (name, text) in [("settle.md", text), ("settle.json", format!("{json:#}\n"))] {
-        let path = options.out.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
-    }
+    };
+    // A report that cannot be written now is tried again after the next plant; the last failure is told.
+    let save = |judged: &[Option<Judged>]| drop(write(options, judged, count));
+    let judged = pool::map_and_save(options.jobs, options.budget(), "settled", &plants, work, save);
+    print!("{}", write(options, &judged, count)?);
     Ok(())
+}
+
+/// Writes `settle.json` and `settle.md` about the plants that are judged; returns the latter.
+fn write(options: &Options, judged: &[Option<Judged>], count: usize) -> Result<String, String> {
+    let judged: Vec<&Judged> = judged.iter().flatten().collect();
+    let text = table::markdown(&judged, &options.inputs, options.seed, count);
+    let all: Vec<Value> = judged.iter().map(|plant| json_of(plant, &options.inputs)).collect();
+    let json = json!({ "seed": options.seed, "drawn": count, "plants": all });
+    crate::write_out(options, "settle.md", &text)?;
+    crate::write_out(options, "settle.json", &crate::pretty(&json)?)?;
+    Ok(text)
 }
 
 /// True if `only` is the folder of plant `index`, or a part of its kind or of its effects; all are wanted if it is absent.

@@ -5,7 +5,7 @@ use crate::stats::{Rate, quantile};
 use std::fmt::Write as _;
 
 /// The table in Markdown, with every plant below it.
-pub(super) fn markdown(judged: &[Judged], inputs: &[&str], seed: u64, drawn: usize) -> String {
+pub(super) fn markdown(judged: &[&Judged], inputs: &[&str], seed: u64, drawn: usize) -> String {
     let rule = format!("| --- |{}\n", " --- |".repeat(inputs.len()));
     let figures: Vec<Figures> = (0..inputs.len())
         .map(|source| {
