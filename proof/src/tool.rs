@@ -257,6 +257,13 @@ pub(crate) fn actuator_gain(rig: &str) -> Option<f64> {
     None
 }
 
+/// A mark of a program's file: the same bytes have the same.
+pub(crate) fn mark(program: &Path) -> String {
+    let bytes = std::fs::read(program).unwrap_or_default();
+    let sum = bytes.iter().fold(7_u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(*b)));
+    format!("{sum:016x}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -61,7 +61,7 @@ impl EffectSearch for Defined {
     fn needs_dry(&self) -> bool {
         true
     }
-    fn is_of_command(&self) -> bool {
+    fn needs_inertia(&self) -> bool {
         true
     }
     fn has_optima_apart(&self) -> bool {

@@ -35,9 +35,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }

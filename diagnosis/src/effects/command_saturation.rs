@@ -39,9 +39,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let part = |i: i32| span.clip + (0.945 - span.clip) / 9.0 * f64::from(i);
         let limits: Vec<f64> = (0..10).map(|i| span.command * part(i)).collect();

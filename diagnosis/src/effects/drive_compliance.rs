@@ -91,7 +91,7 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn is_of_command(&self) -> bool {
+    fn needs_inertia(&self) -> bool {
         true
     }
     fn has_optima_apart(&self) -> bool {

@@ -30,9 +30,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }

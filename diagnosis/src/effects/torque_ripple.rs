@@ -26,9 +26,6 @@ impl EffectSearch for Defined {
     fn is_periodic(&self) -> bool {
         true
     }
-    fn is_of_command(&self) -> bool {
-        true
-    }
     fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
         Vec::new()
     }

@@ -70,6 +70,16 @@ const ONE_WAY: usize = 4;
 /// friction changes its sign then hardly matters.
 const DRIVEN: f64 = 10.0;
 
+/// Part of the dry friction that is not known in the block of a reversal: the speed changes its sign there at a time that two blocks tell.
+const UNSURE: f64 = 0.2;
+
+/// True if the disturbance is larger than what is not known of the friction at a reversal, so that such blocks may judge a model.
+fn outweighs_reversals(track: &BlockedRecording, noise: &Noise) -> bool {
+    // Friction takes off twice as much in a block as it stops within half of one.
+    let friction = 2.0 * track.blocks.stops_from * track.block_rate();
+    noise.slow.sqrt() >= UNSURE * friction
+}
+
 /// Blocks on both sides of a reversal through which the axis is driven without a stop, so that the direction is known: its speed `v` is
 /// large before and after, and it is not held in between. `floor` is the slowest speed that is seen, `by_friction` the change of speed
 /// over a block that dry friction makes: where that is zero, the rig does not know the friction, and every reversal may be a stop.
@@ -134,7 +144,10 @@ pub(crate) fn estimate_motion(
         let n = still.len();
         let held = held(track, fast);
         let holds: Vec<bool> = (0..n).map(|j| still[j] || held[j]).collect();
-        let swept = swept(&state.v, &holds, floor, 2.0 * track.blocks.stops_from);
+        let swept = match outweighs_reversals(track, noise) {
+            true => swept(&state.v, &holds, floor, 2.0 * track.blocks.stops_from),
+            false => vec![false; n],
+        };
         let slow: Vec<bool> = (0..n).map(|j| holds[j] || state.v[j].abs() < floor).collect();
         track.motion.rest = near_rest(&state.v, &slow, &swept);
         track.motion.any_force = near_rest(&state.v, &slow, &vec![false; n]);
@@ -285,6 +298,7 @@ mod tests {
     use super::*;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
+    use std::sync::Arc;
 
     /// Blocks of 2.5 ms on which an axis passes one count each and from 40 on, for five blocks, none.
     fn stopped_for_a_moment() -> BlockedRecording {
@@ -340,6 +354,15 @@ mod tests {
         for turn in turns {
             assert!(!motion.rest[turn] && motion.any_force[turn], "block {turn}");
         }
+    }
+
+    #[test]
+    fn a_reversal_judges_where_more_is_left_than_it_hides() {
+        let mut track = stopped_for_a_moment();
+        Arc::make_mut(&mut track.blocks).stops_from = 0.5 * 10.0 * 2.5e-3;
+        let noise = |slow: f64| Noise { sensor: 1.0, white: 0.0, slow, tau: 0.1, rest: 1.0, blur: 0.0 };
+        let is_outweighed = |disturbance: f64| outweighs_reversals(&track, &noise(disturbance * disturbance));
+        assert!(!is_outweighed(1.9) && is_outweighed(2.1), "a fifth of a friction of 10 rad/s²");
     }
 
     #[test]

@@ -131,7 +131,7 @@ pub struct WindowsOff {
 }
 
 /// Position errors of the three models when they run forward along the held-out recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
     /// rad or m.
     pub unit: String,

@@ -106,10 +106,9 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
     name.definition().grid(name, span)
 }
 
-/// True if an effect shows in such motion. Where the inertia hardly matters, the command that holds a part of the motion cannot
-/// reveal saturation, delay or a joint, and its scale is the reference for everything else.
+/// True if an effect shows in such motion.
 pub(crate) fn is_seen(name: N, nominal: &Nominal) -> bool {
-    nominal.virtual_inertia == 0.0 || !name.definition().is_of_command()
+    nominal.virtual_inertia == 0.0 || !name.definition().needs_inertia()
 }
 
 /// The shape values that refinement may move, with their bounds.
@@ -259,6 +258,17 @@ mod tests {
             [true, false, false],
             "starts that lie 15 rad apart on a travel of 20"
         );
+    }
+
+    #[test]
+    fn a_joint_is_not_looked_for_where_the_inertia_hardly_matters() {
+        let nominal = Nominal::of(&Rig::of_values(0.01, 0.0, 0.05));
+        let slow = Nominal { virtual_inertia: 0.01, ..nominal.clone() };
+        let joints = [N::Backlash, N::DriveCompliance, N::RollerSlip];
+        assert!(joints.iter().all(|name| is_seen(*name, &nominal) && !is_seen(*name, &slow)));
+        for name in [N::TorqueRipple, N::CommandDeadband, N::CommandDelay] {
+            assert!(is_seen(name, &slow), "{name} shows in the force that the motion asks for");
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ fn why(name: EffectName, span: &Span, nominal: &Nominal) -> Option<String> {
         return None;
     }
     if !candidates::is_seen(name, nominal) {
-        return Some("the inertia hardly matters in this motion, and the command cannot show it then".into());
+        return Some("it shows only where the inertia matters, which hardly does in this motion".into());
     }
     if definition.is_periodic() {
         let needed = periodic::travel_needed(span, nominal)?;

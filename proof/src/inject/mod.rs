@@ -108,7 +108,7 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
 /// A case, `None` if no carrier holds the effect, or why it could not be run.
 type Outcome = Result<Option<Case>, String>;
 
-/// What every report of this run says beside its cases.
+/// The parts of a report that no case changes.
 struct Report<'a> {
     options: &'a Options,
     carriers: usize,

@@ -33,9 +33,7 @@ pub(crate) fn tool_mark(line: Option<&str>) -> String {
     if let Some(line) = line {
         return line.into();
     }
-    let exe = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
-    let sum = exe.iter().fold(7_u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(*b)));
-    format!("{sum:016x}")
+    std::env::current_exe().map(|exe| tool::mark(&exe)).unwrap_or_default()
 }
 
 /// Asks the tool about the carrier, or reads what it said before. `fixed`: reports that count whatever made them.

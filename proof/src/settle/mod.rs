@@ -1,12 +1,14 @@
 //! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside it, in the same time of motion, random
 //! multisines and the set of `characterise`.
 
+mod earlier;
 mod plants;
 mod table;
 
 use crate::options::Options;
 use crate::pool;
 use crate::stats::Rate;
+use crate::tool::mark;
 use plants::{Base, Kind, Plant};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -32,6 +34,8 @@ struct Answer {
 
 /// A plant with the answer by each source of inputs.
 struct Judged {
+    /// Its place among those of the seed.
+    index: usize,
     kind: Kind,
     names: Vec<&'static str>,
     answers: Vec<Answer>,
@@ -116,29 +120,39 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         .map(|index| (index, plants::draw(&base, options.seed, index)))
         .filter(|(index, plant)| is_wanted(options.only.as_deref(), *index, plant))
         .collect();
-    let inputs = &options.inputs;
-    let work = |(index, plant): &(usize, Plant)| {
-        let folder = out.join(format!("plant-{index}"));
-        let answers = settle(&program, plant, inputs, options.seed + *index as u64, &folder);
-        if options.keep.is_none() {
-            // Recordings of a plant take 100 MB.
-            let _ = std::fs::remove_dir_all(&folder);
-        }
-        Judged { kind: plant.kind, names: plant.names.clone(), answers }
+    let mark = mark(&program);
+    let mut known = earlier::answers(options, &mark);
+    if !known.is_empty() {
+        println!("{} plants were judged before, by the same program.", known.len());
+    }
+    let plants: Vec<(usize, Plant, Option<Vec<Answer>>)> =
+        plants.into_iter().map(|(index, plant)| (index, plant, known.remove(&index))).collect();
+    let work = |(index, plant, known): &(usize, Plant, Option<Vec<Answer>>)| {
+        let asked = || {
+            let folder = out.join(format!("plant-{index}"));
+            let answers = settle(&program, plant, &options.inputs, options.seed + *index as u64, &folder);
+            if options.keep.is_none() {
+                // Recordings of a plant take 100 MB.
+                let _ = std::fs::remove_dir_all(&folder);
+            }
+            answers
+        };
+        let answers = known.clone().unwrap_or_else(asked);
+        Judged { index: *index, kind: plant.kind, names: plant.names.clone(), answers }
     };
     // A report that cannot be written now is tried again after the next plant; the last failure is told.
-    let save = |judged: &[Option<Judged>]| drop(write(options, judged, count));
+    let save = |judged: &[Option<Judged>]| drop(write(options, judged, count, &mark));
     let judged = pool::map_and_save(options.jobs, options.budget(), "settled", &plants, work, save);
-    print!("{}", write(options, &judged, count)?);
+    print!("{}", write(options, &judged, count, &mark)?);
     Ok(())
 }
 
 /// Writes `settle.json` and `settle.md` about the plants that are judged; returns the latter.
-fn write(options: &Options, judged: &[Option<Judged>], count: usize) -> Result<String, String> {
+fn write(options: &Options, judged: &[Option<Judged>], count: usize, mark: &str) -> Result<String, String> {
     let judged: Vec<&Judged> = judged.iter().flatten().collect();
     let text = table::markdown(&judged, &options.inputs, options.seed, count);
     let all: Vec<Value> = judged.iter().map(|plant| json_of(plant, &options.inputs)).collect();
-    let json = json!({ "seed": options.seed, "drawn": count, "plants": all });
+    let json = json!({ "seed": options.seed, "drawn": count, "program": mark, "plants": all });
     crate::write_out(options, "settle.md", &text)?;
     crate::write_out(options, "settle.json", &crate::pretty(&json)?)?;
     Ok(text)
@@ -166,7 +180,7 @@ fn json_of(plant: &Judged, inputs: &[&str]) -> Value {
         })
     };
     let answers: Vec<Value> = inputs.iter().zip(&plant.answers).map(answer).collect();
-    json!({ "kind": plant.kind.words(), "truth": plant.names, "answers": answers })
+    json!({ "plant": plant.index, "kind": plant.kind.words(), "truth": plant.names, "answers": answers })
 }
 
 /// `host-sim`, beside this program.

@@ -129,8 +129,8 @@ pub(crate) trait EffectSearch {
         false
     }
 
-    /// True if it is told by what the command does fast, or by the command's scale.
-    fn is_of_command(&self) -> bool {
+    /// True if it does not show in motion whose inertia hardly matters: a joint, or the gain, which is then the scale of all else.
+    fn needs_inertia(&self) -> bool {
         false
     }
 

@@ -62,9 +62,6 @@ pub(crate) fn columns(
     asked: &Asked,
 ) -> Option<Columns> {
     let definition = effect.name.definition();
-    if definition.coupling().is_some() {
-        return None;
-    }
     let scale = Scale::of(nominal);
     if let Some(law) = CommandLaw::new(effect) {
         let column =
@@ -192,6 +189,16 @@ mod tests {
         assert!(is_judged(N::CoulombFriction, 0.0), "it turns back");
         assert!(!is_judged(N::CoulombFriction, 40_000.0), "a constant is each recording's own offset");
         assert!(is_judged(N::QuadraticDrag, 40_000.0), "it changes with the speed");
+    }
+
+    #[test]
+    fn a_joint_that_was_found_is_judged() {
+        let gap = Effect::shaped(
+            N::Backlash,
+            &[("gap", 0.05), ("coast", 1.0), ("contact_hz", 180.0), ("ratio", 1.0), ("dry", 2.0)],
+        );
+        let columns = of_axis(&gap, 0.0, 0.0).expect("a regression has this law");
+        assert!(columns.of[0][0].iter().any(|x| *x != 0.0), "the gap opens at reversals");
     }
 
     #[test]

@@ -145,6 +145,9 @@ impl<'a> State<'a> {
     /// The shape of an effect that takes most on stretches left out of the fit.
     fn best_shape(&self, name: N) -> Option<Columns> {
         let on = self.on;
+        if name.definition().coupling().is_some() {
+            return None;
+        }
         let grid = candidates::shapes(name, on.context.span, on.context.nominal);
         let tried = grid.iter().filter_map(|effect| {
             let columns = self.columns(effect)?;

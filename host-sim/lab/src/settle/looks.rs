@@ -6,8 +6,8 @@ use super::Name;
 /// Confidence below which a diagnosis names nothing.
 const LEAST: f64 = 2.0 / 3.0;
 
-/// The part of the error that a run may make that its first diagnosis takes; the others share the rest.
-const FIRST: f64 = 0.5;
+/// The part of the error that a run may still make that each of its diagnoses takes: the first half of all, the last what is left.
+const SPENT: f64 = 0.5;
 
 /// Names of the last round with a confidence that counts the looks of a run of at most `most` rounds, and those that are then too unsure
 /// to be names.
@@ -27,8 +27,8 @@ pub(super) fn corrected(rounds: &[Vec<Name>], most: usize) -> (Vec<Name>, Vec<Na
 fn share(round: usize, most: usize) -> f64 {
     match (round, most) {
         (_, 0 | 1) => 1.0,
-        (1, _) => FIRST,
-        _ => (1.0 - FIRST) / (most - 1) as f64,
+        (round, most) if round >= most => (1.0 - SPENT).powi(most as i32 - 1),
+        (round, _) => SPENT * (1.0 - SPENT).powi(round as i32 - 1),
     }
 }
 
@@ -63,13 +63,17 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_comes_up_late_counts_eight_times() {
+    fn a_name_counts_the_more_the_later_it_comes_up() {
         let rounds = [vec![], vec![name(&["cogging"], 0.9)], vec![], vec![], vec![name(&["cogging"], 0.78)]];
         let (names, unsure) = corrected(&rounds, 5);
         assert!(names.is_empty());
         assert!(unsure[0].confidence < 0.01);
         let (names, _) = corrected(&[vec![], vec![name(&["cogging"], 0.98)]], 5);
-        assert!((names[0].confidence - 0.84).abs() < 1e-12);
+        assert!((names[0].confidence - 0.92).abs() < 1e-12, "four times in the second round");
+        for most in 1..=5 {
+            let all: f64 = (1..=most).map(|round| share(round, most)).sum();
+            assert!((all - 1.0).abs() < 1e-12, "{most} rounds");
+        }
     }
 
     /// A run stops at the first of five looks that gives a name; where nothing is there, each look gives one with the probability that
