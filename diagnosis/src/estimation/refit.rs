@@ -336,11 +336,12 @@ mod tests {
 
     #[test]
     fn a_reversal_that_is_driven_through_allows_any_force() {
-        // Half a radian at 8 rad/s by the command that this takes, against a friction of a thirtieth of it.
+        // Half a radian at 8 rad/s by the command that this takes, against a friction of a thirtieth of it, and shaken by a force as large.
+        let position = |row: f64| 500.0 * (row * 0.02).cos() + 3.0 * (row * 0.05).cos();
         let recording = Recording {
             time_s: (0..800).map(|row| f64::from(row) * 2.5e-3).collect(),
             command: (0..800).map(|row| -0.01 * 32.0 / 0.1 * (f64::from(row) * 0.02).cos()).collect(),
-            position_counts: (0..800).map(|row| (500.0 * (f64::from(row) * 0.02).cos()).round()).collect(),
+            position_counts: (0..800).map(|row| position(f64::from(row)).round()).collect(),
             ..Recording::default()
         };
         let rig = Rig::of_values(0.01, 0.0, 0.01);
