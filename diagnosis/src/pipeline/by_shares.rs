@@ -167,14 +167,23 @@ fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
     out_of_library::alone(&context, &refit, &found.holdout).is_some()
 }
 
+/// True for a law that lets the command act later.
+fn is_late(effect: &Effect) -> bool {
+    matches!(CommandLaw::new(effect), Some(CommandLaw::Delay { .. } | CommandLaw::Lag { .. }))
+}
+
 /// True if a regression can judge all that was found, and it leaves clearly less than what was selected. A law that reshapes or scales the
-/// recorded command shrinks what is to be explained, so what it leaves says nothing here, unless it scales the command and was selected too.
+/// recorded command shrinks what is to be explained, so what it leaves says nothing here, unless it scales the command and was selected too,
+/// or is one of two that let it act later.
 fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
     let model = &found.standing.model.model;
     let own: &[Effect] = &model.effects;
     let is_selected = |effect: &Effect| Material::is_of_class(&selected.standing.materials, effect.name);
+    let is_late_too =
+        |effect: &Effect| is_late(effect) && selected.standing.model.model.effects.iter().any(is_late);
     let is_comparable = |effect: &Effect| {
-        !is_by_command(effect) || (CommandLaw::new(effect).is_none() && is_selected(effect))
+        let scales_as_selected = CommandLaw::new(effect).is_none() && is_selected(effect);
+        !is_by_command(effect) || scales_as_selected || is_late_too(effect)
     };
     let is_judged = own.iter().all(is_comparable) && selection.judges(own);
     // Both fitted, and both judged, under one noise.
