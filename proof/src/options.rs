@@ -98,8 +98,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
   --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines
                 and the set of characterise in the same time of motion; settle.json and settle.md in the folder of --out.
-                --keep DIR leaves the recordings. Plants that settle.json there has of the same seed, inputs and program are not settled
-                again
+                --keep DIR leaves the recordings. A run of the same seed, inputs and programs that was stopped goes on; with --only,
+                plants are settled anew and their report takes its place
   --inputs A,B  with --settle: only these of designed, multisines and characterise; the first sets the time of motion
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left

@@ -70,7 +70,8 @@ const ONE_WAY: usize = 4;
 /// friction changes its sign then hardly matters.
 const DRIVEN: f64 = 10.0;
 
-/// Part of the dry friction that is not known in the block of a reversal: the speed changes its sign there at a time that two blocks tell.
+/// Part of the dry friction that is not known in the block of a reversal, because the speeds of two blocks tell only roughly when the
+/// axis turns back. Set by hand: a tenth of a block too early or too late changes the mean friction by twice that part.
 const UNSURE: f64 = 0.2;
 
 /// True if the disturbance is larger than what is not known of the friction at a reversal, so that such blocks may judge a model.

@@ -19,7 +19,7 @@ pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Re
 }
 
 /// True if the patched simulation follows the motion less well than the refitted one in windows of half a second or less, in the geometric
-/// mean over their lengths: an error of the measured speed at the start may hide in the shortest what the others show.
+/// mean over their lengths: a wrong starting speed may spoil the shortest windows of the better simulation.
 pub(crate) fn follows_worse(simulation: &Simulation) -> bool {
     let short = simulation.windows.iter().filter(|w| w.seconds <= 0.5);
     let both = short.filter_map(|w| w.position.patched.zip(w.position.refit));

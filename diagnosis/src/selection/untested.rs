@@ -19,7 +19,7 @@ fn why(name: EffectName, span: &Span, nominal: &Nominal) -> Option<String> {
         return None;
     }
     if !candidates::is_seen(name, nominal) {
-        return Some("it shows only where the inertia matters, which hardly does in this motion".into());
+        return Some("it shows only where the inertia matters, and in this motion it hardly does".into());
     }
     if definition.is_periodic() {
         let needed = periodic::travel_needed(span, nominal)?;

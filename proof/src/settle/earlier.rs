@@ -1,13 +1,16 @@
 //! Answers of an earlier run of the same seed into the same folder: a run that was stopped goes on where it was.
 
-use super::Answer;
+use super::{Answer, names};
 use crate::options::Options;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Answers per plant in the `settle.json` of the folder of `--out`; none if there is no such file or it is of another seed, or if
-/// the run has other inputs or is of another program.
+/// Answers per plant in the `settle.json` of the folder of `--out`; none if there is no such file, if it is of another seed, of
+/// other inputs or of another program, or if only some plants are asked for: these are settled anew.
 pub(super) fn answers(options: &Options, program: &str) -> BTreeMap<usize, Vec<Answer>> {
+    if options.only.is_some() {
+        return BTreeMap::new();
+    }
     let text = std::fs::read_to_string(options.out.join("settle.json")).unwrap_or_default();
     let Ok(value) = serde_json::from_str::<Value>(&text) else { return BTreeMap::new() };
     if value["seed"] != options.seed || value["program"] != program {
@@ -19,10 +22,10 @@ pub(super) fn answers(options: &Options, program: &str) -> BTreeMap<usize, Vec<A
         .collect()
 }
 
-/// The answers to a plant by each of `inputs`; none if it has others.
+/// The answers to a plant by each of `inputs`; none if it has others, or one that failed.
 fn of(plant: &Value, inputs: &[&str]) -> Option<Vec<Answer>> {
     let answers = plant["answers"].as_array()?;
-    let is_of = |(answer, source): (&Value, &&str)| answer["inputs"] == **source;
+    let is_of = |(answer, source): (&Value, &&str)| answer["inputs"] == **source && answer["error"].is_null();
     if answers.len() != inputs.len() || !answers.iter().zip(inputs).all(is_of) {
         return None;
     }
@@ -30,15 +33,11 @@ fn of(plant: &Value, inputs: &[&str]) -> Option<Vec<Answer>> {
 }
 
 fn one(answer: &Value) -> Option<Answer> {
-    let name = |name: &Value| {
-        let class = name["class"].as_array()?.iter().map(|one| Some(one.as_str()?.to_owned()));
-        Some((class.collect::<Option<_>>()?, name["confidence"].as_f64()?))
-    };
     Some(Answer {
-        names: answer["names"].as_array()?.iter().map(name).collect::<Option<_>>()?,
+        names: names(answer)?,
         rounds: answer["rounds"].as_u64()? as usize,
         motion_s: answer["motion_s"].as_f64()?,
-        error: answer["error"].as_str().map(str::to_owned),
+        error: None,
     })
 }
 
@@ -53,7 +52,8 @@ mod tests {
         let text = r#"{ "seed": 7, "program": "a", "plants": [
             { "plant": 3, "answers": [{ "inputs": "designed", "names": [{ "class": ["cogging"], "confidence": 0.9 }],
                                         "rounds": 2, "motion_s": 56.0, "error": null }] },
-            { "plant": 4, "answers": [{ "inputs": "multisines", "names": [], "rounds": 1, "motion_s": 24.0, "error": null }] }] }"#;
+            { "plant": 4, "answers": [{ "inputs": "multisines", "names": [], "rounds": 1, "motion_s": 24.0, "error": null }] },
+            { "plant": 5, "answers": [{ "inputs": "designed", "names": [], "rounds": 0, "motion_s": 0.0, "error": "killed" }] }] }"#;
         std::fs::write(folder.0.join("settle.json"), text).expect("it is written");
         let of = |seed, program| {
             let options =
@@ -61,7 +61,7 @@ mod tests {
             answers(&options, program)
         };
         let known = of(7, "a");
-        assert_eq!(known.keys().collect::<Vec<_>>(), [&3], "plant 4 met other inputs");
+        assert_eq!(known.keys().collect::<Vec<_>>(), [&3], "plant 4 met other inputs, and plant 5 failed");
         assert_eq!((known[&3][0].rounds, known[&3][0].names[0].1), (2, 0.9));
         assert!(of(8, "a").is_empty() && of(7, "b").is_empty());
     }

@@ -45,12 +45,8 @@ impl Answer {
     /// Reads `settle.json`.
     fn parse(text: &str) -> Option<Self> {
         let value: Value = serde_json::from_str(text).ok()?;
-        let one = |name: &Value| {
-            let class = name["class"].as_array()?.iter().filter_map(|n| Some(n.as_str()?.to_owned()));
-            Some((class.collect(), name["confidence"].as_f64()?))
-        };
         Some(Self {
-            names: value["names"].as_array()?.iter().map(one).collect::<Option<_>>()?,
+            names: names(&value)?,
             rounds: value["rounds"].as_array()?.len(),
             motion_s: value["motion_s"].as_f64()?,
             error: None,
@@ -68,6 +64,15 @@ impl Answer {
         let is_true = |name: &String| truth.contains(&name.as_str());
         self.names.iter().any(|(class, sure)| *sure >= SURE && !class.iter().any(is_true))
     }
+}
+
+/// Names with their class and confidence in the JSON of an answer.
+fn names(answer: &Value) -> Option<Vec<(Vec<String>, f64)>> {
+    let one = |name: &Value| {
+        let class = name["class"].as_array()?.iter().filter_map(|n| Some(n.as_str()?.to_owned()));
+        Some((class.collect(), name["confidence"].as_f64()?))
+    };
+    answer["names"].as_array()?.iter().map(one).collect()
 }
 
 /// Figures of one source of inputs.
@@ -120,37 +125,49 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         .map(|index| (index, plants::draw(&base, options.seed, index)))
         .filter(|(index, plant)| is_wanted(options.only.as_deref(), *index, plant))
         .collect();
-    let mark = mark(&program);
-    let mut known = earlier::answers(options, &mark);
-    if !known.is_empty() {
-        println!("{} plants were judged before, by the same program.", known.len());
-    }
-    let plants: Vec<(usize, Plant, Option<Vec<Answer>>)> =
-        plants.into_iter().map(|(index, plant)| (index, plant, known.remove(&index))).collect();
-    let work = |(index, plant, known): &(usize, Plant, Option<Vec<Answer>>)| {
-        let asked = || {
-            let folder = out.join(format!("plant-{index}"));
-            let answers = settle(&program, plant, &options.inputs, options.seed + *index as u64, &folder);
-            if options.keep.is_none() {
-                // Recordings of a plant take 100 MB.
-                let _ = std::fs::remove_dir_all(&folder);
-            }
-            answers
-        };
-        let answers = known.clone().unwrap_or_else(asked);
-        Judged { index: *index, kind: plant.kind, names: plant.names.clone(), answers }
+    let mark = marks(&program);
+    let mut answers = earlier::answers(options, &mark);
+    let judged = |(index, plant): &(usize, Plant), answers| Judged {
+        index: *index,
+        kind: plant.kind,
+        names: plant.names.clone(),
+        answers,
+    };
+    let known: Vec<Judged> =
+        plants.iter().filter_map(|one| Some(judged(one, answers.remove(&one.0)?))).collect();
+    let is_known = |index: usize| known.iter().any(|plant| plant.index == index);
+    let left: Vec<(usize, Plant)> = plants.iter().filter(|(index, _)| !is_known(*index)).cloned().collect();
+    let work = |one: &(usize, Plant)| {
+        let (index, plant) = one;
+        let folder = out.join(format!("plant-{index}"));
+        let answers = settle(&program, plant, &options.inputs, options.seed + *index as u64, &folder);
+        if options.keep.is_none() {
+            // Recordings of a plant take 100 MB.
+            let _ = std::fs::remove_dir_all(&folder);
+        }
+        judged(one, answers)
+    };
+    let write_all = |new: &[Option<Judged>]| {
+        let mut all: Vec<&Judged> = known.iter().chain(new.iter().flatten()).collect();
+        all.sort_by_key(|plant| plant.index);
+        write(options, &all, count, &mark)
     };
     // A report that cannot be written now is tried again after the next plant; the last failure is told.
-    let save = |judged: &[Option<Judged>]| drop(write(options, judged, count, &mark));
-    let judged = pool::map_and_save(options.jobs, options.budget(), "settled", &plants, work, save);
-    print!("{}", write(options, &judged, count, &mark)?);
+    let save = |new: &[Option<Judged>]| drop(write_all(new));
+    let new = pool::map_and_save(options.jobs, options.budget(), "settled", &left, work, save);
+    print!("{}", write_all(&new)?);
     Ok(())
 }
 
+/// Marks of the program that is judged and of this one, which draws the plants.
+fn marks(program: &Path) -> String {
+    let own = std::env::current_exe().map(|own| mark(&own)).unwrap_or_default();
+    format!("{} {own}", mark(program))
+}
+
 /// Writes `settle.json` and `settle.md` about the plants that are judged; returns the latter.
-fn write(options: &Options, judged: &[Option<Judged>], count: usize, mark: &str) -> Result<String, String> {
-    let judged: Vec<&Judged> = judged.iter().flatten().collect();
-    let text = table::markdown(&judged, &options.inputs, options.seed, count);
+fn write(options: &Options, judged: &[&Judged], count: usize, mark: &str) -> Result<String, String> {
+    let text = table::markdown(judged, &options.inputs, options.seed, count);
     let all: Vec<Value> = judged.iter().map(|plant| json_of(plant, &options.inputs)).collect();
     let json = json!({ "seed": options.seed, "drawn": count, "program": mark, "plants": all });
     crate::write_out(options, "settle.md", &text)?;
