@@ -82,7 +82,8 @@ pub(crate) const LEADS_Z: f64 = 1.0;
 pub(crate) const BEHIND_NATS: f64 = 3.0;
 /// The same as a part of the effect's gain: a smaller lead comes from the form of a law, not from its name.
 pub(crate) const BEHIND_PART: f64 = 0.015;
-/// Nats under a slow disturbance by which a rival is behind whatever a white one says, if it is by half of the winner's gain there.
+/// Nats by which a rival must be behind under coloured noise to be excluded, whatever white noise gives; half of the winner's gain is
+/// needed too.
 pub(crate) const BEHIND_SLOW_NATS: f64 = 30.0;
 /// z that such a rival counts as behind by.
 pub(crate) const BEHIND_SLOW_Z: f64 = 4.0;
@@ -119,7 +120,8 @@ pub(crate) const DRIFT: Range<f64> = -0.95..3.0;
 pub(crate) const BRISTLES: f64 = 0.03;
 /// A value within this part of a bound counts as at the bound.
 pub(crate) const AT_END: f64 = 0.05;
-/// Part of what the refit leaves that swings at a frequency of its own and that effects have taken on, from which they count as mistaken for it.
+/// Part of the refit's residual, at one frequency that does not follow the axis, from which effects that explain it are rejected as
+/// standing for that oscillation.
 pub(crate) const MISTAKEN: f64 = 0.2;
 
 /// Residual of a model, over that of a motion read in whole counts, from which other physics limits, not noise, and shares decide: it

@@ -48,9 +48,10 @@ export class GuideSteps {
   }
 }
 
-function show(item, { text, moves, stage }) {
+function show(item, { text, moves, stage, news }) {
   write(item.querySelector(".text"), text);
   write(item.querySelector(".going"), moves ? GOING.motor : GOING.hand);
+  write(item.querySelector(".news"), news);
   item.toggleAttribute("data-moves", moves);
   if (item.dataset.stage === stage) return;
   item.dataset.stage = stage;

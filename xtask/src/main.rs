@@ -35,8 +35,9 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
-                                fmt words clippy firmware unit doc board wasm site browser clients fuzz prove
-  cargo xtask test --quick      the inner loop: format, warnings, the tests inside the crates; three minutes
+                                fmt words arrows clippy firmware unit doc board wasm site browser clients fuzz
+                                prove
+  cargo xtask test --quick      the inner loop: format, words, arrows, warnings, the tests inside the crates; three minutes
   cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class counts soak
                                 mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use

@@ -4,6 +4,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, 
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
+use crate::numerics::golden_section::logarithmic;
 
 shape! {
     /// The clip.
@@ -40,8 +41,7 @@ impl EffectLaw for Defined {
 
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let part = |i: i32| span.clip + (0.945 - span.clip) / 9.0 * f64::from(i);
-        let limits: Vec<f64> = (0..10).map(|i| span.command * part(i)).collect();
+        let limits: Vec<f64> = logarithmic(span.clip * span.command, 0.945 * span.command, 10);
         let hard = limits.iter().map(|&limit| Effect::shaped(name, &[("limit", limit)]));
         let soft =
             limits.iter().map(|&limit| Effect::shaped(name, &[("limit", limit), ("softness", SOFTNESS)]));

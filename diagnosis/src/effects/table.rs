@@ -137,6 +137,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn is_sought(&self) -> bool {
+        false
+    }
     /// It is no candidate: what has no name is sought by its form.
     fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
         Vec::new()

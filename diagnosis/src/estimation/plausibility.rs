@@ -180,6 +180,40 @@ fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
     None
 }
 
+/// Factor between the inertia for which one recording asks and that of the others from which they are of other units: no load that is
+/// changed between recordings makes as much.
+const ANOTHER_UNIT: f64 = 5.0;
+
+/// The recording whose force and motion are of other units than those of the others, as a sentence with its place; of two, the one that
+/// is farther from the rig.
+pub(crate) fn odd_one(all: &[&Recording], rig: &Rig) -> Option<(usize, String)> {
+    let asked = |recording: &&Recording| {
+        let (inertia, explained) = Smoothed::new(recording, rig).inertia()?;
+        (explained > EXPLAINED && inertia > 0.0).then(|| inertia.ln())
+    };
+    let inertias: Vec<f64> = all.iter().map(asked).collect::<Option<_>>()?;
+    let mut sorted = inertias.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = if all.len() > 2 { sorted[sorted.len() / 2] } else { rig.model.inertia.ln() };
+    let far = |i: &usize| (inertias[*i] - usual).abs();
+    let odd = (0..all.len()).max_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let from_others = |i: usize| inertias[odd] - inertias[i];
+    let nearest = (0..all.len())
+        .filter(|i| *i != odd)
+        .map(from_others)
+        .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+        .filter(|apart| apart.abs() > ANOTHER_UNIT.ln())?;
+    let (factor, than) =
+        if nearest > 0.0 { (nearest.exp(), "as large as") } else { ((-nearest).exp(), "smaller than") };
+    let file = &all[odd].file;
+    Some((
+        odd,
+        format!(
+            "the force of {file} for its motion is {factor:.0} times {than} in the other recordings: its command or its counts have another unit"
+        ),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -41,42 +41,8 @@ pub(crate) fn effect_inputs(
     if let Some(coupling) = definition.coupling() {
         return vec![of_second_mass(track, coupling, &mut law, command, bias)];
     }
-    let count = law.names().len();
-    let n = track.block_count();
-    let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
-        || effect.name.formula().is_some_and(|formula| formula.uses("u"));
-    let of_drive = effect.shape.contains_key("of_drive");
-    let uses_command = over_command || of_drive || effect.shape.contains_key("mean_square");
-    let carried = uses_command.then(|| track.block_mean(command));
     let scales_drive = definition.scales_drive();
-    let mut columns = vec![Vec::with_capacity(n); count];
-    let mut out = vec![0.0; count];
-    for j in 0..n {
-        let state = State {
-            position: track.motion.x[j],
-            velocity: track.motion.v[j],
-            acceleration: track.acceleration(j),
-            rest: track.motion.rest[j],
-            // What scales the drive scales its whole input below.
-            drive: carried.as_ref().filter(|_| !scales_drive).map_or(1.0, |carried| carried[j]),
-            command: carried.as_ref().map_or(1.0, |carried| carried[j]),
-            tilt: track.tilt_at(j),
-            external: track.force_at(j),
-            time: track.blocks.start[j] + 0.5 * track.blocks.span[j],
-            dt: track.blocks.span[j],
-            ..State::default()
-        };
-        let Some(sides) = track.motion.sides(j) else {
-            law.terms(&state, &mut out);
-            columns.iter_mut().zip(&out).for_each(|(column, term)| column.push(*term));
-            continue;
-        };
-        columns.iter_mut().for_each(|column| column.push(0.0));
-        for Side { part, velocity } in sides {
-            law.terms(&State { velocity, dt: part * state.dt, ..state }, &mut out);
-            columns.iter_mut().zip(&out).for_each(|(column, term)| column[j] += part * term);
-        }
-    }
+    let columns = columns_of(track, effect, &mut law, command);
     let sensor = law.in_sensor();
     let drive = scales_drive.then(drive);
     columns
@@ -91,6 +57,57 @@ pub(crate) fn effect_inputs(
             }
         })
         .collect()
+}
+
+/// The terms of a law over the blocks of a recording: a column for each term.
+fn columns_of(track: &BlockedRecording, effect: &Effect, law: &mut Law, command: &[f64]) -> Vec<Vec<f64>> {
+    let count = law.names().len();
+    let n = track.block_count();
+    let carried = uses_command(effect).then(|| track.block_mean(command));
+    // What scales the drive scales its whole input, and not the command here.
+    let scales_drive = effect.name.definition().scales_drive();
+    let mut columns = vec![Vec::with_capacity(n); count];
+    let mut out = vec![0.0; count];
+    for j in 0..n {
+        let state = State {
+            drive: carried.as_ref().filter(|_| !scales_drive).map_or(1.0, |carried| carried[j]),
+            command: carried.as_ref().map_or(1.0, |carried| carried[j]),
+            ..state_of_block(track, j)
+        };
+        let Some(sides) = track.motion.sides(j) else {
+            law.terms(&state, &mut out);
+            columns.iter_mut().zip(&out).for_each(|(column, term)| column.push(*term));
+            continue;
+        };
+        columns.iter_mut().for_each(|column| column.push(0.0));
+        for Side { part, velocity } in sides {
+            law.terms(&State { velocity, dt: part * state.dt, ..state }, &mut out);
+            columns.iter_mut().zip(&out).for_each(|(column, term)| column[j] += part * term);
+        }
+    }
+    columns
+}
+
+/// True if a law reads the command beside the motion.
+fn uses_command(effect: &Effect) -> bool {
+    let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
+        || effect.name.formula().is_some_and(|formula| formula.uses("u"));
+    over_command || effect.shape.contains_key("of_drive") || effect.shape.contains_key("mean_square")
+}
+
+/// The state of the axis in block `j`, without its command.
+fn state_of_block(track: &BlockedRecording, j: usize) -> State {
+    State {
+        position: track.motion.x[j],
+        velocity: track.motion.v[j],
+        acceleration: track.acceleration(j),
+        rest: track.motion.rest[j],
+        tilt: track.tilt_at(j),
+        external: track.force_at(j),
+        time: track.blocks.start[j] + 0.5 * track.blocks.span[j],
+        dt: track.blocks.span[j],
+        ..State::default()
+    }
 }
 
 /// The input of a second mass, which is faster than a block.

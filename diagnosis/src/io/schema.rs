@@ -252,7 +252,7 @@ pub struct Report {
     pub noise_floor: f64,
     /// Part of the held-out mean square above the noise that the patched model leaves.
     pub unexplained_fraction: f64,
-    /// Every hypothesis that was looked at closely.
+    /// Every effect that was tested, with the outcome.
     pub hypotheses: Vec<Hypothesis>,
     /// Effects that these recordings could not show.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]

@@ -21,7 +21,11 @@ const FEWEST_COUNTS: f64 = 100.0;
 /// The reason why recordings cannot tell, if there is one; short ones tell together what none tells alone.
 pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
     if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
-        return Some(reason);
+        let enough = fit.iter().chain(holdout).filter(|recording| alone(recording).is_none());
+        return Some(with_usable(
+            reason,
+            &enough.map(|recording| recording.file.as_str()).collect::<Vec<_>>(),
+        ));
     }
     let pooled = |all: &[Recording], least: f64, what: &str| {
         let seconds: f64 = all.iter().map(Recording::duration_s).sum();
@@ -37,6 +41,15 @@ pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<Str
         })
     };
     pooled(fit, SHORTEST_S, "to fit on").or_else(|| pooled(holdout, SHORTEST_HOLDOUT_S, "to judge by"))
+}
+
+/// A sentence on a recording that cannot be used, with the files that still could.
+pub(crate) fn with_usable(sentence: String, usable: &[&str]) -> String {
+    match usable.split_last() {
+        None => sentence,
+        Some((one, [])) => format!("{sentence}; {one} could still be used"),
+        Some((last, more)) => format!("{sentence}; {} and {last} could still be used", more.join(", ")),
+    }
 }
 
 /// The reason why one recording tells too little.

@@ -7,8 +7,10 @@ use super::verdict::misfit;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::model::Model;
 use crate::estimation::refit::is_driven;
+use crate::io::schema::FitTable;
 use crate::selection::context::FittedModel;
 use crate::selection::excitation::Excitation;
+use crate::thresholds::MATERIAL;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence_pass::{Scales, WeighedModel, weigh};
 use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
@@ -61,6 +63,10 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let (unnamed, fitted) = unnamed.map_or((None, None), |(unnamed, fitted)| (Some(unnamed), fitted));
     let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
     let with_unnamed = fitted.map(show);
+    // A form that lowers no error on recordings it was not fitted to explains nothing.
+    let lowers = |shown: &Shown| shown.table.patched.holdout < shown.table.refit.holdout;
+    let helps = with_unnamed.as_ref().is_none_or(lowers);
+    let (unnamed, with_unnamed) = if helps { (unnamed, with_unnamed) } else { (None, None) };
     let foreign = nothing_named.then(|| out_of_library::alone(&context, &refit, &holdout)).flatten();
     Ok(Assessment {
         fit,
@@ -76,14 +82,24 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     })
 }
 
+/// True if a model takes a material part off the held-out force error of the refit.
+pub(super) fn is_material(table: &FitTable) -> bool {
+    table.patched.holdout <= (1.0 - MATERIAL) * table.refit.holdout
+}
+
 /// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in no
-/// patched rig. An effect that has no size without the others is not named either.
+/// patched rig. An effect that has no size without the others is not named either, nor are effects that together take no material part
+/// off the held-out force error.
 fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
     let Scales { context, refit, null, holdout, .. } = *scales;
     loop {
         let named = weighed.named();
         if named.len() == weighed.effects.len() {
-            return None;
+            if named.is_empty() || is_material(&weighed.shown.table) {
+                return None;
+            }
+            weighed.weakest_is_immaterial(part_off(&weighed.shown.table));
+            continue;
         }
         let last = &weighed.slow;
         let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
@@ -100,9 +116,20 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
         };
         let gone: Vec<usize> =
             named.iter().enumerate().filter(|(place, _)| !is_there(*place)).map(|(_, i)| *i).collect();
-        if gone.is_empty() {
-            return Some(Shown::new(context, &holdout.smoothed, &weighed.estimator, refit, patched));
+        if !gone.is_empty() {
+            weighed.have_no_size(&gone);
+            continue;
         }
-        weighed.have_no_size(&gone);
+        let shown = Shown::new(context, &holdout.smoothed, &weighed.estimator, refit, patched);
+        if named.is_empty() || is_material(&shown.table) {
+            return Some(shown);
+        }
+        weighed.weakest_is_immaterial(part_off(&shown.table));
     }
+}
+
+/// The part that a model takes off the held-out force error of the refit.
+fn part_off(table: &FitTable) -> f64 {
+    // A residual that is no number takes nothing off.
+    (1.0 - table.patched.holdout / table.refit.holdout.max(1e-300)).max(f64::MIN)
 }

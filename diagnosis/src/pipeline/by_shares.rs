@@ -108,8 +108,8 @@ fn shown(prepared: &Prepared, found: &Found) -> Shown {
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
-/// True if shares name something new and leave clearly less of the force than what was found, so that noise does not limit. Where a law
-/// that reshapes the command was found, which shrinks what is to be explained, they have to name every other effect found too.
+/// True if shares name something new and leave clearly less of the force than what was found, so that noise does not limit. A law that
+/// reshapes the command changes the force that is to be explained: where one was found, shares have to confirm every other effect too.
 fn explains_more(selected: &[Selected], own: &[Effect], selection: &Selection) -> bool {
     let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
     let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));

@@ -54,13 +54,18 @@ pub(crate) fn decide(
     let estimator = &assessment.weighed.estimator;
     let mut series = all_series(estimator, &assessment.fit, &shown.on_fit, false);
     series.extend(all_series(estimator, smoothed, &shown.on_holdout, true));
+    let effects = decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse));
+    // What is named was tested, if not in every order.
+    let is_open = |(name, _): &(EffectName, String)| effects.iter().all(|one| !one.class.contains(name));
+    let untested =
+        untested::untested(&prepared.span, &prepared.nominal).into_iter().filter(is_open).collect::<Vec<_>>();
     let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
     Diagnosis::Complete(Box::new(Complete {
         verdict,
         reason,
-        effects: decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse)),
-        untested: untested::untested(&prepared.span, &prepared.nominal),
-        hypotheses: hypotheses(&assessment.weighed),
+        effects,
+        hypotheses: hypotheses(&assessment.weighed, &untested, &prepared.nominal),
+        untested,
         contenders: contenders(prepared, assessment),
         errors: shown.table.clone(),
         moved: moved(&prepared.nominal, &shown.patched.fit),
@@ -117,6 +122,7 @@ impl Decision<'_> {
                 &on(fit, on_fit),
                 &on(&holdout.smoothed, on_holdout),
                 &weighed.estimator,
+                self.prepared.nominal.rig.turn(),
             )
             .map(|(what, part)| Reason::Follows { what, part })
         };
@@ -187,8 +193,13 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
     if before > 0.0 { (left / before).min(1.0) } else { 0.0 }
 }
 
-/// Returns the weighed effects, their rivals, and the hypotheses that were rejected on the way, each effect once.
-fn hypotheses(weighed: &WeighedModel) -> Vec<JudgedHypothesis> {
+/// Returns the weighed effects, their rivals, the hypotheses that were rejected on the way, and what no score singled out, each effect once.
+/// With those that could not be tested and those of the rig it is the whole library.
+fn hypotheses(
+    weighed: &WeighedModel,
+    untested: &[(EffectName, String)],
+    nominal: &Nominal,
+) -> Vec<JudgedHypothesis> {
     let of_effect = |effect: &WeighedEffect| JudgedHypothesis {
         name: effect.found.effect.name,
         holdout_gain: Some(effect.found.holdout.sum),
@@ -217,6 +228,12 @@ fn hypotheses(weighed: &WeighedModel) -> Vec<JudgedHypothesis> {
     }
     for rejected in &weighed.rejected {
         lost(rejected.name, rejected.holdout_gain, rejected.why.clone());
+    }
+    let is_tested = |name: &EffectName| untested.iter().all(|(other, _)| other != name);
+    let is_in_question =
+        |name: &&EffectName| name.definition().is_sought() && is_tested(name) && !nominal.holds(**name);
+    for name in EffectName::ALL.iter().filter(is_in_question) {
+        lost(*name, None, Rejection::LowScore);
     }
     out
 }

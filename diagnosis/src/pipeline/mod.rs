@@ -21,7 +21,6 @@ use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
-use crate::thresholds::MATERIAL;
 use assess::Assessment;
 use by_shares::{ByShares, by_shares, confirmed};
 use diagnosis::{Diagnosis, Reason};
@@ -92,8 +91,7 @@ fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> O
 
 /// True if the named effects together take a material part off the held-out force error.
 fn lowers_error(one: &Assessment) -> bool {
-    let table = &one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table;
-    table.patched.holdout <= (1.0 - MATERIAL) * table.refit.holdout
+    assess::is_material(&one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table)
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.
@@ -108,10 +106,10 @@ fn unusable(all: &[&Recording], rig: &Rig) -> Option<String> {
             None => usable.push(recording.file.as_str()),
         }
     }
-    let sentence = first?;
-    Some(match usable.split_last() {
-        None => sentence,
-        Some((one, [])) => format!("{sentence}; {one} could still be used"),
-        Some((last, more)) => format!("{sentence}; {} and {last} could still be used", more.join(", ")),
-    })
+    let odd = || {
+        let (place, sentence) = plausibility::odd_one(all, rig)?;
+        usable.remove(place);
+        Some(sentence)
+    };
+    first.or_else(odd).map(|sentence| sufficiency::with_usable(sentence, &usable))
 }

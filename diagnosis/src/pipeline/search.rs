@@ -113,7 +113,7 @@ impl Search<'_> {
             if !next.generalises && before.is_some() {
                 break;
             }
-            // Of two effects as large as each other neither generalises alone: what promises stands until one more step decides.
+            // Two equally large effects each fail alone, so the best candidate is kept for one more step.
             let last = std::mem::replace(&mut now, next.state);
             before = (!next.generalises).then_some(last);
         }

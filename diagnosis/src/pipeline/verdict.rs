@@ -6,7 +6,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::nominal::Nominal;
 use crate::io::schema::Verdict;
 use crate::selection::excitation::Excitation;
-use crate::thresholds::UNDERSTOOD;
+use crate::thresholds::{MATERIAL, UNDERSTOOD};
 use crate::validation::comparison::Shown;
 use crate::validation::confidence_pass::WeighedModel;
 use crate::validation::residual_maps::Map;
@@ -57,7 +57,11 @@ pub(crate) fn verdict(
         .swing
         .filter(|swing| disturbed && swing.is_left_out())
         .map(|swing| Reason::Swing { part: swing.part, hertz: swing.hertz });
-    let resembles = weighed.resembled().map(|(effect, rather)| Reason::Resembles { effect, rather });
+    // What the noise of reading counts hides almost whole is no mismatch, whatever it resembles.
+    let is_seen = weighed.floor < (1.0 - MATERIAL) * table.refit.holdout;
+    let foreign = foreign.filter(|_| is_seen);
+    let resembles = weighed.resembled().filter(|_| is_seen);
+    let resembles = resembles.map(|(effect, rather)| Reason::Resembles { effect, rather });
     if !weighed.named().is_empty() {
         (Verdict::MissingPhysics, None)
     } else if excitation.is_one_speed() {

@@ -161,6 +161,12 @@ fn numbers(out: &mut String, outcome: &Outcome) {
         let [low, high] = f.holdout_gain_ci95.map(|part| (100.0 * part).round() + 0.0);
         let _ = if low > 0.0 {
             write!(out, " From refit to patched the mean square falls by {low:.0} to {high:.0} % (95 %).")
+        } else if high < 0.0 {
+            write!(
+                out,
+                " From refit to patched the mean square rises by {:.0} to {:.0} % (95 %).",
+                -high, -low
+            )
         } else {
             write!(
                 out,

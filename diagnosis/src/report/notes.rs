@@ -4,10 +4,12 @@ use crate::pipeline::diagnosis::Moved;
 
 /// Standard deviations from which a value far from the rig's is told.
 const FAR: f64 = 2.0;
+/// Rows by which commands act early or late from which that is told: a hundredth is the last digit shown.
+const SKEWED: f64 = 0.005;
 
 /// The notes, each a clause.
 pub(crate) fn notes(moved: &Moved) -> Vec<String> {
-    let timing = moved.late_rows.map(timing);
+    let timing = moved.late_rows.filter(|rows| rows.abs() >= SKEWED).map(timing);
     let inertia = (moved.deviations.abs() >= FAR).then(|| inertia(moved));
     timing.into_iter().chain(inertia).collect()
 }
@@ -31,9 +33,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_inertia_is_told_where_it_is_far_and_a_skew_always() {
+    fn an_inertia_is_told_where_it_is_far_and_a_skew_where_it_shows() {
         let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6 };
         assert!(notes(&near).is_empty());
+        assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());
         let both = notes(&Moved { late_rows: Some(-0.5), inertia_by_gain: 0.1, deviations: 3.5 });
         assert!(both[0].contains("0.50 rows before"), "{both:?}");
         assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");

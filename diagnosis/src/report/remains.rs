@@ -52,13 +52,13 @@ fn record_next(report: &Report) -> String {
     }
     match report.verdict {
         Verdict::MissingPhysics => {
-            "nothing to tell these effects apart; another day, other speeds and other loads would show whether they hold"
+            "nothing more is needed; to confirm, record another day at other speeds and loads"
         }
         Verdict::NoMismatch | Verdict::ParametersOnly => {
             "nothing; keep a recording of another day to hold out, as machines change"
         }
         Verdict::Unexplained => {
-            "the same motion twice, then slower and faster: what follows time, speed or place shows by that"
+            "the same motion twice, then slower and faster: the differences show whether the force depends on time, speed or position"
         }
         Verdict::RandomDisturbance => {
             "the same motion twice, with what may move the axis (a hand, a load, the inclination) as `force` or `tilt_rad`"

@@ -60,6 +60,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
         Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
+        Rejection::LowScore => "a score test finds less of it than of the effects that were fitted".into(),
         Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
     }
 }
@@ -78,7 +79,7 @@ fn rather(what: &Rather) -> String {
         Rather::FreeForm { over, form, effect } => {
             let own = if *effect > 0.0 { format!("{effect:.0}") } else { "nothing".to_owned() };
             format!(
-                "a force over {} of a form that it cannot have explains {form:.0} nats of left-out blocks where it explains {own}",
+                "a free-form force over {} gains {form:.0} nats on left-out blocks, and it gains {own}",
                 over.in_words()
             )
         }

@@ -58,7 +58,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         row: seconds / rows,
         block: seconds / blocks,
         count: 1.0 / nominal.rig.encoder.counts_per_unit,
-        clip: if nominal.anchor.is_some() { 0.45 } else { 0.27 },
+        clip: least_clip(tracks, nominal.anchor.is_some(), command, machine.dry / machine.per_command.abs()),
         dead: nominal.most_ignored() * command,
         tilt: varies(tracks.iter().flat_map(|t| column(&t.blocks.tilt))),
         force: varies(tracks.iter().flat_map(|t| column(&t.blocks.force))),
@@ -77,6 +77,28 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
     };
     span.rig.has_stroke = has_stroke(&span, nominal);
     span
+}
+
+/// Smallest part of the largest command at which a drive may clip, where its inertia is known and where it is hardly known.
+const LEAST_CLIP: f64 = 0.27;
+const LEAST_CLIP_ANCHORED: f64 = 0.45;
+/// Times the dry friction that a drive which moves an axis carries at least.
+const CARRIES: f64 = 2.0;
+
+/// The smallest part of the largest command, `most`, at which a drive may clip. How far beyond a clip commands go says nothing of the drive,
+/// as a servo that waits for a clipped drive asks for any amount: a clip may also lie as low as the median command, if that is clearly
+/// more than dry friction, which is `dry` as a command.
+fn least_clip(tracks: &[BlockedRecording], is_anchored: bool, most: f64, dry: f64) -> f64 {
+    if is_anchored {
+        return LEAST_CLIP_ANCHORED;
+    }
+    let mut commands: Vec<f64> = tracks.iter().flat_map(|t| t.rows.command.iter().map(|u| u.abs())).collect();
+    let middle = commands.len() / 2;
+    if dry <= 0.0 || commands.is_empty() {
+        return LEAST_CLIP;
+    }
+    let (_, median, _) = commands.select_nth_unstable_by(middle, f64::total_cmp);
+    (median.max(CARRIES * dry) / most).min(LEAST_CLIP)
 }
 
 fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {

@@ -27,14 +27,30 @@ const FEWEST: usize = 6;
 /// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
 const PER_ORDER: f64 = 8.0;
 
+/// Periods that the travel must hold for an order to be told from a shape along the travel, and the part of a turn that shows a mass off
+/// its centre, whose order is known.
+const PERIODS: f64 = 2.0;
+const MOST_OF_TURN: f64 = 0.6;
+
+/// True if a travel, in turns, shows an order of the turn.
+pub(crate) fn fits(order: f64, turns: f64) -> bool {
+    order * turns >= PERIODS || (order == 1.0 && turns > MOST_OF_TURN)
+}
+
+/// True if a travel, in turns, tells two orders from each other: their beat must go round once.
+pub(crate) fn are_apart(a: f64, b: f64, turns: f64) -> bool {
+    (a - b).abs() * turns >= 1.0
+}
+
 /// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of cycles over the travel.
 fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     let travel = span.travel();
     // A wave must be resolved by the encoder and stay in the band of the filter at slow speed.
     let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
-    if let Some(turn) = nominal.rig.turn().filter(|turn| travel > 0.6 * turn) {
+    if let Some(turn) = nominal.rig.turn() {
         let highest = ((turn / shortest) as usize).clamp(1, HIGHEST);
-        return Some((turn, (1..=highest).map(|n| n as f64).collect()));
+        let orders: Vec<f64> = (1..=highest).map(|n| n as f64).filter(|n| fits(*n, travel / turn)).collect();
+        return (!orders.is_empty()).then_some((turn, orders));
     }
     let most = (travel / shortest).min(MOST_CYCLES);
     // One over the travel is the reference; cycles over the travel play the part of orders.
@@ -42,16 +58,32 @@ fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     (count >= 8).then(|| (travel, (FEWEST..=count).map(|i| 0.5 * i as f64).collect()))
 }
 
-/// Travel that would be needed to look for waves, rad or m; none where there is enough.
-pub(crate) fn travel_needed(span: &Span, nominal: &Nominal) -> Option<f64> {
-    if candidates(span, nominal).is_some() {
-        return None;
+/// The waves that a travel is too short for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum TooShort {
+    /// No turn is known: this travel would be needed for any, rad or m.
+    ForAll(f64),
+    /// The highest order of the turn that is not looked for.
+    ForOrders { up_to: f64 },
+}
+
+/// The waves that are not looked for because the travel is too short; none where all are.
+pub(crate) fn too_short_for(name: N, span: &Span, nominal: &Nominal) -> Option<TooShort> {
+    let all = candidates(span, nominal);
+    match (nominal.rig.turn(), all) {
+        (None, Some(_)) => None,
+        // Three periods of the shortest wave that the encoder resolves.
+        (None, None) => {
+            let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
+            Some(TooShort::ForAll((4.0 * shortest).max(span.travel())))
+        }
+        (Some(turn), _) => {
+            let is_own = |order: &f64| name.definition().is_of_orders(&[*order]);
+            let is_hidden = |order: &f64| is_own(order) && !fits(*order, span.travel() / turn);
+            let order = (1..=HIGHEST).rev().map(|n| n as f64).find(is_hidden)?;
+            Some(TooShort::ForOrders { up_to: order })
+        }
     }
-    let turn = nominal.rig.turn();
-    // Three periods of the shortest wave that the encoder resolves, or most of a turn.
-    let shortest = (6.0 * span.count).max(span.slow * 2.0 * span.block);
-    let by_cycles = 4.0 * shortest;
-    Some(turn.map_or(by_cycles, |turn| by_cycles.min(0.6 * turn)).max(span.travel()))
 }
 
 /// Everything that a search for waves looks at.
@@ -135,7 +167,12 @@ impl<'a> Waves<'a> {
             .map(|r| columns.iter().flat_map(|terms| terms[r].iter().cloned()).collect())
             .collect();
         let sums = self.project(&joined);
-        let (chosen, gain) = forward(&sums, orders.len(), recordings, (self.orders.len() as f64).ln());
+        let turns = self.context.span.travel() / self.turn;
+        let may_join = |chosen: &[usize], order: usize| {
+            !self.whole || chosen.iter().all(|other| are_apart(orders[*other], orders[order], turns))
+        };
+        let looked = (self.orders.len() as f64).ln();
+        let (chosen, gain) = forward(&sums, orders.len(), recordings, looked, &may_join);
         (chosen.iter().map(|i| orders[*i]).collect(), gain)
     }
 
@@ -245,8 +282,14 @@ fn gain_of(sums: &Sums) -> f64 {
     if gain.is_finite() { gain } else { 0.0 }
 }
 
-/// Picks orders one after another while each brings more than it costs.
-fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<usize>, f64) {
+/// Picks orders one after another while each brings more than it costs; `may_join` says which may stand beside those chosen.
+fn forward(
+    sums: &Sums,
+    orders: usize,
+    recordings: usize,
+    looked: f64,
+    may_join: &dyn Fn(&[usize], usize) -> bool,
+) -> (Vec<usize>, f64) {
     let places = |order: usize| -> Vec<usize> {
         (0..recordings).flat_map(|r| [0, 1].map(|i| r * 2 * orders + 2 * order + i)).collect()
     };
@@ -265,7 +308,7 @@ fn forward(sums: &Sums, orders: usize, recordings: usize, looked: f64) -> (Vec<u
     let mut gain = 0.0;
     while chosen.len() < MOST.min(orders) {
         let trials: Vec<(usize, f64)> = (0..orders)
-            .filter(|order| !chosen.contains(order))
+            .filter(|order| !chosen.contains(order) && may_join(&chosen, *order))
             .map(|order| {
                 let mut with = chosen.clone();
                 with.push(order);

@@ -126,6 +126,15 @@ impl WeighedModel {
         }
     }
 
+    /// Marks the least sure of the named effects as immaterial: with all of them a model takes only this part off the held-out force error.
+    pub(crate) fn weakest_is_immaterial(&mut self, part: f64) {
+        let sure = |i: &usize| self.effects[*i].confidence;
+        let weakest = self.named().into_iter().min_by(|a, b| sure(a).total_cmp(&sure(b)));
+        if let Some(i) = weakest {
+            self.effects[i].found.off_force = part;
+        }
+    }
+
     /// Places of the effects that are named.
     pub(crate) fn named(&self) -> Vec<usize> {
         let is_named = |(i, effect): (usize, &WeighedEffect)| self.doubt(effect).is_none().then_some(i);
@@ -146,8 +155,23 @@ impl WeighedModel {
         })
     }
 
+    /// A larger effect with which it shares a class: either could be the other, so that both together are no finding.
+    fn twin_beside(&self, assessed: &WeighedEffect) -> Option<EffectName> {
+        let name = |effect: &WeighedEffect| effect.found.effect.name;
+        let is_twin = |other: &&WeighedEffect| {
+            name(other) != name(assessed)
+                && assessed.class.contains(&name(other))
+                && other.class.contains(&name(assessed))
+                && other.explains_more(assessed)
+        };
+        self.effects.iter().find(is_twin).map(name)
+    }
+
     /// Returns what rules an effect out however much it explains; none if nothing does.
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
+        if let Some(from) = self.twin_beside(assessed) {
+            return Some(Rejection::Indistinguishable { from });
+        }
         if assessed.found.material.is_some() {
             return assessed.found.rejection_by_shares(assessed.is_there);
         }

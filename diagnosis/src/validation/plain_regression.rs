@@ -6,6 +6,7 @@ use crate::estimation::force_residual::Estimator;
 use crate::numerics::linear::{Factor, Square};
 use crate::thresholds::SURE_Z;
 use crate::validation::residuals::{Residuals, relative_gain};
+use std::f64::consts::TAU;
 
 /// Part of the mean square of what is left that a regression must predict on held-out recordings.
 const PREDICTS: f64 = 0.1;
@@ -13,6 +14,8 @@ const PREDICTS: f64 = 0.1;
 const DELAYS_S: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.08];
 /// Factor between the sizes of a delay by the recorded command and by the one that the motion asks for.
 const SAME_SIZE: f64 = 2.0;
+/// Orders of a turn that are tried together.
+const ORDERS: u32 = 24;
 
 /// Recordings with what a model leaves on them and the drive's force, per block.
 pub(crate) struct Left<'a> {
@@ -34,8 +37,13 @@ impl<'a> Left<'a> {
 type Columns = Vec<Vec<Vec<f64>>>;
 
 /// Returns the best predictor of the residual on the held-out recordings, as a noun phrase, and the share that it predicts; none if
-/// nothing does.
-pub(crate) fn follows(fit: &Left, holdout: &Left, estimator: &Estimator) -> Option<(&'static str, f64)> {
+/// nothing does. `turn` is the travel of one turn, rad or m, where the axis has turns.
+pub(crate) fn follows(
+    fit: &Left,
+    holdout: &Left,
+    estimator: &Estimator,
+    turn: Option<f64>,
+) -> Option<(&'static str, f64)> {
     let predicted = |columns: &dyn Fn(&Left) -> Columns, is_possible: &dyn Fn(&[f64]) -> bool| {
         let theta = solve(fit, &columns(fit))?;
         is_possible(&theta).then(|| gain(holdout, &columns(holdout), &theta, estimator)).flatten()
@@ -43,9 +51,7 @@ pub(crate) fn follows(fit: &Left, holdout: &Left, estimator: &Estimator) -> Opti
     // A disturbance that accelerates the axis goes along with its speed, and friction against it.
     let against = |theta: &[f64]| theta[0] < 0.0;
     let any = |_: &[f64]| true;
-    let turn =
-        |left: &Left| of_motion(left, &|track, j| vec![track.motion.x[j].sin(), track.motion.x[j].cos()]);
-    let all: [(&'static str, Option<f64>); 4] = [
+    let all = [
         (
             "a force against the motion in proportion to speed, as viscous friction is,",
             predicted(&|left| of_motion(left, &|track, j| vec![track.motion.v[j]]), &against),
@@ -61,12 +67,24 @@ pub(crate) fn follows(fit: &Left, holdout: &Left, estimator: &Estimator) -> Opti
                 &any,
             ),
         ),
-        ("a force once per turn", predicted(&turn, &any)),
+        (
+            "a force over the angle of the turn",
+            turn.and_then(|turn| {
+                predicted(&|left| of_motion(left, &|track, j| waves(track.motion.x[j] / turn)), &any)
+            }),
+        ),
     ];
     let delayed =
         delay(fit, holdout, estimator).map(|part| ("a command that acts later than it is recorded", part));
     let all = all.into_iter().filter_map(|(what, part)| Some((what, part?))).chain(delayed);
     all.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Cosine and sine of the first orders of a turn, at a place in turns.
+fn waves(turns: f64) -> Vec<f64> {
+    (1..=ORDERS)
+        .flat_map(|order| [(TAU * f64::from(order) * turns).cos(), (TAU * f64::from(order) * turns).sin()])
+        .collect()
 }
 
 /// Columns of the motion, block by block.

@@ -188,3 +188,22 @@ fn a_gain_that_falls_with_copper_loss_is_found_with_its_size() {
     let time_s = found.parameters["time_constant"].value;
     assert!((time_s / (0.2 * setup.seconds) - 1.0).abs() < 0.2, "{time_s}: {}", outcome.summary());
 }
+
+/// Commands beyond a clip say nothing of the drive: here the largest is five times what it gives.
+#[test]
+fn a_clip_far_below_the_largest_command_is_found() {
+    let machine = Machine { limit: 40.0, ..AXIS };
+    let take = |seed: u64| {
+        let phase = seed as f64;
+        let command = move |t: f64| {
+            40.0 * (12.0 * t).sin()
+                + 25.0 * (33.0 * t + phase).sin()
+                + 160.0 * (1.6 * t + phase).sin().powi(31)
+        };
+        axis::record(machine, BENCH, seed, command)
+    };
+    let outcome = diagnosed(&rig(WHOLE, "", "", BENCH.counts), &[take(1), take(2)], &[take(3)]);
+    assert_eq!(names(&outcome), [N::CommandSaturation], "{}", outcome.report.sentence);
+    let limit = outcome.report.effects[0].parameters["limit"].value;
+    assert!((limit / 40.0 - 1.0).abs() < 0.1, "{limit}");
+}

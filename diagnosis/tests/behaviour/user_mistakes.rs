@@ -1,5 +1,6 @@
 //! Mistakes that people make with units, signs, columns and files: each gets the sentence that helps, and none a name.
 
+use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};
@@ -64,9 +65,43 @@ fn the_recordings_that_could_still_be_used_are_said() {
     let turned = error(1, &|r| r.position_counts.iter_mut().for_each(|q| *q = -*q));
     assert!(turned.starts_with("the axis of fit2.csv moves against its command"), "{turned}");
     assert!(turned.ends_with("; fit.csv and holdout.csv could still be used"), "{turned}");
+    let tenfold = error(1, &|r| r.command.iter_mut().for_each(|u| *u *= 10.0));
+    assert!(tenfold.starts_with("the force of fit2.csv for its motion is 10 times as large"), "{tenfold}");
+    assert!(tenfold.ends_with("; fit.csv and holdout.csv could still be used"), "{tenfold}");
     let at_rest = error(2, &|r| r.position_counts.fill(17.0));
     assert!(at_rest.starts_with("holdout.csv is at rest"), "{at_rest}");
     assert!(at_rest.ends_with("; fit.csv and fit2.csv could still be used"), "{at_rest}");
+}
+
+#[test]
+fn a_constant_command_in_one_recording_leaves_the_others_usable() {
+    let mut all = [recorded("fit.csv", 0.0), recorded("fit2.csv", 0.5), recorded("holdout.csv", 1.0)];
+    all[1].command.fill(0.1);
+    let [fit, more, holdout] = all;
+    let outcome = diagnose_recordings(&rig(), &[fit, more], &[holdout], &|_, _| ()).expect("it is told");
+    assert_eq!(outcome.report.verdict, Verdict::InsufficientExcitation);
+    let sentence = &outcome.report.sentence;
+    assert!(
+        sentence.contains("fit2.csv is constant; fit.csv and holdout.csv could still be used"),
+        "{sentence}"
+    );
+}
+
+#[test]
+fn every_effect_of_the_library_is_tested_or_said_not_to_be() {
+    let report = said(&rig(), |_| ()).report;
+    for name in EffectName::ALL.iter().filter(|name| **name != EffectName::Table) {
+        let is_of_rig = matches!(name, EffectName::ViscousFriction | EffectName::CoulombFriction);
+        let is_named = report.effects.iter().any(|one| one.class.contains(name));
+        let is_tested = report.hypotheses.iter().any(|one| one.name == *name);
+        let is_untested = report.untested.iter().any(|one| one.name == *name);
+        assert_eq!(
+            u8::from(is_of_rig) + u8::from(is_named || is_tested) + u8::from(is_untested),
+            1,
+            "{name} stands in one list: {}",
+            report.sentence
+        );
+    }
 }
 
 #[test]

@@ -9,6 +9,8 @@ use std::path::Path;
 const MARGIN: f64 = 0.8;
 /// Contenders below this probability are left out.
 const LEAST_PROBABILITY: f64 = 0.01;
+/// Steps of a recording from which their mean length is taken.
+const FEWEST_STEPS: f64 = 20.0;
 /// The most contenders that are compared.
 const MOST_RIVALS: usize = 5;
 
@@ -53,6 +55,8 @@ pub struct Case {
     pub disturbance: f64,
     /// Bandwidth over which it was measured, Hz.
     pub bandwidth_hz: f64,
+    /// Time between two readings that the diagnosis takes apart, s: a row of the recordings, or a block of a few if they are faster.
+    pub reading_s: f64,
     /// The machine's limits.
     pub limits: Limits,
 }
@@ -91,7 +95,7 @@ impl Case {
         // Counting is simulated by itself; what is left beside it disturbs.
         let disturbance = (left * left - floor * floor).max(0.01 * floor * floor).sqrt();
         let bandwidth_hz = report.residual_bandwidth_hz.max(1.0);
-        Ok(Self { rivals, disturbance, bandwidth_hz, limits })
+        Ok(Self { rivals, disturbance, bandwidth_hz, reading_s: shown.reading_s, limits })
     }
 
     /// Sets the probabilities so that they sum to one.
@@ -140,6 +144,8 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
 struct Shown {
     travel: f64,
     speed: f64,
+    /// Longest mean time between two residuals of a recording, s.
+    reading_s: f64,
 }
 
 impl Shown {
@@ -148,23 +154,29 @@ impl Shown {
         let text = std::fs::read_to_string(path).map_err(|cause| {
             format!("{}: the residuals cannot be read ({cause}); diagnose again", path.display())
         })?;
-        let mut shown = Self { travel: 0.0, speed: 0.0 };
+        let mut shown = Self { travel: 0.0, speed: 0.0, reading_s: 0.0 };
         let (mut file, mut before, mut place, mut low, mut high) =
             (String::new(), 0.0, 0.0, 0.0_f64, 0.0_f64);
+        let (mut begin, mut steps) = (0.0, 0.0);
         for line in text.lines().skip(1) {
             let cells: Vec<&str> = line.split(',').collect();
             let [name, time, velocity, ..] = cells[..] else { continue };
             let (Ok(time), Ok(velocity)) = (time.parse::<f64>(), velocity.parse::<f64>()) else { continue };
-            if name != file {
+            if name != file || time < before {
                 (place, low, high) = (0.0, 0.0, 0.0);
+                (begin, steps) = (time, 0.0);
                 name.clone_into(&mut file);
             } else {
                 place += velocity * (time - before);
+                steps += 1.0;
             }
             before = time;
             (low, high) = (low.min(place), high.max(place));
             shown.travel = shown.travel.max(high - low);
             shown.speed = shown.speed.max(velocity.abs());
+            if steps >= FEWEST_STEPS {
+                shown.reading_s = shown.reading_s.max((time - begin) / steps);
+            }
         }
         Ok(shown)
     }

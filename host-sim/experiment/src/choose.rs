@@ -202,16 +202,26 @@ fn best(all: impl Iterator<Item = (usize, f64, f64)>) -> Option<(usize, f64, f64
 /// # Errors
 /// One sentence if every input of the library leaves the limits.
 pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
-    let servo = Servo::of(case.rivals[0].rig.model.inertia);
+    let servo = Servo::within(case.rivals[0].rig.model.inertia, &case.limits.usable());
     let bench = Bench { case, filter: Filter::new(case), servo };
     let segments: Vec<Segment> =
         library(case, seed).into_iter().filter(|segment| segment.seconds <= most_s).collect();
     let tried = segments.len();
+    let beyond = |which: &str| {
+        let Limit { travel, speed, force } = words(case);
+        format!(
+            "all {which} of the library leave 80 % of the limits (travel {travel}, speed {speed}, force {force}) under a rival; give wider ones with --travel, --speed or --force"
+        )
+    };
     let judged = |segment: Segment| {
         let input = Input { segments: vec![segment.clone()] };
         bench.sums(&input).map(|sums| (segment, sums))
     };
     let all: Vec<(Segment, Sums)> = segments.into_par_iter().filter_map(judged).collect();
+    // A diagnosis refuses recordings of an axis at rest.
+    if !all.is_empty() && !all.iter().any(|(segment, _)| segment.signal.travels()) {
+        return Err(beyond("staircases and strokes, without which the axis hardly moves,"));
+    }
     let mut firsts: Vec<(usize, f64)> =
         all.iter().enumerate().map(|(k, (_, sums))| (k, criterion(&case.rivals, &sums.nats()))).collect();
     firsts.sort_by(|a, b| b.1.total_cmp(&a.1).then(all[a.0].0.seconds.total_cmp(&all[b.0].0.seconds)));
@@ -228,15 +238,8 @@ pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
     };
     let mut whole: Vec<(Alternative, Vec<Prediction>)> =
         firsts.par_iter().take(RUNNERS_UP + 1).filter_map(grown).collect();
-    let order =
-        best(whole.iter().enumerate().map(|(k, (a, _))| (k, a.criterion, a.input.seconds()))).ok_or_else(
-            || {
-                let Limit { travel, speed, force } = words(case);
-                format!(
-                    "all {tried} inputs of the library leave 80 % of the limits (travel {travel}, speed {speed}, force {force}) under a rival; give wider ones with --travel, --speed or --force"
-                )
-            },
-        )?;
+    let order = best(whole.iter().enumerate().map(|(k, (a, _))| (k, a.criterion, a.input.seconds())))
+        .ok_or_else(|| beyond(&format!("{tried} inputs")))?;
     let (chosen, predictions) = whole.remove(order.0);
     let mut runners_up: Vec<Alternative> = whole.into_iter().map(|(alternative, _)| alternative).collect();
     runners_up.sort_by(|a, b| b.criterion.total_cmp(&a.criterion));

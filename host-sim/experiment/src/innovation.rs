@@ -31,7 +31,7 @@ impl Filter {
     pub(crate) fn new(case: &Case) -> Self {
         let rig = &case.rivals[0].rig;
         let count = 1.0 / rig.encoder.counts_per_unit.abs();
-        let block_s = (0.125 / case.bandwidth_hz).clamp(BLOCK_S.0, BLOCK_S.1);
+        let block_s = (0.125 / case.bandwidth_hz).clamp(BLOCK_S.0, BLOCK_S.1).max(case.reading_s);
         let rows = (block_s / STEP_S).round() as usize;
         let noise = rig.encoder.noise_counts.unwrap_or(0.0) * count;
         // The mean over the block's rows.

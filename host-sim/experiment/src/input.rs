@@ -1,5 +1,6 @@
 //! Inputs: signals one after the other, those that the device can play (`control_core::excitation`), in the coordinate of a rig.
 
+use crate::case::Limits;
 use std::f64::consts::{PI, TAU};
 
 /// Natural frequency of the servo that follows a reference, rad/s: a device's speed estimate is 6 ms late, which leaves it well damped.
@@ -19,9 +20,19 @@ pub struct Servo {
 impl Servo {
     /// The servo for an inertia in kg·m² or kg.
     pub fn of(inertia: f64) -> Self {
+        Self::of_frequency(inertia, SERVO_RAD_PER_S)
+    }
+
+    /// The same for a machine with limits, softer if a reversal at its speed would take more than its force.
+    pub(crate) fn within(inertia: f64, limits: &Limits) -> Self {
+        let reversal = 4.0 * SERVO_DAMPING_RATIO * inertia * limits.speed;
+        Self::of_frequency(inertia, SERVO_RAD_PER_S.min(limits.force / reversal))
+    }
+
+    fn of_frequency(inertia: f64, rad_per_s: f64) -> Self {
         Self {
-            stiffness: inertia * SERVO_RAD_PER_S * SERVO_RAD_PER_S,
-            damping: 2.0 * SERVO_DAMPING_RATIO * inertia * SERVO_RAD_PER_S,
+            stiffness: inertia * rad_per_s * rad_per_s,
+            damping: 2.0 * SERVO_DAMPING_RATIO * inertia * rad_per_s,
         }
     }
 }

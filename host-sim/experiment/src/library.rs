@@ -19,7 +19,12 @@ pub(crate) fn library(case: &Case, seed: u64) -> Vec<Segment> {
     staircases(&mut out, &limits, &mut random);
     strokes(&mut out, &limits, &mut random);
     ladders(&mut out, &limits, count);
+    let highest = highest_hz(case.reading_s);
     for (low, high) in [(1, 12), (3, 60), (5, 400), (60, 500)] {
+        let high = high.min(highest);
+        if high < 2 * low {
+            continue;
+        }
         let frequencies = frequencies(low, high, &mut random);
         for share in [0.4, 1.0, 3.0] {
             let force = (share * dry).min(ROOM * limits.force / LINES as f64);
@@ -32,6 +37,17 @@ pub(crate) fn library(case: &Case, seed: u64) -> Vec<Segment> {
     }
     out.push(Segment { signal: Signal::Hold, seconds: 2.0 });
     out
+}
+
+/// Readings by which two blocks of a fast recording are apart, s.
+const BLOCK_S: f64 = 2.6e-3;
+/// Periods of a sine between two readings of a slow recording that still show its force.
+const PERIODS: f64 = 0.2;
+
+/// The highest frequency that recordings show, Hz, `reading_s` being the time between two readings: blocks of a fast recording hold
+/// some of what is faster than they are, and rows of a slow one do not.
+fn highest_hz(reading_s: f64) -> u16 {
+    if reading_s <= BLOCK_S { u16::MAX } else { (PERIODS / reading_s) as u16 }
 }
 
 fn staircases(out: &mut Vec<Segment>, limits: &Limits, random: &mut Random) {

@@ -25,7 +25,7 @@ fn rival(name: &str, probability: f64, effects: Vec<Effect>) -> Rival {
 
 fn case(rivals: Vec<Rival>) -> Case {
     let limits = Limits { travel: 60.0, speed: 65.0, force: 0.02 };
-    Case { rivals, disturbance: 2e-5, bandwidth_hz: 40.0, limits }
+    Case { rivals, disturbance: 2e-5, bandwidth_hz: 40.0, reading_s: 2.5e-3, limits }
 }
 
 fn delay_or_lag() -> Case {
@@ -49,6 +49,30 @@ fn fast_forces_tell_a_delay_from_a_lag() {
     assert!(design.chosen.nearest().expect("two rivals").nats > 10.0, "{:?}", design.chosen.pairs);
     assert!(design.inseparable.is_empty());
     assert!(design.runners_up.iter().all(|other| other.criterion <= 1.04 * design.chosen.criterion));
+}
+
+/// A heavy joint that is logged 200 times a second.
+#[test]
+fn a_slow_log_of_a_heavy_joint_gets_what_it_can_show() {
+    let mut case = delay_or_lag();
+    for rival in &mut case.rivals {
+        rival.rig.model.inertia = 0.17;
+        rival.rig.model.coulomb = Some(0.3);
+        rival.rig.model.viscous = Some(0.05);
+        rival.rig.actuator.gain = 1.0;
+    }
+    case.limits = Limits { travel: 3.0, speed: 3.0, force: 6.0 };
+    (case.disturbance, case.bandwidth_hz, case.reading_s) = (0.05, 12.0, 5e-3);
+    let design = design(&case, 20.0, 1).expect("the limits are those of a joint");
+    let segments = &design.chosen.input.segments;
+    assert!(segments.iter().any(|segment| segment.signal.travels()), "{segments:?}");
+    for segment in segments {
+        if let Signal::Multisine { frequencies, .. } = &segment.signal {
+            assert!(frequencies.iter().all(|hertz| *hertz <= 40), "five readings a period: {frequencies:?}");
+        }
+    }
+    let fastest = design.predictions[0].velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    assert!(fastest > 0.1, "it moves by {fastest} rad/s");
 }
 
 #[test]

@@ -45,6 +45,11 @@ impl Guide {
         Ok(())
     }
 
+    /// Shows what goes on in the last step, or what came of it.
+    pub fn tell(&self, news: &str) {
+        self.lock().tell(news);
+    }
+
     /// Sets the device's present readings.
     pub fn read(&self, reading: Reading) {
         self.lock().read(reading);

@@ -65,6 +65,13 @@ impl Consent {
         }
     }
 
+    /// Shows on the page what goes on in the last step, or what came of it.
+    pub(crate) fn tell(&self, news: &str) {
+        if let Some((guide, _)) = &self.guide {
+            guide.tell(news);
+        }
+    }
+
     /// Shows the result on the page.
     pub(crate) fn end(&self, outcome: Result<Vec<String>, &Error>) {
         if let Some((guide, _)) = &self.guide {

@@ -7,6 +7,7 @@ use diagnosis::rig::Rig;
 use lab::settle::{
     self, Feel, Inputs, MOST_MOTION_S, MOST_ROUNDS, Plant, Progress, Settings, Settled, Subject,
 };
+use live::progress::Progress as Bar;
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
 use live::{examples, note, say};
@@ -117,6 +118,7 @@ impl Settle {
             Some(path) => Rig::read(path).map_err(Error::input)?,
             None => subject.data_sheet_rig()?,
         };
+        let mut bar: Option<Bar> = None;
         settle::settle(subject, &rig, &self.settings(), |progress| {
             if stop.load(Ordering::Relaxed) {
                 return Err(Error::failed("stopped before the end; the rounds so far are in --out"));
@@ -125,8 +127,19 @@ impl Settle {
                 Progress::Asked(number, asked, why) => {
                     consent.ask(&format_args!("round {number}: {asked}; why: {why}: hands off"), true)?;
                 }
-                Progress::Said(sentence) => note!("  {sentence}."),
-                Progress::Played(_) => {}
+                Progress::Played { seconds, of } => {
+                    bar.get_or_insert_with(|| Bar::new("playing")).show(seconds, Some(of), "s");
+                    consent.tell(&format!("{seconds:.0} of {of:.0} s played"));
+                }
+                Progress::Diagnoses => {
+                    bar = None;
+                    note!("  diagnosing all recordings so far");
+                    consent.tell("Diagnosing all recordings so far; this takes half a minute or more.");
+                }
+                Progress::Said(sentence) => {
+                    note!("  {sentence}.");
+                    consent.tell(&format!("{sentence}."));
+                }
                 Progress::Feeds(step) => consent.ask(&step, step.moves())?,
             }
             Ok(())

@@ -129,7 +129,7 @@ fn a_person_ends_it_and_the_torque_goes() {
     let mut subject = Subject::Real { port: &mut port, stop: &stop };
     let rig = subject.data_sheet_rig().expect("the device tells its scale");
     let ended = settle(&mut subject, &rig, &settings(&out, 9.0, false), |progress| {
-        if matches!(progress, Progress::Played(seconds) if seconds > 0.5) {
+        if matches!(progress, Progress::Played { seconds, .. } if seconds > 0.5) {
             stop.store(true, Ordering::Relaxed);
         }
         Ok(())

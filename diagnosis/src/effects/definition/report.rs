@@ -94,7 +94,7 @@ pub(crate) trait EffectReport {
         "speed"
     }
 
-    /// The recording that would tell it from another; none where the other knows better or nobody does.
+    /// Returns the recording that distinguishes it from `other`; none where `other` has one, or none is known.
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         None
     }

@@ -134,6 +134,11 @@ pub(crate) trait EffectSearch {
         false
     }
 
+    /// False for a force without a name, which is no hypothesis.
+    fn is_sought(&self) -> bool {
+        true
+    }
+
     /// True if it is made of waves that are sought.
     fn is_periodic(&self) -> bool {
         false

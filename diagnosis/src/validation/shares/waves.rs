@@ -4,12 +4,10 @@
 use super::laws::Columns;
 use super::state::State;
 use crate::effects::{Effect, EffectName as N};
-use crate::selection::periodic::of_orders;
+use crate::selection::periodic::{are_apart, fits, of_orders};
 
 /// Orders of a turn that are tried.
 const ORDERS: usize = 24;
-/// Periods that the travel must hold.
-const PERIODS: f64 = 1.5;
 /// Orders that are tried together, the best alone first, and how many of them one effect may have.
 const TOGETHER: (usize, usize) = (6, 4);
 /// Additional share that a further order must take.
@@ -37,7 +35,7 @@ impl State<'_> {
         let turn = span.rig.turn?;
         let is_seen = |order: &f64| {
             let is_in_band = *order == 1.0 || order * span.speed <= 2.0 * self.on.bandwidth_hz() * turn;
-            order * span.travel() >= PERIODS * turn && is_in_band
+            fits(*order, span.travel() / turn) && is_in_band
         };
         let orders = (1..=ORDERS).map(|order| order as f64).filter(is_seen);
         let alone = |order: f64| Some((order, self.tried(of_orders(name, turn, &[order]))?));
@@ -50,6 +48,9 @@ impl State<'_> {
         for order in others {
             if taken.len() == TOGETHER.1 {
                 break;
+            }
+            if !taken.iter().all(|other| are_apart(*other, order, span.travel() / turn)) {
+                continue;
             }
             let with: Vec<f64> = taken.iter().copied().chain([order]).collect();
             let Some(more) = self.tried(of_orders(name, turn, &with)) else { continue };

@@ -26,6 +26,8 @@ struct Step {
     /// True if the motor moves in it.
     moves: bool,
     stage: Stage,
+    /// The news of it: what goes on, or what came of it; empty where nobody says.
+    news: String,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -82,7 +84,7 @@ impl GuideState {
     /// Shows the next step. Returns its number, counted from 1.
     pub fn ask(&mut self, text: String, moves: bool) -> usize {
         self.finish_last();
-        self.steps.push(Step { text, moves, stage: Stage::Asked });
+        self.steps.push(Step { text, moves, stage: Stage::Asked, news: String::new() });
         self.steps.len()
     }
 
@@ -100,6 +102,13 @@ impl GuideState {
     pub fn run_last(&mut self) {
         if let Some(step) = self.steps.last_mut() {
             step.stage = Stage::Running;
+        }
+    }
+
+    /// Shows what goes on in the last step, or what came of it.
+    pub fn tell(&mut self, news: &str) {
+        if let Some(step) = self.steps.last_mut() {
+            news.clone_into(&mut step.news);
         }
     }
 
@@ -157,5 +166,18 @@ mod tests {
         assert_eq!(state.ask("two".into(), true), 2);
         begin(&mut state, 1);
         assert!(!state.is_agreed(2), "a second press on the step before");
+    }
+
+    #[test]
+    fn the_news_of_a_step_stay_with_it() {
+        let mut state = GuideState::new("Settling", "a board");
+        state.tell("nothing was asked yet");
+        state.ask("one".into(), true);
+        state.tell("12 of 24 s played");
+        state.tell("nothing is named");
+        state.ask("two".into(), true);
+        let shown = serde_json::to_value(&state).expect("JSON");
+        assert_eq!(shown["steps"][0]["news"], "nothing is named");
+        assert_eq!(shown["steps"][1]["news"], "");
     }
 }

@@ -6,7 +6,7 @@ use super::{Progress, Settings};
 use crate::compensate::felt::Felt;
 use crate::compensate::{self, files};
 use device_sim::error::Error;
-use std::path::Path;
+use diagnosis::rig::Rig;
 
 /// The force that the mechanism adds to a hand, before and after.
 #[derive(Clone, Debug)]
@@ -19,22 +19,21 @@ pub struct Feel {
     pub notes: Vec<String>,
 }
 
-/// Feeds forward what the report in `report` found, and writes the page and the device's part beside `settle.html`. The sentence where
+/// Feeds forward what `rig` has beyond its plain values, and writes the page and the device's part beside `settle.html`. The sentence where
 /// nothing is fed forward.
 ///
 /// # Errors
 /// A sentence if a person ends it or a file cannot be written.
 pub(super) fn feel(
     subject: &mut Subject,
-    report: &Path,
+    rig: &Rig,
     settings: &Settings,
     radius_mm: f64,
     progress: &mut impl FnMut(Progress) -> Result<(), Error>,
 ) -> Result<Result<Feel, String>, Error> {
-    let rig = compensate::read_report(report)?;
     let mut ended = None;
     let outcome = subject.talk(radius_mm, |line| {
-        compensate::compensate(line, &rig, 1.0, |step| {
+        compensate::compensate(line, rig, 1.0, |step| {
             progress(Progress::Feeds(step)).map_err(|error| {
                 let sentence = error.to_string();
                 ended = Some(error);

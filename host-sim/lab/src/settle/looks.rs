@@ -33,7 +33,7 @@ fn share(round: usize, most: usize) -> f64 {
 }
 
 /// The round, from 1, since which every round gives the name or one of its class.
-fn since(name: &Name, rounds: &[Vec<Name>]) -> usize {
+pub(super) fn since(name: &Name, rounds: &[Vec<Name>]) -> usize {
     let is_same = |other: &Name| other.class.iter().any(|one| name.class.contains(one));
     let without = rounds.iter().rposition(|names| !names.iter().any(is_same));
     without.map_or(1, |round| round + 2)

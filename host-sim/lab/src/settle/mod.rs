@@ -6,6 +6,7 @@ mod following;
 mod kept;
 mod looks;
 mod page;
+mod patched;
 mod play;
 mod subject;
 
@@ -129,10 +130,15 @@ impl Settled {
 
     /// Sentences, without their full stops, on the names that are not sure enough.
     pub fn unsure_in_words(&self) -> impl Iterator<Item = String> {
-        self.unsure.iter().map(|name| {
+        let rounds: Vec<Vec<Name>> = self.rounds.iter().map(|round| round.names.clone()).collect();
+        self.unsure.iter().map(move |name| {
             format!(
-                "{} is not named: it came up in a later round, and with every look counted it is {:.0} % sure",
+                "{} is not named: {}, and with every look counted it is {:.0} % sure",
                 name.class.join(" or "),
+                match looks::since(name, &rounds) {
+                    1 => "no round was sure of it".to_owned(),
+                    round => format!("it came up only in round {round}"),
+                },
                 100.0 * name.confidence
             )
         })
@@ -149,8 +155,15 @@ impl Settled {
 pub enum Progress<'a> {
     /// A round begins: its number, its input and why.
     Asked(usize, &'a str, &'a str),
-    /// Seconds played of one of its recordings.
-    Played(f64),
+    /// Seconds played of the round's motion.
+    Played {
+        /// So far, s.
+        seconds: f64,
+        /// The whole motion of the round, s.
+        of: f64,
+    },
+    /// The diagnosis of all recordings so far begins.
+    Diagnoses,
     /// The diagnosis says this.
     Said(&'a str),
     /// A step of the compensation begins.
@@ -179,10 +192,14 @@ pub fn settle(
     let limited = Limited::new(rig, subject.config()?)?;
     let mut run = Run { limited, rig, settings, request: Request::default() };
     let mut settled = Settled::default();
-    let report = run.rounds(subject, &mut settled, &mut progress)?;
-    if let Some(report) = report.filter(|_| settings.compensate && !settled.names.is_empty()) {
-        let radius_mm = run.limited.radius_mm();
-        settled.feel = Some(feel::feel(subject, &report, settings, radius_mm, &mut progress)?);
+    let last = run.rounds(subject, &mut settled, &mut progress)?;
+    if let Some(last) = last.filter(|_| !settled.names.is_empty()) {
+        let found = patched::patched(&last, &settled.names);
+        written_rig(&settings.out.join("patched-rig.toml"), &found)?;
+        if settings.compensate {
+            let radius_mm = run.limited.radius_mm();
+            settled.feel = Some(feel::feel(subject, &found, settings, radius_mm, &mut progress)?);
+        }
     }
     page::write(&settled, &settings.out)?;
     Ok(settled)
@@ -198,13 +215,13 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Plays round after round until nothing is left to ask; returns the folder of the last report.
+    /// Plays round after round until nothing is left to ask; returns the last diagnosis.
     fn rounds(
         &mut self,
         subject: &mut Subject,
         settled: &mut Settled,
         progress: &mut impl FnMut(Progress) -> Result<(), Error>,
-    ) -> Result<Option<PathBuf>, Error> {
+    ) -> Result<Option<Outcome>, Error> {
         let mut asked = first(&self.limited, self.rig, self.settings)?;
         let mut last = None;
         loop {
@@ -215,8 +232,9 @@ impl Run<'_> {
                 design.write(&folder.join("experiment")).map_err(Error::failed)?;
             }
             self.record(subject, &asked.programmes, &folder, progress)?;
-            let report = match diagnosed(&self.request, &folder.join("report")) {
-                Ok(outcome) => outcome.report,
+            progress(Progress::Diagnoses)?;
+            let outcome = match diagnosed(&self.request, &folder.join("report")) {
+                Ok(outcome) => outcome,
                 Err(error) if number == 1 => return Err(error),
                 Err(error) => {
                     // The names of the round before stand.
@@ -224,20 +242,21 @@ impl Run<'_> {
                     return Ok(last);
                 }
             };
+            let report = &outcome.report;
             progress(Progress::Said(&report.sentence))?;
             let before = settled.rounds.last().map_or(&[][..], |round| &round.names);
-            let round = round(asked, &report, before);
+            let round = round(asked, report, before);
             settled.rounds.push(round);
             settled.count_looks(self.settings.most_rounds());
             let folder = folder.join("report");
-            match following(&self.limited, &report, &folder, self.settings, settled)? {
+            match following(&self.limited, report, &folder, self.settings, settled)? {
                 Ok(next) => asked = next,
                 Err(conclusion) => {
                     settled.conclusion = conclusion;
-                    return Ok(Some(folder));
+                    return Ok(Some(outcome));
                 }
             }
-            last = Some(folder);
+            last = Some(outcome);
         }
     }
 
@@ -249,10 +268,14 @@ impl Run<'_> {
         folder: &Path,
         progress: &mut impl FnMut(Progress) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let mut shown = Ok(());
+        let of = programmes.iter().map(Programme::seconds).sum();
+        let (mut before, mut last, mut shown) = (0.0, 0.0, Ok(()));
         let tracks = subject.play(programmes, |seconds| {
+            // Each recording counts from zero.
+            before += if seconds < last { last } else { 0.0 };
+            last = seconds;
             if shown.is_ok() {
-                shown = progress(Progress::Played(seconds));
+                shown = progress(Progress::Played { seconds: before + seconds, of });
             }
         })?;
         shown?;
@@ -264,13 +287,17 @@ impl Run<'_> {
         }
         // Not the rig of the data sheets but the simulation as its author believes it.
         self.request.rig = paths[0].clone();
-        std::fs::write(&self.request.rig, self.rig.to_toml()).map_err(|cause| {
-            Error::failed(format_args!(
-                "{}: the rig cannot be written ({cause}); free some space or choose another --out",
-                self.request.rig.display()
-            ))
-        })
+        written_rig(&self.request.rig, self.rig)
     }
+}
+
+fn written_rig(path: &Path, rig: &Rig) -> Result<(), Error> {
+    std::fs::write(path, rig.to_toml()).map_err(|cause| {
+        Error::failed(format_args!(
+            "{}: the rig cannot be written ({cause}); free some space or choose another --out",
+            path.display()
+        ))
+    })
 }
 
 fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Error> {
