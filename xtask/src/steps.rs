@@ -229,7 +229,7 @@ fn parquet() -> Result<(), Error> {
     import.arg("test").args(BUILD).args([
         "--quiet",
         "--features",
-        "host-sim/parquet,host-sim/ros",
+        "host-sim/hdf5,host-sim/parquet,host-sim/ros",
         "--test",
         "program",
         "--",

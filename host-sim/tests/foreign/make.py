@@ -1,6 +1,6 @@
 """Writes the same short recording as other programs write it, into the folder given.
 
-pip install numpy==2.4.6 pandas==3.1.1 pyarrow==26.0.1 mcap==1.6.0 scipy==1.17.1 rosbags==0.11.9 openpyxl==3.1.5; python make.py DIR
+pip install numpy==2.4.6 pandas==3.1.1 pyarrow==26.0.1 mcap==1.6.0 scipy==1.17.1 rosbags==0.11.9 openpyxl==3.1.5 h5py==3.16.0; python make.py DIR
 
 The motion is one that tests/import.rs knows: 2.5 s at 200 rows a second, an angle of 0.8·sin(2π·0.9·t) + 0.3·sin(2π·2.3·t) rad
 under a torque of 0.4·cos(2π·0.9·t) N·m.
@@ -12,6 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -138,3 +139,30 @@ np.savetxt(out / "bare.txt", np.column_stack([t, q, u]), fmt="%.7g")
 # The same two columns in two files: an angle in one, a torque in the other.
 pd.DataFrame({"time": t, "value": np.degrees(q)}).to_csv(out / "angle.csv", index=False, float_format="%.9g")
 pd.DataFrame({"time": t, "value": u}).to_csv(out / "torque.csv", index=False, float_format="%.9g")
+
+# HDF5 by h5py: named datasets in a group, compressed, beside what is no column.
+with h5py.File(out / "datasets.h5", "w") as file:
+    group = file.create_group("bench")
+    group.create_dataset("time_s", data=t, compression="gzip")
+    group.create_dataset("theta_deg", data=np.degrees(q), compression="gzip", shuffle=True)
+    group.create_dataset("tau_Nm", data=u.astype(np.float32))
+    group.create_dataset("operator", data="K.")
+    group.create_dataset("mass", data=0.4)
+
+# MATLAB's -v7.3 by its layout (h5py): a user block that says so, a struct as a group, a matrix with MATLAB's columns as rows, text as
+# numbers of the class char, and what a cell refers to beside.
+path = out / "v73.mat"
+with h5py.File(path, "w", userblock_size=512) as file:
+    log = file.create_group("log")
+    log.attrs["MATLAB_class"] = np.bytes_("struct")
+    for name, values in [("time_s", t), ("angle_rad", q)]:
+        log.create_dataset(name, data=values[None, :], compression="gzip").attrs["MATLAB_class"] = np.bytes_("double")
+    file.create_dataset("torque", data=np.stack([u, -u])).attrs["MATLAB_class"] = np.bytes_("double")
+    text = file.create_dataset("note", data=np.frombuffer("bench".encode("utf-16-le"), np.uint16)[:, None])
+    text.attrs["MATLAB_class"] = np.bytes_("char")
+    refs = file.create_group("#refs#")
+    refs.create_dataset("a", data=np.arange(500.0)[None, :])
+with open(path, "r+b") as file:
+    file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Fri Nov 27 12:00:00 2026 HDF5 schema 1.00 .".ljust(116))
+    file.seek(124)
+    file.write(b"\x00\x02IM")

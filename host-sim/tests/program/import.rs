@@ -165,6 +165,37 @@ fn the_episodes_of_a_lerobot_dataset_are_runs_of_their_own() {
     }
 }
 
+#[cfg(feature = "hdf5")]
+#[test]
+fn hdf5_of_h5py_and_of_matlab_gives_the_motion() {
+    let (said, recordings, per_unit) = import(&["datasets.h5"], &[]);
+    assert!(said.contains("read as HDF5") && said.contains("bench.operator"), "{said}");
+    assert_eq!(recordings[0].len(), 500);
+    holds_the_motion(&recordings[0], per_unit.expect("it is known"), 0.0, 1.0, 2e-6);
+    let (said, recordings, per_unit) = import(&["v73.mat"], &["--column", "command=torque.1:Nm"]);
+    assert!(said.contains("read as MATLAB -v7.3: 4 columns") && said.contains("note left out"), "{said}");
+    holds_the_motion(&recordings[0], per_unit.expect("it is known"), 0.0, 1.0, 2e-6);
+}
+
+#[cfg(feature = "hdf5")]
+#[test]
+fn damaged_hdf5_is_refused_or_read_and_never_panics() {
+    let out = folder("import-damaged-hdf5");
+    let whole = std::fs::read(foreign("datasets.h5")).expect("it is there");
+    let file = out.join("damaged.h5");
+    for i in 0..200 {
+        let mut damaged = whole.clone();
+        // The structure stands in the first part; cut the file now and then.
+        damaged[8 + (i * 37) % 6000] ^= 1 << (i % 8);
+        damaged.truncate(if i % 5 == 0 { whole.len() * (i + 1) / 201 } else { whole.len() });
+        std::fs::write(&file, &damaged).expect("written");
+        let to = out.join("done");
+        let output = host_sim(&["import", text(&file), "--out", text(&to)]).output().expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(matches!(output.status.code(), Some(0 | 2)), "damage {i}: {said}");
+    }
+}
+
 #[cfg(not(feature = "ros"))]
 #[test]
 fn a_ros_2_bag_is_told_which_build_reads_it() {

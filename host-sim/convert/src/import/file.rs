@@ -14,6 +14,8 @@ pub(super) fn read(path: &Path) -> Result<Log, Error> {
     let first = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(0);
     let mut log = if bytes.starts_with(mcap::MAGIC) {
         log::read(&file, &bytes)?
+    } else if HDF5.iter().any(|magic| bytes.starts_with(magic)) {
+        hdf5(&file, bytes)?
     } else if let Some(advice) = unread(&bytes) {
         return Err(Error::input(format_args!("{file}: is {advice}")));
     } else if bytes.starts_with(ZIP) || bytes.starts_with(b"\x93NUMPY") {
@@ -40,6 +42,8 @@ pub(super) fn read(path: &Path) -> Result<Log, Error> {
 }
 
 const ZIP: &[u8] = b"PK\x03\x04";
+/// The first bytes of MATLAB's files of `-v7.3`, and of other HDF5.
+const HDF5: [&[u8]; 2] = [b"MATLAB 7.3", b"\x89HDF"];
 
 /// The name of a known format that is not read, and how to convert it.
 fn unread(bytes: &[u8]) -> Option<&'static str> {
@@ -57,15 +61,7 @@ fn unread(bytes: &[u8]) -> Option<&'static str> {
     }
     [
         (
-            &b"MATLAB 7.3"[..],
-            "a MATLAB file of -v7.3, which is HDF5; save it again with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
-        ),
-        (
-            b"\x89HDF",
-            "an HDF5 file, as MATLAB's -v7.3 is; save it again from MATLAB with save('FILE.mat', '-v7'), or from Python with h5py and np.savez",
-        ),
-        (
-            b"#ROSBAG",
+            &b"#ROSBAG"[..],
             "a ROS 1 bag; make an MCAP file of it with rosbags-convert --src FILE --dst OUT --dst-storage mcap (pip install rosbags)",
         ),
         (
@@ -89,5 +85,17 @@ fn parquet(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
 fn parquet(file: &str, _: Vec<u8>) -> Result<Log, Error> {
     Err(Error::input(format_args!(
         "{file}: is a Parquet file, which this build does not read; build with `--features parquet` (cargo run --release --features parquet -- import …)"
+    )))
+}
+
+#[cfg(feature = "hdf5")]
+fn hdf5(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
+    super::hdf5::read(file, bytes)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn hdf5(file: &str, _: Vec<u8>) -> Result<Log, Error> {
+    Err(Error::input(format_args!(
+        "{file}: is an HDF5 file, as MATLAB's -v7.3 is, which this build does not read; build with `--features hdf5` (cargo run --release --features hdf5 -- import …), or save it again from MATLAB with save('FILE.mat', '-v7')"
     )))
 }

@@ -125,7 +125,7 @@ impl Found {
                         values.iter().skip(i).step_by(n).copied().collect()
                     };
                     // As MATLAB counts its columns.
-                    self.columns.push(Column::new(join(&path, &(i + 1).to_string()), column));
+                    self.columns.push(Column::unnamed(join(&path, &(i + 1).to_string()), column));
                 }
             }
             _ => self.left_out.push(path),

@@ -4,6 +4,8 @@
 mod encoder_resolution;
 mod file;
 mod folder;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 mod json;
 mod log;
 mod mat;

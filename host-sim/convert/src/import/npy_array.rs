@@ -36,6 +36,12 @@ impl Array {
         Some(Array { shape, strides, values })
     }
 
+    /// An array whose last axis is the nearest.
+    #[cfg(feature = "hdf5")]
+    pub(super) fn of(shape: Vec<usize>, values: Vec<f64>) -> Array {
+        Array { strides: strides(&shape, false), shape, values }
+    }
+
     /// Number of axes.
     pub(super) fn axes(&self) -> usize {
         self.shape.len()
