@@ -16,6 +16,8 @@ pub struct Options {
     pub quick: bool,
     /// Conceal plants in the virtual device and let `host-sim settle` name them.
     pub settle: bool,
+    /// With `settle`: the folder of plants that are settled instead of drawn ones.
+    pub plants_from: Option<PathBuf>,
     /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion first.
     pub inputs: Vec<&'static str>,
     /// Cases that run at the same time.
@@ -51,6 +53,7 @@ impl Default for Options {
             cases: None,
             quick: false,
             settle: false,
+            plants_from: None,
             inputs: INPUTS.to_vec(),
             jobs: 2,
             minutes: None,
@@ -72,10 +75,11 @@ impl Default for Options {
 pub(crate) const SPEED: &str = "speed";
 
 /// The flags that take a value.
-const FLAGS: [&str; 15] = [
+const FLAGS: [&str; 16] = [
     "--seed",
     "--cases",
     "--inputs",
+    "--plants-from",
     "--jobs",
     "--minutes",
     "--only",
@@ -100,6 +104,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
                 and the set of characterise in the same time of motion; settle.json and settle.md in the folder of --out.
                 --keep DIR leaves the recordings. A run of the same seed, inputs and programs that was stopped goes on; with --only,
                 plants are settled anew and their report takes its place
+  --plants-from DIR  with --settle: the plants of a folder with key.json (tests/independent/settle_plants.py writes one), not drawn ones
   --inputs A,B  with --settle: only these of designed, multisines and characterise; the first sets the time of motion
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
@@ -163,6 +168,7 @@ impl Options {
                 "--cases" => {
                     options.cases = Some(whole("a whole number from 1")?.clamp(1, 10_000) as usize);
                 }
+                "--plants-from" => options.plants_from = Some(PathBuf::from(value)),
                 "--inputs" => options.inputs = inputs(&value)?,
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
                 "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
@@ -189,6 +195,9 @@ impl Options {
         }
         if self.reports.is_some() && (self.tool.is_some() || self.keep.is_some()) {
             return Err("--reports runs no tool, so it goes neither with --tool nor with --keep".into());
+        }
+        if self.plants_from.is_some() && !self.settle {
+            return Err("--plants-from goes with --settle: the plants are for its virtual device".into());
         }
         if self.untouched.is_some() && self.inject.is_empty() {
             return Err("--untouched goes with --inject: the diagnoses are of its machines".into());

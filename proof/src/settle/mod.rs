@@ -2,6 +2,7 @@
 //! multisines and the set of `characterise`.
 
 mod earlier;
+mod given;
 mod plants;
 mod table;
 
@@ -37,7 +38,7 @@ struct Judged {
     /// Its place among those of the seed.
     index: usize,
     kind: Kind,
-    names: Vec<&'static str>,
+    names: Vec<String>,
     answers: Vec<Answer>,
 }
 
@@ -54,14 +55,15 @@ impl Answer {
     }
 
     /// True if the names that are given are the true ones, each alone in its class, and no others.
-    fn is_right(&self, truth: &[&str]) -> bool {
-        let is_given = |name: &&str| self.names.iter().any(|(class, _)| *class == [*name]);
+    fn is_right(&self, truth: &[String]) -> bool {
+        let is_given =
+            |name: &String| self.names.iter().any(|(class, _)| class.len() == 1 && class[0] == *name);
         self.error.is_none() && self.names.len() == truth.len() && truth.iter().all(is_given)
     }
 
     /// True if a class without a true name is given as sure.
-    fn is_surely_wrong(&self, truth: &[&str]) -> bool {
-        let is_true = |name: &String| truth.contains(&name.as_str());
+    fn is_surely_wrong(&self, truth: &[String]) -> bool {
+        let is_true = |name: &String| truth.contains(name);
         self.names.iter().any(|(class, sure)| *sure >= SURE && !class.iter().any(is_true))
     }
 }
@@ -102,7 +104,7 @@ impl Figures {
         }
         if !plant.names.is_empty() {
             let is_held =
-                |truth: &&str| answer.names.iter().any(|(class, _)| class.iter().any(|name| name == truth));
+                |truth: &String| answer.names.iter().any(|(class, _)| class.iter().any(|name| name == truth));
             self.in_class.add(plant.names.iter().all(is_held));
         }
         self.wrong.add(answer.is_surely_wrong(&plant.names));
@@ -119,13 +121,14 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     let program = program()?;
     let out = options.out.join("settle");
     std::fs::create_dir_all(&out).map_err(|e| format!("cannot create {}: {e}", out.display()))?;
-    let base = base(&program, &out)?;
-    let count = options.cases.unwrap_or(PLANTS);
-    let plants: Vec<(usize, Plant)> = (0..count)
-        .map(|index| (index, plants::draw(&base, options.seed, index)))
+    let all = all_plants(options, &program, &out)?;
+    let count = all.len();
+    let plants: Vec<(usize, Plant)> = all
+        .into_iter()
+        .enumerate()
         .filter(|(index, plant)| is_wanted(options.only.as_deref(), *index, plant))
         .collect();
-    let mark = marks(&program);
+    let mark = marks(&program, options);
     let mut answers = earlier::answers(options, &mark);
     let judged = |(index, plant): &(usize, Plant), answers| Judged {
         index: *index,
@@ -159,10 +162,22 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-/// Marks of the program that is judged and of this one, which draws the plants.
-fn marks(program: &Path) -> String {
+/// The plants of a folder, or those of the seed.
+fn all_plants(options: &Options, program: &Path, out: &Path) -> Result<Vec<Plant>, String> {
+    if let Some(folder) = &options.plants_from {
+        let all = given::plants(folder)?;
+        return Ok(all.into_iter().take(options.cases.unwrap_or(usize::MAX)).collect());
+    }
+    let base = base(program, out)?;
+    let count = options.cases.unwrap_or(PLANTS);
+    Ok((0..count).map(|index| plants::draw(&base, options.seed, index)).collect())
+}
+
+/// Marks of the program that is judged, and of what draws or lists the plants.
+fn marks(program: &Path, options: &Options) -> String {
     let own = std::env::current_exe().map(|own| mark(&own)).unwrap_or_default();
-    format!("{} {own}", mark(program))
+    let key = options.plants_from.as_ref().map(|folder| mark(&folder.join(given::KEY)));
+    format!("{} {own} {}", mark(program), key.unwrap_or_default()).trim_end().to_owned()
 }
 
 /// Writes `settle.json` and `settle.md` about the plants that are judged; returns the latter.
@@ -276,20 +291,24 @@ mod tests {
         Answer { names: classes.iter().map(class).collect(), rounds: 2, motion_s: 48.0, error: None }
     }
 
+    fn texts(names: &[&str]) -> Vec<String> {
+        names.iter().map(ToString::to_string).collect()
+    }
+
     #[test]
     fn only_the_true_name_alone_is_right() {
-        assert!(answer(&[&["cogging"]], 0.95).is_right(&["cogging"]));
-        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_right(&["cogging"]));
-        assert!(!answer(&[&["cogging"], &["command_delay"]], 0.95).is_right(&["cogging"]));
-        assert!(!answer(&[], 0.0).is_right(&["cogging"]));
+        assert!(answer(&[&["cogging"]], 0.95).is_right(&texts(&["cogging"])));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_right(&texts(&["cogging"])));
+        assert!(!answer(&[&["cogging"], &["command_delay"]], 0.95).is_right(&texts(&["cogging"])));
+        assert!(!answer(&[], 0.0).is_right(&texts(&["cogging"])));
         let both = answer(&[&["cogging"], &["command_delay"]], 0.95);
-        assert!(both.is_right(&["command_delay", "cogging"]));
-        assert!(!both.is_right(&["command_delay", "torque_ripple"]));
+        assert!(both.is_right(&texts(&["command_delay", "cogging"])));
+        assert!(!both.is_right(&texts(&["command_delay", "torque_ripple"])));
     }
 
     #[test]
     fn only_the_plants_that_are_asked_for_are_settled() {
-        let names = vec!["cogging", "command_delay"];
+        let names = texts(&["cogging", "command_delay"]);
         let plant = Plant { kind: Kind::Pair, names, toml: String::new() };
         for wanted in [None, Some("plant-12"), Some("cogging"), Some("pairs")] {
             assert!(is_wanted(wanted, 12, &plant), "{wanted:?}");
@@ -301,11 +320,11 @@ mod tests {
 
     #[test]
     fn a_name_is_surely_wrong_if_its_class_lacks_the_truth() {
-        assert!(answer(&[&["cogging"]], 0.95).is_surely_wrong(&["torque_ripple"]));
-        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_surely_wrong(&["torque_ripple"]));
-        assert!(!answer(&[&["cogging"]], 0.85).is_surely_wrong(&["torque_ripple"]));
+        assert!(answer(&[&["cogging"]], 0.95).is_surely_wrong(&texts(&["torque_ripple"])));
+        assert!(!answer(&[&["cogging", "torque_ripple"]], 0.95).is_surely_wrong(&texts(&["torque_ripple"])));
+        assert!(!answer(&[&["cogging"]], 0.85).is_surely_wrong(&texts(&["torque_ripple"])));
         assert!(
-            answer(&[&["cogging"]], 0.95).is_surely_wrong(&[]),
+            answer(&[&["cogging"]], 0.95).is_surely_wrong(&texts(&[])),
             "any sure name is wrong where nothing is concealed"
         );
     }

@@ -20,6 +20,12 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    /// The kind of these words.
+    pub(crate) fn of(words: &str) -> Option<Self> {
+        let all = [Self::Twin, Self::Single, Self::Pair, Self::Null, Self::Outside];
+        all.into_iter().find(|kind| kind.words() == words)
+    }
+
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Twin => "twins",
@@ -36,7 +42,7 @@ impl Kind {
 pub(crate) struct Plant {
     pub(crate) kind: Kind,
     /// The effects; none where nothing is to be named.
-    pub(crate) names: Vec<&'static str>,
+    pub(crate) names: Vec<String>,
     /// The rig file.
     pub(crate) toml: String,
 }
@@ -160,8 +166,11 @@ fn text(name: &str, shape: &[(&str, f64)], coefficients: &[(&str, f64)]) -> Stri
 }
 
 /// Effects of the library and their text.
-fn named(names: &[&'static str], base: &Base, rng: &mut Rng) -> (Vec<&'static str>, String) {
-    (names.to_vec(), names.iter().map(|name| effect(name, base, rng)).collect())
+fn named(names: &[&str], base: &Base, rng: &mut Rng) -> (Vec<String>, String) {
+    (
+        names.iter().map(ToString::to_string).collect(),
+        names.iter().map(|name| effect(name, base, rng)).collect(),
+    )
 }
 
 /// The text of an effect of the library, of a size that is a part of the dry friction or of the drive.
