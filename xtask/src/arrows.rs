@@ -1,10 +1,11 @@
-//! The arrow check: no files of a crate use each other in a circle.
+//! The arrow check: no files of a crate use each other in a circle, and no function is longer than 60 lines.
 //!
 //! A file uses another if its code, tests aside, names something that the other defines. A name that a module only hands on
 //! (`pub use`) belongs to the file that defines it. A module and the modules that it is made of are one house: what it uses of
 //! them is no arrow, what they use of it is one.
 
 mod krate;
+mod lengths;
 mod source;
 
 use crate::shell::{self, Error};
@@ -26,23 +27,31 @@ type Uses = BTreeMap<String, BTreeMap<String, String>>;
 pub(crate) fn check() -> Result<(), Error> {
     let unreadable = |error: io::Error| Error::new(format!("the sources could not be read: {error}"));
     let mut count = 0;
-    let mut circles = Vec::new();
+    let (mut circles, mut long) = (Vec::new(), Vec::new());
     for folder in crates(&shell::top()).map_err(unreadable)? {
         let uses = Crate::read(&folder.join("src")).map_err(unreadable)?.uses();
         count += uses.values().map(BTreeMap::len).sum::<usize>();
         let name = folder.strip_prefix(shell::top()).unwrap_or(&folder).display().to_string();
         circles.extend(circles_of(&uses).iter().map(|circle| message(&name, circle, &uses)));
+        for (file, text) in krate::sources(&folder.join("src")).map_err(unreadable)? {
+            let one = |long: lengths::Function| {
+                let lengths::Function { name: function, line, lines } = long;
+                format!("{name}/src/{file}:{line}: {function} has {lines} lines: split it")
+            };
+            long.extend(lengths::too_long(&text).into_iter().map(one));
+        }
     }
-    circles.iter().for_each(|circle| eprintln!("{circle}"));
+    circles.iter().chain(&long).for_each(|one| eprintln!("{one}"));
     if count < FEWEST_USES {
         return Err(Error::new(format!("only {count} uses were seen: the reader of sources is blind")));
     }
-    if circles.is_empty() {
+    if circles.is_empty() && long.is_empty() {
         return Ok(());
     }
     Err(Error::new(format!(
-        "{} circles, each printed above: move what both files need into a file below them",
-        circles.len()
+        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long",
+        circles.len(),
+        long.len()
     )))
 }
 

@@ -381,6 +381,14 @@ mod tests {
     }
 
     #[test]
+    fn a_short_travel_shows_orders_that_fit_twice_and_beat_once() {
+        assert!(fits(7.0, 0.3) && !fits(6.0, 0.3));
+        assert!(fits(1.0, 0.7) && !fits(2.0, 0.7) && fits(3.0, 0.7));
+        assert!(!are_apart(11.0, 12.0, 0.19) && are_apart(12.0, 18.0, 0.19));
+        assert!(are_apart(1.0, 2.0, 1.0), "a whole turn shows every order");
+    }
+
+    #[test]
     fn teeth_and_poles_leave_gaps_between_their_orders() {
         assert!(is_comb(&cogging(&[7.0, 12.0, 14.0, 21.0, 28.0]), &[1.0; 5]));
         assert!(is_comb(&cogging(&[1.0, 2.0, 3.0, 4.0]), &[1.0; 4]));

@@ -157,11 +157,6 @@ impl Signal {
         }
     }
 
-    /// True if the signal moves the reference.
-    pub fn has_reference(&self) -> bool {
-        matches!(self, Self::Staircase { .. } | Self::Triangle { .. } | Self::Ladder { .. })
-    }
-
     /// True if the signal moves the axis whatever its friction: recordings at rest are refused.
     pub fn travels(&self) -> bool {
         matches!(self, Self::Staircase { .. } | Self::Triangle { .. })
@@ -218,11 +213,6 @@ impl Input {
     /// Its length, s.
     pub fn seconds(&self) -> f64 {
         self.segments.iter().map(|segment| segment.seconds).sum()
-    }
-
-    /// True if a part of it needs a position loop.
-    pub fn has_reference(&self) -> bool {
-        self.segments.iter().any(|segment| segment.signal.has_reference())
     }
 
     /// The input in words.

@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 const EVERY: usize = 10;
 
 impl Design {
-    /// Writes `command.csv`, `reference.csv` if the input has a reference, `predicted.csv`, `experiment.json` and `experiment.html`
-    /// to a folder; returns their paths.
+    /// Writes `command.csv`, `reference.csv`, `predicted.csv`, `experiment.json` and `experiment.html` to a folder; returns their paths.
     ///
     /// # Errors
     /// One sentence: the file, the cause, what to do.
@@ -24,13 +23,13 @@ impl Design {
             )
         };
         std::fs::create_dir_all(folder).map_err(|cause| refuse(folder, cause))?;
-        let mut files = vec![("command.csv", self.command_csv())];
-        if self.chosen.input.has_reference() {
-            files.push(("reference.csv", self.reference_csv()));
-        }
-        files.push(("predicted.csv", self.predicted_csv()));
-        files.push(("experiment.json", format!("{:#}\n", self.json())));
-        files.push(("experiment.html", page::html(self)));
+        let files = [
+            ("command.csv", self.command_csv()),
+            ("reference.csv", self.reference_csv()),
+            ("predicted.csv", self.predicted_csv()),
+            ("experiment.json", format!("{:#}\n", self.json())),
+            ("experiment.html", page::html(self)),
+        ];
         let mut out = Vec::new();
         for (name, text) in files {
             let path = folder.join(name);
@@ -40,7 +39,7 @@ impl Design {
         Ok(out)
     }
 
-    /// The command at 10 kHz: exact where no servo is in the loop, otherwise that of the most probable rival.
+    /// The command at 10 kHz that the servo would send if the most probable rival were true.
     fn command_csv(&self) -> String {
         let mut out = String::from("time_s,command\n");
         for (row, command) in self.predictions[0].command.iter().enumerate() {

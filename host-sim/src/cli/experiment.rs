@@ -11,7 +11,7 @@ const MOST_S: f64 = 30.0;
 
 /// Design the input that best tells the rivals of a diagnosis apart, within limits of travel, speed and force.
 ///
-/// Writes command.csv (and reference.csv for a position loop), predicted.csv with the response of each rival, experiment.json, and
+/// Writes reference.csv for a position loop, command.csv as that loop would send it, predicted.csv with the response of each rival, experiment.json, and
 /// experiment.html, which shows why this input decides. Record it and diagnose again with the recording.
 #[derive(Args)]
 #[command(after_help = examples!("Example:

@@ -23,8 +23,7 @@ struct Module {
 
 impl Crate {
     pub(super) fn read(folder: &Path) -> io::Result<Self> {
-        let mut files = Vec::new();
-        visit(folder, "", &mut files)?;
+        let files = sources(folder)?;
         Ok(Self::of(files.iter().map(|(name, text)| (name.clone(), text.as_str()))))
     }
 
@@ -118,6 +117,13 @@ impl Crate {
         }
         Some((place.to_vec(), name.clone()))
     }
+}
+
+/// Every source below a folder, with its path.
+pub(super) fn sources(folder: &Path) -> io::Result<Vec<(String, String)>> {
+    let mut files = Vec::new();
+    visit(folder, "", &mut files)?;
+    Ok(files)
 }
 
 /// Appends every source below a folder, whose path below `src` is `path`.
