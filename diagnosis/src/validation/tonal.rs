@@ -32,15 +32,20 @@ pub(crate) struct TonalDisturbance {
     pub(crate) part: f64,
     /// Part of what the refit leaves that swings so and that the effects found have taken on.
     pub(crate) taken: f64,
+    /// Part of the rest, which does not swing so, that the effects found take.
+    pub(crate) taken_beside: f64,
 }
 
 /// The smallest part at which a swing is the missing physics.
 const DOMINANT: f64 = 0.4;
+/// Part of the rest from which effects explain more than a swing: a delay leaves much where its command has a tone, and something
+/// everywhere else.
+const MORE_THAN_SWING: f64 = 0.3;
 
 impl TonalDisturbance {
-    /// True if the effects found explain a swing.
+    /// True if the effects found explain a swing and little else.
     pub(crate) fn is_mistaken(&self) -> bool {
-        self.taken > MISTAKEN
+        self.taken > MISTAKEN && self.taken_beside < MORE_THAN_SWING
     }
 
     /// True if the swing is what was left out.
@@ -167,7 +172,14 @@ pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option
     {
         return None;
     }
-    Some(TonalDisturbance { hertz, part, taken: (swings - explained(&after, hertz)) / whole })
+    let still = explained(&after, hertz);
+    let beside = (whole - swings).max(1e-300);
+    Some(TonalDisturbance {
+        hertz,
+        part,
+        taken: (swings - still) / whole,
+        taken_beside: 1.0 - (square(&after) - still) / beside,
+    })
 }
 
 #[cfg(test)]
