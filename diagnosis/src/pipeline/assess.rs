@@ -1,4 +1,4 @@
-//! The third stage: how sure each effect is, and whether something without a name explains the recordings instead.
+//! The fourth stage: how sure each effect is, and whether something without a name explains the recordings instead.
 
 use super::diagnosis::Reason;
 use super::prepare::Prepared;

@@ -1,4 +1,4 @@
-//! Between search and assessment: where other physics and not noise is most of what a model leaves, shares of the force error select
+//! The third stage: where other physics and not noise is most of what a model leaves, shares of the force error select
 //! the effects, and no likelihood rejects them.
 
 use super::prepare::Prepared;

@@ -1,4 +1,4 @@
-//! The fourth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
+//! The fifth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
 
 use super::assess::Assessment;
 use super::contenders::contenders;

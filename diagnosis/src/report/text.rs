@@ -1,4 +1,4 @@
-//! The sentences of a report: nothing else makes any of what was found, and nothing reads one to decide.
+//! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes the headline. Nothing reads one to decide.
 
 use crate::numerics::bootstrap::Gain;
 use crate::pipeline::diagnosis::Reason;
