@@ -193,8 +193,8 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
     if before > 0.0 { (left / before).min(1.0) } else { 0.0 }
 }
 
-/// Returns the weighed effects, their rivals, the hypotheses that were rejected on the way, and what no score singled out, each effect once.
-/// With those that could not be tested and those of the rig it is the whole library.
+/// Returns the weighed effects, their rivals, the hypotheses that were rejected on the way, and what the search found less in than in those,
+/// each effect once. With those that could not be tested and those of the rig it is the whole library.
 fn hypotheses(
     weighed: &WeighedModel,
     untested: &[(EffectName, String)],
@@ -233,7 +233,7 @@ fn hypotheses(
     let is_in_question =
         |name: &&EffectName| name.definition().is_sought() && is_tested(name) && !nominal.holds(**name);
     for name in EffectName::ALL.iter().filter(is_in_question) {
-        lost(*name, None, Rejection::LowScore);
+        lost(*name, None, Rejection::LessInSearch);
     }
     out
 }

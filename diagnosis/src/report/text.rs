@@ -60,7 +60,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
         Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
-        Rejection::LowScore => "a score test finds less of it than of the effects that were fitted".into(),
+        Rejection::LessInSearch => "in the search others explain more".into(),
         Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
     }
 }

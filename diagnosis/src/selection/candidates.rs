@@ -92,9 +92,12 @@ fn least_clip(tracks: &[BlockedRecording], is_anchored: bool, most: f64, dry: f6
     if is_anchored {
         return LEAST_CLIP_ANCHORED;
     }
+    if dry <= 0.0 {
+        return LEAST_CLIP;
+    }
     let mut commands: Vec<f64> = tracks.iter().flat_map(|t| t.rows.command.iter().map(|u| u.abs())).collect();
     let middle = commands.len() / 2;
-    if dry <= 0.0 || commands.is_empty() {
+    if commands.is_empty() {
         return LEAST_CLIP;
     }
     let (_, median, _) = commands.select_nth_unstable_by(middle, f64::total_cmp);

@@ -49,8 +49,8 @@ pub(crate) enum Rejection {
     Improbable { probability: f64, weakness: Weakness },
     /// The recordings cannot tell it from a named effect.
     Indistinguishable { from: EffectName },
-    /// A score test finds less of it than of the effects that were fitted.
-    LowScore,
+    /// The search finds more in others.
+    LessInSearch,
     /// Another effect explains more instead.
     Behind { winner: EffectName, z: f64 },
 }

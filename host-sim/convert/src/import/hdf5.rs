@@ -1,7 +1,8 @@
 //! HDF5, as MATLAB's `save` with `-v7.3` and h5py write it; only where the program was built with the feature `hdf5`.
 
+use super::npy;
 use super::npy_array::Array;
-use super::table::{Column, Log};
+use super::table::{Column, Log, join};
 use device_sim::error::Error;
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 
@@ -22,13 +23,7 @@ pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     found.group("", &opened.root(), 0).map_err(|cause| unusable(&cause))?;
     let Found { columns, left_out, .. } = found;
     let format = if is_matlab { "MATLAB -v7.3" } else { "HDF5" };
-    let mut notes = vec![format!("read as {format}: {} columns", columns.len())];
-    if !left_out.is_empty() {
-        notes.push(format!("{} left out: no arrays of numbers", left_out.join(", ")));
-    }
-    let mut log = Log::of_columns(file, columns);
-    log.notes = notes;
-    Ok(log)
+    Ok(Log::of_arrays(file, format, columns, &left_out))
 }
 
 /// The columns of a file, and the datasets that hold none.
@@ -70,20 +65,9 @@ impl Found {
         let shape: Vec<usize> = shape.iter().map(|side| *side as usize).filter(|side| *side != 1).collect();
         let array = Array::of(shape, dataset.read_f64()?);
         // Columns count as those who write such files count them.
-        let first = usize::from(self.is_matlab);
-        let is_one = array.axes() == 1;
-        for (i, values) in array.columns().into_iter().enumerate() {
-            self.columns.push(match is_one {
-                true => Column::new(path.as_str(), values),
-                false => Column::unnamed(join(&path, &(i + first).to_string()), values),
-            });
-        }
+        npy::add(&path, &array, usize::from(self.is_matlab), &mut self.columns);
         Ok(())
     }
-}
-
-fn join(path: &str, name: &str) -> String {
-    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
 
 /// True for numbers; MATLAB also stores text as numbers, and an empty array as its sides.

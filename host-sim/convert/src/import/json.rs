@@ -1,7 +1,7 @@
 //! JSON as programs write it: an object of arrays, an array of objects, lines of objects, pandas' `to_json` in each of its
 //! orientations; nested objects give names with dots.
 
-use super::table::{Column, Log};
+use super::table::{Column, Log, join};
 use device_sim::error::Error;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -34,10 +34,6 @@ pub(super) fn read(file: &str, text: &str) -> Result<Log, Error> {
     let mut log = Log::of_columns(file, columns);
     log.notes = notes;
     Ok(log)
-}
-
-fn join(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
 fn scalar(value: &Value) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`): arrays and structures of
 //! arrays. The layout is that of MathWorks' "MAT-File Format": tagged elements, compressed ones within zlib.
 
-use super::table::{Column, Log};
+use super::table::{Column, Log, join};
 use device_sim::error::Error;
 use std::io::Read;
 
@@ -47,13 +47,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
             _ => {}
         }
     }
-    let mut notes = vec![format!("read as MATLAB: {} columns", found.columns.len())];
-    if !found.left_out.is_empty() {
-        notes.push(format!("{} left out: no arrays of numbers", found.left_out.join(", ")));
-    }
-    let mut log = Log::of_columns(file, found.columns);
-    log.notes = notes;
-    Ok(log)
+    Ok(Log::of_arrays(file, "MATLAB", found.columns, &found.left_out))
 }
 
 #[derive(Default)]
@@ -131,10 +125,6 @@ impl Found {
             _ => self.left_out.push(path),
         }
     }
-}
-
-fn join(path: &str, name: &str) -> String {
-    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
 
 /// The part that is left to read.

@@ -76,4 +76,18 @@ impl Log {
         }
         log
     }
+
+    /// The arrays of a file of some format as tables, with a note on what was read and what was left out because it holds no numbers.
+    pub(super) fn of_arrays(file: &str, format: &str, columns: Vec<Column>, left_out: &[String]) -> Self {
+        let mut notes = vec![format!("read as {format}: {} columns", columns.len())];
+        if !left_out.is_empty() {
+            notes.push(format!("{} left out: no arrays of numbers", left_out.join(", ")));
+        }
+        Self { notes, ..Self::of_columns(file, columns) }
+    }
+}
+
+/// The name of a part within a path of names.
+pub(super) fn join(path: &str, name: &str) -> String {
+    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
