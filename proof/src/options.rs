@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// The sources of inputs that `--settle` compares, the judged one first.
-const INPUTS: [&str; 3] = ["designed", "multisines", "characterise"];
+const INPUTS: [&str; 4] = ["designed", "multisines", "characterise", "passive"];
 
 /// The flags of `prove`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,12 +100,12 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --seed N      seed of every draw (1)
   --cases K     draws of every effect at every strength (2); pairs, nulls and the rest in proportion
   --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
-  --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines
-                and the set of characterise in the same time of motion; settle.json and settle.md in the folder of --out.
+  --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines,
+                the set of characterise and strokes as in practice in the same time of motion; settle.json and settle.md in the folder of --out.
                 --keep DIR leaves the recordings. A run of the same seed, inputs and programs that was stopped goes on; with --only,
                 plants are settled anew and their report takes its place
   --plants-from DIR  with --settle: the plants of a folder with key.json (tests/independent/settle_plants.py writes one), not drawn ones
-  --inputs A,B  with --settle: only these of designed, multisines and characterise; the first sets the time of motion
+  --inputs A,B  with --settle: only these of designed, multisines, characterise and passive; the first sets the time of motion
   --jobs N      cases that run at the same time (2)
   --minutes N   no case begins after N minutes; the report says how many were left
   --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz; with --settle
@@ -237,7 +237,7 @@ mod tests {
     fn flags_are_read_and_wrong_ones_named() {
         let o = parse("--seed 7 --cases 3 --quick --jobs 1").unwrap().unwrap();
         assert_eq!((o.seed, o.cases, o.quick, o.jobs), (7, Some(3), true, 1));
-        assert_eq!(o.inputs, ["designed", "multisines", "characterise"], "all where nobody says which");
+        assert_eq!(o.inputs, INPUTS, "all where nobody says which");
         let o = parse("--settle --inputs multisines,designed").unwrap().unwrap();
         assert_eq!(o.inputs, ["multisines", "designed"]);
         assert!(parse("--settle --inputs sines").unwrap_err().contains("`sines`"));

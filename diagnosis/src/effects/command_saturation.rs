@@ -54,9 +54,10 @@ impl EffectSearch for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
     }
-    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
-        // A drive that clips, and a roller that slips at a constant force.
-        vec![EffectName::RollerSlip]
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // Along a line the encoder may be on the load, whose force a grip and a clip limit alike.
+        // An angle is the motor's: a drive that lets go runs away there, and a fit sees it.
+        shown.linear.then_some(EffectName::RollerSlip).into_iter().collect()
     }
 }
 

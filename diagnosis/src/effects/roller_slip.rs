@@ -95,9 +95,10 @@ impl EffectSearch for Defined {
         let gain = allowed.gain;
         ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain))
     }
-    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
-        // A drive that clips, and a roller that slips at a constant force.
-        vec![EffectName::CommandSaturation]
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        // Along a line the encoder may be on the load, whose force a grip and a clip limit alike.
+        // An angle is the motor's: a drive that lets go runs away there, and a fit sees it.
+        shown.linear.then_some(EffectName::CommandSaturation).into_iter().collect()
     }
     fn start_factors(&self) -> &'static [Factors] {
         &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]

@@ -187,6 +187,10 @@ const ANOTHER_UNIT: f64 = 5.0;
 /// The recording whose force and motion are of other units than those of the others, as a sentence with its place; of two, the one that
 /// is farther from the rig.
 pub(crate) fn odd_one(all: &[&Recording], rig: &Rig) -> Option<(usize, String)> {
+    // A force from outside, or an effect of the rig, may be most of the force in one recording and nothing in another.
+    if !rig.effects.is_empty() || all.iter().any(|recording| recording.force.is_some()) {
+        return None;
+    }
     let asked = |recording: &&Recording| {
         let (inertia, explained) = Smoothed::new(recording, rig).inertia()?;
         (explained > EXPLAINED && inertia > 0.0).then(|| inertia.ln())
@@ -236,6 +240,19 @@ mod tests {
             out.command.push(2.0e-3 * acceleration + 2.0e-3 * velocity + stiffness * position);
         }
         out
+    }
+
+    #[test]
+    fn a_measured_external_force_is_no_other_unit() {
+        let rig = Rig::parse(RIG, "rig.toml").expect("the rig is right");
+        let (usual, mut pushed) = (swing(0.0), swing(0.0));
+        // A tenth of the force by the drive, the rest by whoever pushes.
+        let pushes: Vec<f64> = pushed.command.iter().map(|u| 0.9 * u).collect();
+        pushed.command.iter_mut().for_each(|u| *u *= 0.1);
+        let all = [&usual, &usual, &pushed];
+        assert_eq!(odd_one(&all, &rig).map(|(place, _)| place), Some(2), "nothing is known of a push");
+        let measured = Recording { force: Some(pushes), ..pushed.clone() };
+        assert_eq!(odd_one(&[&usual, &usual, &measured], &rig), None);
     }
 
     #[test]

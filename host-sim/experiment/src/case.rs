@@ -11,6 +11,8 @@ const MARGIN: f64 = 0.8;
 const LEAST_PROBABILITY: f64 = 0.01;
 /// Steps of a recording from which their mean length is taken.
 const FEWEST_STEPS: f64 = 20.0;
+/// Least probability of a contender that the report names as the possible truth of a named effect.
+const LEAST_OF_CLASS: f64 = 0.05;
 /// The most contenders that are compared.
 const MOST_RIVALS: usize = 5;
 
@@ -130,6 +132,11 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
         Ok(Rival { name, words, probability: contender.probability, rig })
     };
     let mut rivals = report.contenders.iter().map(one).collect::<Result<Vec<_>, String>>()?;
+    // However unlikely, a name that the report gives as well is still to be told apart.
+    let is_said = |rival: &&mut Rival| report.effects.iter().any(|effect| is_other(effect, &rival.name));
+    for rival in rivals.iter_mut().filter(is_said) {
+        rival.probability = rival.probability.max(LEAST_OF_CLASS);
+    }
     Case::normalise(&mut rivals);
     if rivals.len() < 2 {
         return Err(format!(
@@ -138,6 +145,11 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
         ));
     }
     Ok(rivals)
+}
+
+/// True if the report says that an effect could also be the one of this name.
+fn is_other(effect: &diagnosis::report::Named, name: &str) -> bool {
+    effect.class.iter().any(|other| other.as_str() == name && *other != effect.name)
 }
 
 /// The motion that the report's recordings showed.

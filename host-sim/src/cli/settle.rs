@@ -24,6 +24,8 @@ enum Source {
     Multisines,
     /// The set of `characterise`, shortened to --motion, for comparison
     Characterise,
+    /// The needle in and out as in practice, all of --motion in one round, for comparison
+    Passive,
 }
 
 /// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and record again.
@@ -151,6 +153,7 @@ impl Settle {
             Source::Designed => Inputs::Designed,
             Source::Multisines => Inputs::Multisines,
             Source::Characterise => Inputs::Characterise,
+            Source::Passive => Inputs::Passive,
         };
         Settings {
             inputs,

@@ -1,5 +1,5 @@
 //! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside it, in the same time of motion, random
-//! multisines and the set of `characterise`.
+//! multisines, the set of `characterise`, and strokes as in practice.
 
 mod earlier;
 mod given;

@@ -1,5 +1,6 @@
 //! `settle` on the flash image: the emulated board plays the excitations on a mechanism that the diagnosis did not write
-//! (`tests::mechanism`: a law and an integrator of its own), and the diagnosis names what is concealed in it.
+//! (`tests::mechanism`: a law and an integrator of its own), or on a plant that another author concealed
+//! (`tests/independent/settle_plants.py`), and the diagnosis names what is concealed in it.
 
 use std::io;
 use std::path::Path;
@@ -8,7 +9,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use device_sim::device::{Port, Wire};
-use lab::settle::{Inputs, Settings, Subject, settle};
+use diagnosis::rig::Rig;
+use diagnosis::simulation::{Plant, Surroundings};
+use lab::settle::{Inputs, Settings, Settled, Subject, settle};
+use tests::board::plant::{Drive, PlantSide};
 use tests::board::{Board, MILLISECOND, Nanos};
 use tests::mechanism::{Mechanism, SharedMechanism};
 use tests::pc::open_port;
@@ -17,6 +21,9 @@ use tests::scenario::board;
 /// The rotor's angle at the beginning and the board's tilt, rad.
 const ROTOR: f64 = 1.234;
 const TILT: f64 = std::f64::consts::FRAC_PI_6;
+/// The DAC code without torque, and the longest step of a plant, s.
+const MID_SCALE: f64 = 2_048.0;
+const STEP_S: f64 = 2e-5;
 /// The most that the board moves on between two readings, so that a slow computer makes a slow device and not a silent one.
 const BURST_MS: u64 = 5;
 
@@ -61,32 +68,77 @@ impl Wire for Cable {
     }
 }
 
-#[test]
-#[ignore = "nightly: half a minute of the board, recorded at 10 kHz, and its diagnosis, 40 s"]
-fn cogging_is_settled_on_the_flash_image() {
-    let mechanism = SharedMechanism::new(Mechanism::new(ROTOR, TILT));
-    let mut board = board(mechanism.plant());
+/// The mechanism of a rig file on the board's shaft.
+fn concealed(name: &str) -> impl PlantSide + use<> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/concealed").join(name);
+    let mut plant = Plant::new(&Rig::read(&path).expect("a rig"));
+    let mut last = 0;
+    move |at: Nanos, drive: Drive| {
+        let command = match drive {
+            Drive { code: Some(code), enabled: true } => f64::from(code) - MID_SCALE,
+            _ => 0.0,
+        };
+        let dt = at.saturating_sub(last) as f64 / 1e9;
+        last = at;
+        let steps = (dt / STEP_S).ceil();
+        for _ in 0..steps as u32 {
+            plant.step(command, Surroundings::default(), dt / steps);
+        }
+        plant.counts() as i64
+    }
+}
+
+/// Settles what is on the shaft of the emulated board in at most `rounds`.
+fn settled(plant: impl PlantSide + 'static, rounds: usize, name: &str) -> Settled {
+    let mut board = board(plant);
     open_port(&mut board);
     let mut port = Plugged(Arc::new(Mutex::new(board)));
     let stop = AtomicBool::new(false);
     let mut subject = Subject::Real { port: &mut port, stop: &stop };
     let rig = subject.data_sheet_rig().expect("the board tells its scale");
-    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("settled");
     let settings = Settings {
         inputs: Inputs::Designed,
-        rounds: 2,
+        rounds,
         motion_s: 60.0,
         seed: 1,
         compensate: false,
         device: "board".into(),
-        out,
+        out: Path::new(env!("CARGO_TARGET_TMPDIR")).join(name),
     };
     let settled = settle(&mut subject, &rig, &settings, |_| Ok(())).expect("it is settled");
     println!("{}", settled.conclusion);
-    let named: Vec<(&str, f64)> =
-        settled.names.iter().map(|name| (name.name.as_str(), name.confidence)).collect();
-    println!("{named:?} after {:.0} s of motion", settled.motion_s());
+    for name in &settled.names {
+        println!("{} {:.2}", name.class.join(" or "), name.confidence);
+    }
+    println!("{:.0} s of motion", settled.motion_s());
+    settled
+}
+
+/// The names, each alone in its class.
+fn single(settled: &Settled) -> Vec<&str> {
+    settled.names.iter().filter(|name| name.class.len() == 1).map(|name| name.name.as_str()).collect()
+}
+
+#[test]
+#[ignore = "nightly: a minute of the board, recorded at 10 kHz, and two diagnoses"]
+fn a_concealed_imbalance_is_settled_on_the_flash_image() {
+    let settled = settled(concealed("mass_imbalance.toml"), 2, "settled-imbalance");
+    assert_eq!(single(&settled), ["mass_imbalance"], "{}", settled.conclusion);
+}
+
+#[test]
+#[ignore = "nightly: a minute of the board, recorded at 10 kHz, and two diagnoses"]
+fn a_concealed_spring_in_the_drive_is_settled_on_the_flash_image() {
+    let settled = settled(concealed("drive_compliance.toml"), 2, "settled-compliance");
+    assert_eq!(single(&settled), ["drive_compliance"], "{}", settled.conclusion);
+}
+
+#[test]
+#[ignore = "nightly: half a minute of the board, recorded at 10 kHz, and its diagnosis, 40 s"]
+fn cogging_is_settled_on_the_flash_image() {
+    let mechanism = SharedMechanism::new(Mechanism::new(ROTOR, TILT));
+    let settled = settled(mechanism.plant(), 2, "settled");
     // The mechanism has a weight, too, which the data sheet does not tell.
-    let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
+    let names: Vec<&str> = settled.names.iter().map(|name| name.name.as_str()).collect();
     assert_eq!(names, ["cogging", "tilt_gravity"], "{}", settled.conclusion);
 }

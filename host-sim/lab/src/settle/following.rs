@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// The longest input of a round, s: it is played twice, once to fit and once, with other numbers, to judge.
 const INPUT_S: f64 = 16.0;
+/// Rounds before a diagnosis counts: a second input shows an effect that hides in the first.
+const LEAST_ROUNDS: usize = 2;
 /// A round that is shorter than this, s, shows nothing new.
 const LEAST_ROUND_S: f64 = 10.0;
 
@@ -23,7 +25,12 @@ pub(super) fn following(
     let (played, rounds) = (settled.motion_s(), settled.rounds.len());
     let left_s = settings.motion_s - played;
     let is_sure = settled.unsure.is_empty() || settings.inputs != Inputs::Designed;
-    if let Some(conclusion) = is_settled(report, settled).filter(|_| is_sure) {
+    if let Some(conclusion) =
+        is_settled(report, settled, LEAST_ROUNDS.min(settings.rounds)).filter(|_| is_sure)
+    {
+        return Ok(Err(conclusion));
+    }
+    if let Some(conclusion) = not_told_apart(settled).filter(|_| settings.inputs == Inputs::Designed) {
         return Ok(Err(conclusion));
     }
     if rounds >= settings.rounds {
@@ -38,15 +45,36 @@ pub(super) fn following(
     next(limited, report, folder, settings, (rounds as u64 + settings.seed, left_s))
 }
 
-/// The conclusion if each name is single, or nothing is there to be named.
-fn is_settled(report: &Report, settled: &Settled) -> Option<String> {
+/// Rounds that are designed against a class before it stays as it is.
+const DESIGNED_AGAINST: usize = 2;
+
+/// The conclusion if inputs that were designed to tell the members of a class apart left all of them.
+fn not_told_apart(settled: &Settled) -> Option<String> {
+    let since = settled.rounds.len().checked_sub(DESIGNED_AGAINST + 1)?;
+    let [first, later @ ..] = &settled.rounds[since..] else { return None };
+    let is_same = |class: &[String]| {
+        later.iter().all(|round| round.names.iter().any(|name| has_members(&name.class, class)))
+    };
+    let class = first.names.iter().map(|name| &name.class).find(|class| class.len() > 1 && is_same(class))?;
+    Some(format!("{DESIGNED_AGAINST} inputs designed to tell them apart leave {}", class.join(" or ")))
+}
+
+fn has_members(a: &[String], b: &[String]) -> bool {
+    a.len() == b.len() && a.iter().all(|one| b.contains(one))
+}
+
+/// The conclusion if each name is single, or nothing is there to be named, after `least_rounds` or more.
+fn is_settled(report: &Report, settled: &Settled, least_rounds: usize) -> Option<String> {
     let explained = matches!(report.verdict, Verdict::NoMismatch | Verdict::ParametersOnly);
     let has_names = settled.rounds.last().is_some_and(|round| !round.names.is_empty());
-    if explained && !has_names && settled.rounds.len() >= 2 {
+    if explained && !has_names && settled.rounds.len() >= LEAST_ROUNDS {
         return Some("two rounds or more leave nothing that an effect would explain".to_owned());
     }
     let rivals = report.contenders.iter().filter(|one| one.name.is_some()).count();
     if rivals > 0 || matches!(report.verdict, Verdict::InsufficientExcitation) {
+        return None;
+    }
+    if settled.rounds.len() < least_rounds {
         return None;
     }
     let names: Vec<&str> = report.effects.iter().map(|effect| effect.name.as_str()).collect();
@@ -69,12 +97,13 @@ fn next(
         Inputs::Characterise => {
             Ok(Err("the set of characterise was played, shortened to the motion allowed".into()))
         }
+        Inputs::Passive => Ok(Err("recordings of practice have no further round".into())),
         Inputs::Multisines => limited.multisine(seed, most_s).map(Ok),
         Inputs::Designed if report.verdict == Verdict::InsufficientExcitation => {
-            limited.general("the recordings so far could not tell", most_s).map(Ok)
+            limited.general_again("the recordings so far could not tell", most_s).map(Ok)
         }
         Inputs::Designed if report.contenders.is_empty() => {
-            limited.general("a name without a rival is not sure enough yet", most_s).map(Ok)
+            limited.general_again("nothing contends: other numbers show whether it stays so", most_s).map(Ok)
         }
         Inputs::Designed => {
             let (travel, speed, force) = limited.limits();
@@ -92,5 +121,29 @@ fn next(
             }
             limited.designed(design).map(Ok)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settle::{Name, Round};
+
+    fn round(class: &[&str]) -> Round {
+        let class: Vec<String> = class.iter().map(|name| (*name).to_owned()).collect();
+        let names = vec![Name { name: class[0].clone(), class, confidence: 0.9 }];
+        let (asked, why, sentence) = (String::new(), String::new(), String::new());
+        Round { asked, why, seconds: 20.0, sentence, contenders: vec![], names }
+    }
+
+    #[test]
+    fn two_designed_rounds_that_leave_a_class_are_enough() {
+        let twins = ["electrical_lag", "command_delay"];
+        let turned = ["command_delay", "electrical_lag"];
+        let of = |rounds: Vec<Round>| not_told_apart(&Settled { rounds, ..Settled::default() });
+        assert_eq!(of(vec![round(&twins), round(&twins)]), None, "one round was designed against it");
+        assert!(of(vec![round(&twins), round(&turned), round(&twins)]).is_some());
+        assert_eq!(of(vec![round(&twins), round(&twins), round(&twins[..1])]), None, "they are told apart");
+        assert_eq!(of(vec![round(&twins[..1]); 3]), None, "a single name");
     }
 }

@@ -41,6 +41,8 @@ pub enum Inputs {
     Multisines,
     /// The excitations of `characterise`, shortened to the motion that is allowed, in one round, for comparison.
     Characterise,
+    /// The needle pushed in and drawn out as in practice, in one round, for comparison: nothing is asked.
+    Passive,
 }
 
 /// The mechanism that is concealed in the virtual device.
@@ -74,7 +76,7 @@ pub struct Settings {
 impl Settings {
     /// The most rounds that inputs of this kind have.
     fn most_rounds(&self) -> usize {
-        if self.inputs == Inputs::Characterise { 1 } else { self.rounds }
+        if matches!(self.inputs, Inputs::Characterise | Inputs::Passive) { 1 } else { self.rounds }
     }
 }
 
@@ -306,6 +308,7 @@ fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Err
             limited.general("no recording yet: speeds, reversals and frequencies of every kind", GENERAL_S)
         }
         Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.motion_s)),
+        Inputs::Passive => limited.practice(0.5 * settings.motion_s),
         Inputs::Characterise => limited.checked(Asked {
             programmes: shortened(programmes(rig, limited.radius_mm()), settings.motion_s),
             words: "the excitations of characterise".into(),

@@ -15,6 +15,10 @@ use fixed::types::I16F16;
 /// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640 and 680 mm/s.
 const SPEED_MM_PER_S: f64 = 650.0;
 
+/// Strokes of practice: their length in mm, their speed in mm/s, and their part of the time. An epidural is pushed in by 40 to 60 mm in
+/// some seconds.
+const PRACTICE: [(f64, f64, f64); 2] = [(50.0, 50.0, 0.6), (20.0, 20.0, 0.4)];
+
 /// Strokes before random multisines, s.
 const STROKES_S: f64 = 3.0;
 
@@ -52,17 +56,25 @@ impl Limited {
     /// A round of some of everything.
     pub(super) fn general(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
         let rad = |mm: f64| mm / self.radius_mm;
-        let part = most_s / 12.0;
-        let segment = |signal, seconds: f64| Segment { signal, seconds: seconds * part };
         let frequencies = vec![3, 5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281];
-        let input = Input {
-            segments: vec![
-                segment(Signal::Staircase { slowest: rad(5.0), ratio: 2.2, steps: 6, dwell_s: 0.4 }, 4.8),
-                segment(Signal::Ladder { smallest: rad(0.06), ratio: 2.0, steps: 8, speed: rad(12.0) }, 4.2),
-                segment(Signal::Multisine { force: self.dry, frequencies }, 3.0),
-            ],
-        };
-        self.of_input(&input, why.to_owned(), None)
+        let signals = [
+            (Signal::Staircase { slowest: rad(5.0), ratio: 2.2, steps: 6, dwell_s: 0.4 }, 0.4),
+            (Signal::Ladder { smallest: rad(0.06), ratio: 2.0, steps: 8, speed: rad(12.0) }, 0.35),
+            (Signal::Multisine { force: self.dry, frequencies }, 0.25),
+        ];
+        self.of_input(&together(signals, most_s), why.to_owned(), None)
+    }
+
+    /// A later round of some of everything, with other numbers: other speeds, faster reversals, and twice the force.
+    pub(super) fn general_again(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
+        let rad = |mm: f64| mm / self.radius_mm;
+        let frequencies = vec![6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390];
+        let signals = [
+            (Signal::Multisine { force: 2.0 * self.dry, frequencies }, 0.25),
+            (Signal::Staircase { slowest: rad(8.0), ratio: 2.0, steps: 6, dwell_s: 0.5 }, 0.4),
+            (Signal::Ladder { smallest: rad(0.1), ratio: 2.0, steps: 8, speed: rad(30.0) }, 0.35),
+        ];
+        self.of_input(&together(signals, most_s), why.to_owned(), None)
     }
 
     /// A round of a random multisine.
@@ -74,6 +86,16 @@ impl Limited {
         let limits = Limits { travel, speed, force };
         let sines = random_multisine(&limits, self.dry, seed, most_s - STROKES_S);
         self.of_input(&Input { segments: vec![strokes, sines] }, "a random multisine".into(), None)
+    }
+
+    /// A round as practice moves the needle: in and out at a hand's speeds.
+    pub(super) fn practice(&self, seconds: f64) -> Result<Asked, Error> {
+        let rad = |mm: f64| mm / self.radius_mm;
+        let strokes = |(stroke, speed, part): (f64, f64, f64)| {
+            (Signal::Triangle { stroke: rad(stroke), speed: rad(speed) }, part)
+        };
+        let input = together(PRACTICE.map(strokes), seconds);
+        self.of_input(&input, "in and out as in practice: nothing is asked".into(), None)
     }
 
     /// A round of a designed input.
@@ -149,6 +171,12 @@ impl Limited {
     }
 }
 
+/// Signals one after the other, each for its part of the time.
+fn together<const N: usize>(signals: [(Signal, f64); N], seconds: f64) -> Input {
+    let segment = |(signal, part): (Signal, f64)| Segment { signal, seconds: part * seconds };
+    Input { segments: signals.map(segment).into() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,6 +208,42 @@ mod tests {
         let general = limited.general("", 12.0).expect("the first round is within the limits");
         let seconds: f64 = general.programmes.iter().map(Programme::seconds).sum();
         assert!((seconds - 24.0).abs() < 0.01, "{seconds} s");
+    }
+
+    /// Whatever the mechanism is, the servo's reference and the torque of the sines stay below four fifths of the device's limits.
+    #[test]
+    fn what_is_not_designed_leaves_a_fifth_of_the_limits() {
+        let limited = limited();
+        let rounds = [limited.general("", 12.0), limited.general_again("", 16.0), limited.practice(12.0)];
+        for asked in rounds.into_iter().map(|asked| asked.expect("it is within the limits")) {
+            for step in asked.programmes.iter().flat_map(|programme| &programme.steps) {
+                let (mm, mm_per_s, torque) = most(&step.excitation.signal);
+                assert!(mm <= 0.8 * TRAVEL_MM, "{mm} mm: {:?}", step.excitation.signal);
+                assert!(mm_per_s <= 0.8 * SPEED_MM_PER_S, "{mm_per_s} mm/s: {:?}", step.excitation.signal);
+                assert!(torque <= 0.8e3 * limited.torque, "{torque} mN·m: {:?}", step.excitation.signal);
+            }
+        }
+    }
+
+    /// The farthest reference in mm, its largest speed in mm/s, and the largest torque in mN·m, if all sines are at their peaks.
+    fn most(signal: &excitation::Signal) -> (f64, f64, f64) {
+        let largest =
+            |first: f64, ratio: I16F16, steps: u8| first * ratio.to_num::<f64>().powi(i32::from(steps) - 1);
+        match signal {
+            excitation::Signal::SpeedStaircase { slowest, ratio, steps, dwell_ms } => {
+                let speed = largest(slowest.0.to_num(), *ratio, *steps);
+                (speed * f64::from(*dwell_ms) * 1e-3, speed, 0.0)
+            }
+            excitation::Signal::Triangle { stroke, speed } => (stroke.0.to_num(), speed.0.to_num(), 0.0),
+            excitation::Signal::ReversalLadder { smallest, ratio, steps, speed } => {
+                (largest(smallest.0.to_num(), *ratio, *steps), speed.0.to_num(), 0.0)
+            }
+            excitation::Signal::Multisine { torque, frequencies } => {
+                let each: f64 = torque.0.to_num();
+                (0.0, 0.0, each * frequencies.len() as f64)
+            }
+            other => panic!("{other:?} is in no such round"),
+        }
     }
 
     /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step, with `effects` concealed in it.
