@@ -98,11 +98,7 @@ fn joint_of(rig: &Rig) -> JointTerms {
 
 /// Text that may stand in XML, and in its comments.
 fn xml(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-        .replace("--", "– ")
+    html_report::safe(text).replace("--", "– ")
 }
 
 fn notes(out: &mut String, joint: &JointTerms) {

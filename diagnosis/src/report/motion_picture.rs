@@ -1,8 +1,10 @@
 //! The picture of "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
 
 use crate::numerics::digits::short;
-use crate::report::axes::{HIGH, close, frame, safe};
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
+use html_report::drawing::path;
+use html_report::plot::{HIGH, close, frame};
+use html_report::safe;
 use std::fmt::Write as _;
 
 /// Points that a line is drawn with.
@@ -44,16 +46,12 @@ fn line(
     let part = |t: f64| afresh.map_or(0, |seconds| (t / seconds) as u64);
     let _ = write!(out, "<path class=\"motion {class}\" data-name=\"{}\" d=\"", safe(name));
     let mut last = None;
-    for (t, x) in time.iter().zip(values).step_by(every) {
-        let (px, py) = at(*t, *x);
-        if py <= 0.0 || py >= HIGH {
-            last = None;
-            continue;
-        }
-        let pen = if last == Some(part(*t)) { 'L' } else { 'M' };
-        let _ = write!(out, "{pen}{px:.1} {py:.1}");
-        last = Some(part(*t));
-    }
+    let shown = time.iter().zip(values).step_by(every).flat_map(|(t, x)| {
+        let place = Some(at(*t, *x)).filter(|(_, y)| *y > 0.0 && *y < HIGH);
+        let is_new = last.replace(part(*t)) != Some(part(*t));
+        is_new.then_some(None).into_iter().chain([place])
+    });
+    path(out, shown);
     out.push_str("\"/>");
 }
 
