@@ -4,7 +4,7 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, built};
-use crate::{arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
+use crate::{answers, arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -59,7 +59,7 @@ pub(crate) const QUICK: [Step; 5] = [
 ];
 
 /// The checks that take longer than the tests may.
-pub(crate) const NIGHTLY: [Step; 8] = [
+pub(crate) const NIGHTLY: [Step; 9] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
     step(
         "parquet",
@@ -71,6 +71,12 @@ pub(crate) const NIGHTLY: [Step; 8] = [
     step("class", "devices and their instructor over Zenoh, and thirty devices measured", 900.0, class),
     step("counts", "hot paths take no more instructions than were written down", 120.0, counts::check),
     step("soak", "the frame parser, ten minutes of damaged frames", 620.0, soak),
+    step(
+        "answers",
+        "the diagnoses of 100 recordings are those of a day ago, to the digit",
+        1500.0,
+        answers::nightly,
+    ),
     step("mutants", "the tests notice a thousand small changes of the code", 2400.0, mutated),
     step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),
 ];
