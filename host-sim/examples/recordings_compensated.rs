@@ -200,7 +200,7 @@ fn fed_forward(rig: &Rig, row: &Row, shift: f64) -> f64 {
 fn waves(effect: &Effect, position: f64) -> f64 {
     let mut waves = effect.waves();
     if waves.is_empty() {
-        let turn = effect.shape.get("turn").copied().unwrap_or(std::f64::consts::TAU);
+        let turn = effect.turn().unwrap_or(std::f64::consts::TAU);
         waves.push(("1".into(), std::f64::consts::TAU / turn));
     }
     let value = |key: String| effect.coefficients.get(&key).copied().unwrap_or(0.0);

@@ -70,6 +70,9 @@ impl EffectLaw for Defined {
     fn scales_drive(&self) -> bool {
         true
     }
+    fn reads_command(&self, effect: &Effect) -> bool {
+        Shape::of(effect).mean_square.is_some()
+    }
     fn drifts(&self) -> bool {
         true
     }
@@ -135,6 +138,9 @@ impl EffectReport for Defined {
             Reported::new("change", (change / fitted.ratio, (sd / fitted.ratio).abs()), "1"),
             Reported::new("time_constant", fitted.shape("time_constant"), "s"),
         ]
+    }
+    fn is_size(&self, value: &str) -> bool {
+        !value.starts_with("period") && value != "time_constant"
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

@@ -31,6 +31,47 @@ shape! {
     }
 }
 
+/// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command and of the measured
+/// load, by dry and viscous friction, and by the weight.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WholeMachine {
+    pub(crate) per_command: f64,
+    pub(crate) dry: f64,
+    pub(crate) viscous: f64,
+    pub(crate) per_force: f64,
+    pub(crate) weight: f64,
+}
+
+impl WholeMachine {
+    /// The values of a shape.
+    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
+        let Self { per_command, dry, viscous, per_force, weight } = *self;
+        [
+            ("per_command", per_command),
+            ("dry", dry),
+            ("viscous", viscous),
+            ("per_force", per_force),
+            ("weight", weight),
+        ]
+    }
+}
+
+impl Effect {
+    /// True if its law is built on the rest of the machine.
+    pub(crate) fn is_joint(&self) -> bool {
+        self.name.formula().is_none() && self.shape.contains_key("per_command")
+    }
+
+    /// Builds the law of a joint on another machine. The force at which a grip lets go stays as it is.
+    pub(crate) fn put_on(&mut self, machine: &WholeMachine) {
+        let scale = self.shape["per_command"] / machine.per_command;
+        if let Some(limit) = self.shape.get_mut("limit") {
+            *limit *= scale;
+        }
+        self.shape.extend(machine.shape().map(|(key, value)| (key.to_owned(), value)));
+    }
+}
+
 /// The load's motion against the motor's.
 #[derive(Debug, Clone)]
 pub(crate) struct Load {

@@ -40,6 +40,12 @@ impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(LoadDependentFrictionLaw { of_drive: Shape::of(effect).of_drive }))
     }
+    fn reads_command(&self, effect: &Effect) -> bool {
+        effect.shape.contains_key("of_drive")
+    }
+    fn follows_drive(&self, effect: &Effect) -> bool {
+        Shape::of(effect).of_drive
+    }
     fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[Shape::KEYS]
     }

@@ -3,8 +3,8 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
-use super::travel_profile::{self, Profile};
 use super::shape::{ShapeKey, shape};
+use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
 #[derive(Debug, Clone)]
@@ -73,6 +73,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn profile_values(&self, effect: &Effect) -> f64 {
+        travel_profile::degree(effect)
+    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         travel_profile::grid(name, span)
     }

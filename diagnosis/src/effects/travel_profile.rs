@@ -54,8 +54,12 @@ pub(super) fn grid(name: EffectName, span: &Span) -> Vec<Effect> {
     DEGREES.map(of).to_vec()
 }
 
+pub(super) fn degree(effect: &Effect) -> f64 {
+    Shape::of(effect).degree
+}
+
 pub(super) fn freedom(effect: &Effect) -> usize {
-    Shape::of(effect).degree as usize
+    degree(effect) as usize
 }
 
 /// Largest less smallest of the fitted polynomial over the travel.

@@ -1,7 +1,7 @@
 //! The nominal model in units of acceleration: its coefficients, their priors, and the sizes that it allows effects.
 
-use crate::effects::EffectName;
 use crate::effects::definition::{Allowed, NominalTerm};
+use crate::effects::{EffectName, WholeMachine};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::skew_columns;
@@ -46,32 +46,6 @@ pub(crate) struct Nominal {
     pub(crate) virtual_inertia: f64,
     /// Rows by which the commands were delayed because they act after their time stamps; none if the recordings show no skew.
     pub(crate) skew_rows: Option<f64>,
-}
-
-/// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command and of the measured load, by
-/// dry
-/// and viscous friction, and by the weight.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Machine {
-    pub(crate) per_command: f64,
-    pub(crate) dry: f64,
-    viscous: f64,
-    per_force: f64,
-    weight: f64,
-}
-
-impl Machine {
-    /// The values of a shape.
-    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
-        let Self { per_command, dry, viscous, per_force, weight } = *self;
-        [
-            ("per_command", per_command),
-            ("dry", dry),
-            ("viscous", viscous),
-            ("per_force", per_force),
-            ("weight", weight),
-        ]
-    }
 }
 
 /// The number of standard deviations by which a nominal value may move in a refit.
@@ -245,11 +219,11 @@ impl Nominal {
     }
 
     /// Returns the values of the whole machine that the law of a joint uses: each as `fitted` has it, or as the rig has it.
-    pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> Machine {
+    pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> WholeMachine {
         let model = &self.rig.model;
         let fitted = |key: Key, otherwise: f64| fitted(key).unwrap_or(otherwise);
         let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
-        Machine {
+        WholeMachine {
             per_command: fitted(Key::Gain, self.known_gain()),
             dry: fitted(Key::Coulomb, self.dry_deceleration()),
             viscous: fitted(Key::Viscous, per_inertia(model.viscous)),

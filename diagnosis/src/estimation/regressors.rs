@@ -92,7 +92,7 @@ fn columns_of(track: &BlockedRecording, effect: &Effect, law: &mut Law, command:
 fn uses_command(effect: &Effect) -> bool {
     let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
         || effect.name.formula().is_some_and(|formula| formula.uses("u"));
-    over_command || effect.shape.contains_key("of_drive") || effect.shape.contains_key("mean_square")
+    over_command || effect.name.definition().reads_command(effect)
 }
 
 /// The state of the axis in block `j`, without its command.

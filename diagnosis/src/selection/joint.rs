@@ -1,12 +1,11 @@
 //! The search for the joint between a motor and its load: the values of its law go together, have many optima, and lean on
 //! the rest of the machine. What is here moves shapes; it chooses between no effects.
 
-use crate::effects::Effect;
+use crate::effects::{Effect, WholeMachine};
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::estimation::nominal::Machine;
 use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
@@ -21,7 +20,7 @@ const ENOUGH: f64 = 1.0;
 
 /// True if the law of an effect is built on the rest of the machine.
 pub(crate) fn is_joint(effect: &Effect) -> bool {
-    effect.shape.contains_key("per_command")
+    effect.is_joint()
 }
 
 fn ends_in_joint(model: &Model) -> bool {
@@ -72,15 +71,9 @@ pub(crate) fn search(
 }
 
 /// The model with its joint on another machine.
-fn on(machine: &Machine, model: &Model) -> Model {
+fn on(machine: &WholeMachine, model: &Model) -> Model {
     let mut on = model.clone();
-    let shape = &mut on.effects.last_mut().expect("there is a joint").shape;
-    // The force at which a grip lets go stays as it is.
-    let scale = shape["per_command"] / machine.per_command;
-    if let Some(limit) = shape.get_mut("limit") {
-        *limit *= scale;
-    }
-    shape.extend(machine.shape().map(|(key, value)| (key.to_owned(), value)));
+    on.effects.last_mut().expect("there is a joint").put_on(machine);
     on
 }
 

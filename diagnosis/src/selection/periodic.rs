@@ -187,33 +187,18 @@ impl<'a> Waves<'a> {
         if orders.is_empty() || (self.whole && !name.definition().is_of_orders(&orders)) {
             return None;
         }
-        let shape = self.shape(&orders);
-        let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-        Some((Effect::shaped(name, &shape), gain))
+        Some((self.made_of(name, &orders), gain))
     }
 
-    /// The shape of an effect that is made of some orders.
-    fn shape(&self, orders: &[f64]) -> Vec<(String, f64)> {
+    /// An effect that is made of some orders.
+    fn made_of(&self, name: N, orders: &[f64]) -> Effect {
         if self.whole {
-            return shape_of_orders(self.turn, orders);
+            return Effect::of_orders(name, self.turn, orders);
         }
         let mut periods: Vec<f64> = orders.iter().map(|order| self.turn / order).collect();
         periods.sort_by(f64::total_cmp);
-        periods.into_iter().enumerate().map(|(i, period)| (format!("period_{}", i + 1), period)).collect()
+        Effect::of_periods(name, &periods)
     }
-}
-
-/// The shape of an effect that is made of whole orders of a turn, rad or m.
-fn shape_of_orders(turn: f64, orders: &[f64]) -> Vec<(String, f64)> {
-    let waves = orders.iter().map(|order| (format!("order_{order}"), *order));
-    std::iter::once(("turn".to_owned(), turn)).chain(waves).collect()
-}
-
-/// An effect that is made of whole orders of a turn, rad or m.
-pub(crate) fn of_orders(name: N, turn: f64, orders: &[f64]) -> Effect {
-    let shape = shape_of_orders(turn, orders);
-    let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-    Effect::shaped(name, &shape)
 }
 
 /// Whitened responses of each recording to cosine and sine of some waves, for one search after another; `means` holds those waves for

@@ -137,8 +137,8 @@ pub(crate) fn best_on_grid(
 ) -> Option<(Effect, Score)> {
     let scores = parallel::map_all(grid, |effect| score(fit, residuals, model, tracks, effect, nominal));
     // Of profiles along the travel the finer has more values to fit.
-    let degree = |effect: &Effect| effect.shape.get("degree").copied().unwrap_or(0.0);
-    let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * degree(effect);
+    let values = |effect: &Effect| effect.name.definition().profile_values(effect);
+    let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * values(effect);
     let mut best: Option<(Effect, Score)> = None;
     for (effect, score) in grid.iter().zip(scores) {
         if score.gain > 0.0 && best.as_ref().is_none_or(|(e, b)| net(effect, &score) > net(e, b)) {

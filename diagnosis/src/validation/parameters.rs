@@ -104,9 +104,7 @@ pub(crate) fn has_size(name: N, parameters: &BTreeMap<String, Parameter>) -> boo
 
 /// The parameters that are sizes, and do not say where or when an effect acts.
 fn sizes(name: N, parameters: &BTreeMap<String, Parameter>) -> impl Iterator<Item = &Parameter> {
-    let drifts = name.definition().drifts();
-    let is_size = move |key: &str| !(key.starts_with("period") || (drifts && key == "time_constant"));
-    parameters.iter().filter(move |(key, _)| is_size(key)).map(|(_, p)| p)
+    parameters.iter().filter(move |(key, _)| name.definition().is_size(key)).map(|(_, p)| p)
 }
 
 /// Returns why an effect of a fitted model may not be named although it explains something: its own size may be zero.

@@ -168,10 +168,9 @@ fn moved(rig: &Rig, with_effects: bool) -> Vec<Moved> {
             };
             push(&change, COEFFICIENT);
         }
-        let is_fixed = |key: &str| key == "turn" || key.starts_with("order_") || key.starts_with("period_");
-        for (key, value) in effect.shape.iter().filter(|(key, value)| !is_fixed(key) && **value != 0.0) {
+        for (key, value) in effect.uncertain_values() {
             let change = |rig: &mut Rig| {
-                rig.effects[i].shape.insert(key.clone(), value * (1.0 + MOVE));
+                rig.effects[i].shape.insert(key.to_owned(), value * (1.0 + MOVE));
                 true
             };
             push(&change, FRICTION);

@@ -90,6 +90,16 @@ pub(crate) trait EffectLaw: Sync {
         None
     }
 
+    /// True if its law reads the command beside the motion.
+    fn reads_command(&self, _effect: &Effect) -> bool {
+        false
+    }
+
+    /// True if its force is in proportion to the drive's, which is what a fit of shares is to explain.
+    fn follows_drive(&self, _effect: &Effect) -> bool {
+        false
+    }
+
     /// True if it changes with the time of the recording.
     fn drifts(&self) -> bool {
         false

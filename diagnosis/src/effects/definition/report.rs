@@ -89,6 +89,11 @@ pub(crate) trait EffectReport {
         0.005
     }
 
+    /// True if a reported value is a size, and does not say where or when the effect acts.
+    fn is_size(&self, value: &str) -> bool {
+        !value.starts_with("period")
+    }
+
     /// The variable over which it shows: `speed`, `travel`, `angle`, `command`, `time` or `tilt`.
     fn variable(&self) -> &'static str {
         "speed"

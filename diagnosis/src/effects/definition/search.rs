@@ -134,6 +134,11 @@ pub(crate) trait EffectSearch {
         false
     }
 
+    /// Returns the number of values of a finer profile along the travel, by which shapes of a grid differ; 0 if they do not.
+    fn profile_values(&self, _effect: &Effect) -> f64 {
+        0.0
+    }
+
     /// False for a force without a name, which is no hypothesis.
     fn is_sought(&self) -> bool {
         true

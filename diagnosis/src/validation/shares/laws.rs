@@ -76,7 +76,7 @@ pub(crate) fn columns(
         });
     }
     // A loss in proportion to the recorded command would shrink what it is to explain.
-    let rests_on_command = is_by_command(effect) || effect.value("of_drive") > 0.5;
+    let rests_on_command = is_by_command(effect) || effect.name.definition().follows_drive(effect);
     let with_asked = rests_on_command.then(|| asked.tracks(sights, scale));
     let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
     let inputs: Vec<Vec<Input>> = (0..sights.len()).map(|r| inputs_of(effect, track(r))).collect();

@@ -4,7 +4,7 @@
 use super::laws::Columns;
 use super::state::State;
 use crate::effects::{Effect, EffectName as N};
-use crate::selection::periodic::{are_apart, fits, of_orders};
+use crate::selection::periodic::{are_apart, fits};
 
 /// Orders of a turn that are tried.
 const ORDERS: usize = 24;
@@ -38,7 +38,7 @@ impl State<'_> {
             fits(*order, span.travel() / turn) && is_in_band
         };
         let orders = (1..=ORDERS).map(|order| order as f64).filter(is_seen);
-        let alone = |order: f64| Some((order, self.tried(of_orders(name, turn, &[order]))?));
+        let alone = |order: f64| Some((order, self.tried(Effect::of_orders(name, turn, &[order]))?));
         let mut ranked: Vec<(f64, Tried)> = orders.filter_map(alone).collect();
         ranked.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
         ranked.truncate(TOGETHER.0);
@@ -53,7 +53,7 @@ impl State<'_> {
                 continue;
             }
             let with: Vec<f64> = taken.iter().copied().chain([order]).collect();
-            let Some(more) = self.tried(of_orders(name, turn, &with)) else { continue };
+            let Some(more) = self.tried(Effect::of_orders(name, turn, &with)) else { continue };
             if more.0 > best.0 + FURTHER {
                 (best, taken) = (more, with);
             }

@@ -107,10 +107,10 @@ impl Sums {
                 let waves = self.read_waves(effect, 1.0);
                 self.ripple.extend(waves);
             }
-            EffectName::CommandDeadband if effect.shape.get("shift").is_some_and(|shift| *shift != 0.0) => {
-                self.deadband = effect.shape.get("half_width").copied().unwrap_or(0.0) * self.per_code;
-            }
-            other => self.left_out.push(format!("{} is not fed forward", other.in_words())),
+            other => match effect.shifted_dead_band() {
+                Some(half_width) => self.deadband = half_width * self.per_code,
+                None => self.left_out.push(format!("{} is not fed forward", other.in_words())),
+            },
         }
     }
 
