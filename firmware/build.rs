@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// The boards: the feature of each, as cargo hands it to this script, and where its memory map lies.
+/// The boards: the feature of each, as cargo hands it to this script, and the place of its memory map.
 const BOARDS: [(&str, &str); 2] =
     [("DISCOVERY", "../memory.x"), ("NUCLEO_F429ZI", "src/board/nucleo_f429zi/memory.x")];
 

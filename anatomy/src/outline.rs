@@ -91,7 +91,7 @@ fn end(mut empty: f64, mut full: f64, column: impl Fn(f64) -> Option<Stretch>) -
 mod tests {
     use crate::{Place, Site};
 
-    /// The needle's own line is in the section: what it meets at 45° stands on the outlines.
+    /// The needle's own line is in the section: what it meets at 45° is on the outlines.
     #[test]
     fn a_section_shows_what_the_needle_meets() {
         let body = Site::Shoulder.body(4.39);

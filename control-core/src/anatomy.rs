@@ -455,7 +455,7 @@ impl Angle {
 }
 
 impl Anatomy {
-    /// The angle to the skin at a measured tilt, within what is told apart.
+    /// The angle to the skin at a measured tilt, within what is distinguished.
     fn angle(&self, tilt: Milliradians) -> Milliradians {
         Milliradians(tilt.0.saturating_sub(self.skin_tilt).clamp(SMALLEST_ANGLE.0, LARGEST_ANGLE.0))
     }

@@ -144,7 +144,7 @@ impl From<DacWidth> for WidthCode {
     }
 }
 
-/// A number of bits that is no converter's.
+/// A number of bits that no converter has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoWidth(pub u8);
 

@@ -36,7 +36,7 @@ pub struct Excitation {
     pub servo: Servo,
     /// Largest distance from where it began, 1–1,000 mm along the roller; beyond it is a fault.
     pub travel: Millimetres,
-    /// With what the device feeds forward: shows what is left of the mechanism. Without, the mechanism as it is.
+    /// With what the device feeds forward: shows the rest of the mechanism. Without, the mechanism as it is.
     pub compensated: bool,
 }
 

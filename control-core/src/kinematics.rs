@@ -339,7 +339,7 @@ mod tests {
         // 0.08 mm at 10 Hz is up to 5 mm/s.
         let tremor = |tick: u32| 0.08 * (f64::from(tick) * 0.006_283).sin();
         assert_eq!(directions((0..100_000).map(tremor)), [100_000, 0, 0]);
-        // In at 3 mm/s, then held: a quarter of a second later it rests, for good.
+        // In at 3 mm/s, then held: a quarter of a second later it rests permanently.
         let held = directions((0..50_000).map(|tick| 3e-4 * f64::from(tick.min(10_000)) + tremor(tick)));
         assert!(held[0] > 35_000 && held[2] == 0, "{held:?}");
     }

@@ -13,7 +13,7 @@ const EXP2_Q30: [i32; 6] = [1_073_741_824, 744_261_118, 257_941_248, 59_597_086,
 pub(crate) fn exp(x: I16F16) -> I16F16 {
     let x = x.clamp(I16F16::ZERO, I16F16::from_bits(8 << 16));
     let power = truncating_product(x.to_bits(), LOG2_E.to_bits(), 30);
-    // Round(x·log2(e)), 0 to 12; what is left of it lies in [−0.5, 0.5).
+    // Round(x·log2(e)), 0 to 12; the rest is in [−0.5, 0.5).
     let whole = (power + (1 << 15)) >> 16;
     let fraction_q32 = (power - (whole << 16)) << 16;
     let mantissa_q30 = exp2_q30(fraction_q32);

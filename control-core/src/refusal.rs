@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The reason why a configuration may not run. `layer` counts from 0, the outermost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// A value lies outside its range.
+    /// A value is outside its range.
     OutOfRange {
         /// The field.
         field: Field,
@@ -48,7 +48,7 @@ pub enum Refusal {
         /// The jump in N.
         force: I16F16,
     },
-    /// A rising parabola's vertex lies past contact, or a relief's before its puncture: the force would pull.
+    /// A rising parabola's vertex is past contact, or a relief's before its puncture: the force would pull.
     WrongWay {
         /// The layer.
         layer: u8,
@@ -58,7 +58,7 @@ pub enum Refusal {
         /// The layer.
         layer: u8,
     },
-    /// A layer lies beyond the travel.
+    /// A layer is beyond the travel.
     BeyondTravel {
         /// The layer.
         layer: u8,

@@ -10,7 +10,7 @@
 //!
 //! During an excitation nobody's hand is on the needle, and the torque swings faster than a hand does. Then a rightly wired needle may go
 //! against it as well: a load that flies on through a gap knocks the motor on, and a drive that obeys late gives the torque
-//! of before. Either is over within 4 ms, while a servo whose motor is swapped drives the needle away for good.
+//! of before. Either is over within 4 ms, while a servo whose motor is swapped drives the needle away permanently.
 //!
 //! **Too fast.** Whatever drives it.
 //!
@@ -45,7 +45,7 @@ const COASTING_TURNS: u32 = 1;
 const DRIVEN_LOOKS: u32 = 2;
 /// The same under the servo of an excitation, 4 ms: longer than a late drive or a knock of the load.
 const SERVO_DRIVEN_LOOKS: u32 = 5;
-/// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
+/// Rounding to counts makes up to two of an acceleration: fewer counts than this do not count.
 const LEAST_COUNTS: i32 = 5;
 
 /// A needle is too fast at this share of what an encoder that works may count in a tick: 0.4 m/s where that is 16 counts of

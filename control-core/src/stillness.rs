@@ -113,20 +113,20 @@ impl Stillness {
         self.without_torque > WITHOUT_TORQUE_LOOKS
     }
 
-    /// Returns what is left of `torque`.
+    /// Returns the rest of `torque`.
     pub(crate) fn left_of(&self, torque: I16F16) -> I16F16 {
         let left = I2F30::ONE.saturating_sub(self.taken);
         I16F16::from_bits(truncating_product(torque.to_bits(), left.to_bits(), 30))
     }
 }
 
-/// A torque below this share of the limit is none: a friction of the needle's bearings.
+/// A torque below this share of the limit does not count: the friction of the needle's bearings.
 const LOADED_SHARE: u32 = 8;
 /// A torque that moves a needle which nobody holds is at least so many times the dry friction.
 const TIMES_FRICTION: u32 = 3;
 
 /// The smallest torque at which a needle without a count is looked at, in mN·m: an eighth of the limit, or three times the dry
-/// friction, and what stands even where no force is felt.
+/// friction, and the torque that is there even where no force is felt.
 pub(crate) fn loaded_torque(limit: I16F16, dry_friction: U16F16, at_rest: U16F16) -> U16F16 {
     let share = limit.unsigned_abs() / LOADED_SHARE;
     share.max(dry_friction.saturating_mul_int(TIMES_FRICTION)).saturating_add(at_rest)

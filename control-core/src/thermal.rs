@@ -73,7 +73,7 @@ impl Winding {
         const { assert!(WARM_TICKS == 8, "three places") };
         let mean: I32F32 = core::mem::take(&mut self.squared) >> 3_u32;
         let towards_q32 = (mean - self.heat).to_bits();
-        // What is left of the difference fits. The step is a share of 2^-10 or less: in Q52, with 20 places taken off last,
+        // The rest of the difference fits. The step is a share of 2^-10 or less: in Q52, with 20 places taken off last,
         // nothing of it is lost.
         let step_q52 = i64::from((towards_q32 >> 20) as i32) * i64::from(limits.warming.to_bits());
         self.heat += I32F32::from_bits(step_q52 >> 20);

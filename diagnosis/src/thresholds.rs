@@ -1,5 +1,5 @@
 //! Every number that admits or rejects a name, in one place, with its unit and what it means. Whatever only limits a search (steps, grids,
-//! how many candidates are fitted) stands where it is used.
+//! how many candidates are fitted) is where it is used.
 //!
 //! Shares are parts of the refit's mean square above the noise; z is a gain over its standard error; nats are log-likelihood. Where no
 //! other source is given a number was set by hand on development seeds of `cargo xtask prove`; docs/diagnosis-design.md says how that fares.

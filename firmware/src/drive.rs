@@ -11,7 +11,7 @@ pub trait MotorDac {
     /// Resolution of this converter.
     const WIDTH: DacWidth;
 
-    /// Puts out `code`, which lies within [`Self::WIDTH`]. Called from the tick: takes a few bus cycles and never waits.
+    /// Puts out `code`, which is within [`Self::WIDTH`]. Called from the tick: takes a few bus cycles and never waits.
     /// Where codes wait for an instant set by hardware, one that has missed it gives way to the next tick's.
     fn put(&mut self, code: DacCode);
 

@@ -1,5 +1,5 @@
 //! The interface of a board: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
-//! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
+//! `embedded-hal` has the trait for the amplifier's enable line; the traits that it lacks are here.
 
 use crate::drive::Converters;
 use crate::monitor::Readings;

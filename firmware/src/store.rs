@@ -5,7 +5,7 @@
 //! processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
 //!
 //! Below it, the flash has the traits of `embedded-storage` ([`Nor`]), so that another store, such as `sequential-storage`, can take this
-//! one's place. This one is kept for three things: a bit that flips in the record saved last is told from a record that was never
+//! one's place. This one is kept for three things: a bit that flips in the record saved last is distinguished from a record that was never
 //! finished, so that a device never quietly runs on an older one; it is read and written without waiting in between, in a task
 //! that the watchdog looks after, and reports progress with every word; and its tests cut the power at every single write.
 

@@ -75,7 +75,7 @@ impl Pulses {
     fn show(&self) -> bool {
         let has_moved = self.span.1.abs_diff(self.span.0) >= LEAST_COUNTS;
         let (least, most) = self.bounds;
-        // What is left at the end has gone into friction: a roller that runs on by itself leaves nothing.
+        // The rest at the end has gone into friction: a roller that runs on by itself leaves nothing.
         has_moved && self.driven == (true, true) && most > -least * CLEARLY && self.work * CLEARLY > most
     }
 }

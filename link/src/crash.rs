@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(
             Crash::panic(&std::format!("{wide}x"), 1).file.len(),
             FILE_BYTES - 1,
-            "half a letter is none"
+            "half a letter is left out"
         );
     }
 

@@ -12,7 +12,7 @@ pub(crate) const NUMBERS: usize = 7;
 const GRID: [usize; 2] = [28, 17];
 /// The block of tissue reaches so deep under the skin, mm.
 pub(crate) const BLOCK_MM: f64 = 30.0;
-/// A tube deeper than this is none of the block's, mm.
+/// A tube deeper than this is outside the block, mm.
 const DEEPEST_MM: f32 = 40.0;
 /// A layer is drawn at least so thick, mm.
 const THINNEST_MM: f64 = 0.35;

@@ -206,7 +206,7 @@ impl Record {
 pub(crate) struct Gain {
     /// Over what the oracle gains, whatever noise the tool's own estimator adds.
     pub(crate) of_oracle: f64,
-    /// Over what the tool's own refit leaves above the noise: what is left counts against it.
+    /// Over what the tool's own refit leaves above the noise: the residual counts against it.
     pub(crate) of_own: f64,
 }
 

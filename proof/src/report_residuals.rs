@@ -101,7 +101,7 @@ mod tests {
             .map(|i| {
                 let t = f64::from(i) * 1e-3;
                 let wave = (12.0 * t).sin() + (2500.0 * t).sin();
-                // What stands in the times at rest of the key is not judged.
+                // The times at rest of the key are not judged.
                 let size = if (3.0..3.8).contains(&t) { 50.0 } else { 1.0 };
                 (t, (!(6.0..6.5).contains(&t)).then_some([size * wave, 0.5 * wave]))
             })

@@ -16,7 +16,7 @@ pub(crate) struct Paths {
 }
 
 impl Paths {
-    /// The same files in the folder `to`, which is created, where no key lies beside them.
+    /// The same files in the folder `to`, which is created, where no key is next to them.
     pub(crate) fn copied(&self, to: &Path) -> Result<Self, String> {
         std::fs::create_dir_all(to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;
         let copy = |from: &PathBuf| {

@@ -204,7 +204,7 @@ impl Bootloader {
     }
 }
 
-/// The sector of the flash that an address lies in.
+/// The sector of the flash that holds an address.
 pub fn sector_of(address: u32) -> Option<Range<usize>> {
     let sizes = [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128];
     let offset = address.checked_sub(FLASH)? as usize;

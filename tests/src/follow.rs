@@ -1,4 +1,4 @@
-//! The board and the control core beside each other, tick for tick: what the pins show against what the core computes from the same
+//! The board and the control core side by side, tick for tick: what the pins show against what the core computes from the same
 //! counts and angles.
 
 use control_core::controller::{LargeOrder, Order, Sample, TickInput, TickOutput};

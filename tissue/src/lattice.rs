@@ -177,7 +177,7 @@ impl Lattice {
         }
         let mut add = |corners: [u32; 4]| {
             let built = bending_angle(corners.map(|index| place(&parts.points[index as usize])));
-            // The table's angle lies between the planes; ours between their normals.
+            // The table's angle is between the planes; ours is between their normals.
             let rest = layer.bending_deg.map_or(built, |degrees| std::f32::consts::PI - degrees.to_radians());
             parts.bendings.push(Bending { corners, rest, compliance: 1.0 / layer.bending_stiffness });
         };

@@ -12,7 +12,7 @@ pub struct Mesh<'a> {
     pub triangles: &'a [[u32; 3]],
     /// The medium behind it: under the surface of a layer, inside a vessel.
     pub behind: Medium,
-    /// A closed surface: the second crossing leads out of it again, into the last of those that it is in, of which 64 are told apart. It is a
+    /// A closed surface: the second crossing leads out of it again, into the last of those that it is in, of which 64 are distinguished. It is a
     /// wall as thick as this, mm; 0 is a surface without one.
     pub wall_mm: Option<f32>,
 }

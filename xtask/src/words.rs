@@ -95,12 +95,18 @@ fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
     for (at, first) in words.iter().enumerate() {
         for (rest, phrase) in by_first.get(first.text.as_str()).into_iter().flatten() {
             let follows = words[at + 1..].iter().take(rest.len()).filter(|word| word.follows);
-            if follows.map(|word| word.text.as_str()).eq(rest.iter().copied()) {
+            let same = follows.zip(rest).filter(|(word, banned)| is_same(&word.text, banned));
+            if same.count() == rest.len() {
                 found.push(Found { line: first.line, phrase });
             }
         }
     }
     found
+}
+
+/// True if a word is the one of a phrase; `*'s` is any word that ends in 's.
+fn is_same(word: &str, banned: &str) -> bool {
+    word == banned || banned == "*'s" && ["'s", "’s"].iter().any(|end| word.ends_with(end))
 }
 
 /// Returns the lines of Rust in `text` with the name of a test that is too long, each with the name.
@@ -192,6 +198,15 @@ mod tests {
         assert_eq!(openings(text), [(1, "What"), (6, "Whether")]);
         assert_eq!(openings("/** What it is. */\n  /** How it is. */"), [(1, "What"), (2, "How")]);
         assert_eq!(openings("// What is it?\n/// Whatever it is, it is returned."), []);
+    }
+
+    #[test]
+    fn one_phrase_covers_every_owner() {
+        let list = [Phrase { banned: "quite *'s", plain: "of", why: "shorter" }];
+        let words = prose::reader("a.md").expect("a kind of file with prose");
+        let lines =
+            |text: &str| phrases(&words(text), &list).iter().map(|found| found.line).collect::<Vec<_>>();
+        assert_eq!(lines("It is quite one's.\nIt is quite another’s.\nIt is quite one."), [1, 2]);
     }
 
     #[test]

@@ -143,7 +143,7 @@ fn per_blend(span: I16F16) -> I2F30 {
     I2F30::saturating_from_num(I32F32::ONE / I32F32::from_num(span.max(I16F16::ONE)))
 }
 
-/// Torque that stands even where no force is felt, beside which a needle at rest shows no dead encoder, mN·m.
+/// Torque that is there even where no force is felt, next to which a needle at rest shows no dead encoder, mN·m.
 pub(crate) fn at_rest(device: &Device) -> U16F16 {
     let gains = Gains { friction: super::Gain(0), ..device.compensation.gains };
     largest(device, gains).unsigned_abs()

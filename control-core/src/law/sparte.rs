@@ -31,7 +31,7 @@ const LARGEST_STEP: i32 = 16 << 16;
 const FASTEST: I16F16 = I16F16::from_bits(50 << 16);
 /// Faster than this the friction grows no more: 1,000 mm/s.
 const LARGEST_SPEED: i32 = 1_000 << 16;
-/// The barrier is told again once the needle was turned back to this share of the largest angle, in 256ths.
+/// The barrier is reported again once the needle was turned back to this share of the largest angle, in 256ths.
 const REARMED_256: i32 = 230;
 
 /// The additions of Paper 002's law to the layers: their walls' rising parabolas are its polynomials of second order.

@@ -4,7 +4,7 @@
 //! gives way, the end of its fall. Depth and force of a knot lie linearly between the cells, force linearly between two knots; beyond
 //! the table it is level. So a layer that gives way deeper at another speed does so in between, too.
 //!
-//! A layer *gives way once*. From there on the needle has a track: in it, the force is the lower hull of the table, what is left
+//! A layer *gives way once*. From there on the needle has a track: in it, the force is the lower hull of the table: the force
 //! where nothing has to give way. Beside the track the tissue is whole. The paper says nothing of it, nor of a needle that rests or is
 //! drawn back: there the force is held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it
 //! outwards.
@@ -50,7 +50,7 @@ const ANOTHER_ENTRY: I16F16 = I16F16::from_bits(3 << 16);
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ForceTable {
     /// The depth of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or below the skin. Depth is perpendicular to it, as the layers' are. In
-    /// the order of `forces`, or one for each knot where it lies at the same depth in all cells.
+    /// the order of `forces`, or one for each knot that is at the same depth in all cells.
     pub depths: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     /// Rising.
     pub speeds: Vec<MillimetresPerSecond, MAX_SPEEDS>,

@@ -332,7 +332,7 @@ fn the_fixture_holds_the_direction_up_to_its_largest_angle() {
     let (lateral, barriers) = turned(&mut needle, 250);
     assert!((lateral + 2.0).abs() < 0.02 && barriers == 1, "{lateral} N, {barriers} barriers");
     assert_eq!(turned(&mut needle, 190).1, 0, "not let go yet");
-    assert_eq!((turned(&mut needle, 100).1, turned(&mut needle, 250).1), (0, 1), "told again");
+    assert_eq!((turned(&mut needle, 100).1, turned(&mut needle, 250).1), (0, 1), "reported again");
 }
 
 #[test]

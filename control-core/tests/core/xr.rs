@@ -337,7 +337,7 @@ fn in_its_track_the_needle_meets_no_layer_again() {
     for back_mm in [1.0, -1.0] {
         go(&mut needle, back_mm, 3.0);
         let again = go(&mut needle, 8.0, 3.0);
-        // What lies behind the last fall: 0.45 N and a little more at 3 mm/s, and how that grows over 2.5 mm.
+        // Behind the last fall: 0.45 N and a little more at 3 mm/s, and how that grows over 2.5 mm.
         assert_eq!(again.in_track, if back_mm < 0.0 { 0b11 } else { 0b10 });
         assert!(
             again.largest_n < 0.56 && again.gave_way.is_empty(),
@@ -386,7 +386,7 @@ fn strongest_line(forces: &[f64]) -> f64 {
         let x = index as f64 - middle;
         (above + x * (force - mean), below + x * x)
     });
-    // A Hann window keeps what is left of the trend out of the lines.
+    // A Hann window keeps the rest of the trend out of the lines.
     let windowed: Vec<f64> = (forces.iter().enumerate())
         .map(|(index, force)| {
             let window = 1.0 - (std::f64::consts::TAU * (index as f64 + 0.5) / n).cos();

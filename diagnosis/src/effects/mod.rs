@@ -1,7 +1,7 @@
 //! One model per effect, written once: the diagnosis evaluates its terms along a recording, the simulator runs it forward.
 //!
-//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. What an effect is stands in
-//! a file of its own, as a `Definition`; to add one, write its file and a line in the registry below. Nothing here
+//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. Each effect has a file of
+//! its own with its `Definition`; to add one, write its file and a line in the registry below. Nothing here
 //! may know how an effect is found.
 
 mod bristles;
@@ -265,7 +265,7 @@ impl Effect {
         self.shape.get("turn").copied()
     }
 
-    /// One coefficient; where it is missing, zero, and one of a table, which is a force as it stands.
+    /// One coefficient; where it is missing, zero, and one of a table, which is a force by itself.
     pub fn coefficient(&self, key: &str) -> f64 {
         let missing = if self.name == EffectName::Table { 1.0 } else { 0.0 };
         self.coefficients.get(key).copied().unwrap_or(missing)

@@ -83,7 +83,7 @@ impl EffectSearch for Defined {
         travel_profile::freedom(effect)
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
-        // All of them are told by an acceleration that changes with the travel.
+        // All of them show by an acceleration that changes with the travel.
         let alike = [name, EffectName::EncoderEccentricity, EffectName::MassImbalance];
         if fitted.is_some_and(|effect| !alike.contains(&effect.name)) {
             return Vec::new();

@@ -14,7 +14,7 @@ const WIDEST_HZ: f64 = 50.0;
 const NARROWEST_HZ: f64 = 3.0;
 /// Periods at the end of the band after which the estimator has forgotten all but a few thousandths.
 const KERNEL_PERIODS: f64 = 2.0;
-/// Part of the force that sensor noise may be in it: more hides what is left out.
+/// Part of the force that sensor noise may be in it: more hides the missing physics.
 const NOISY: f64 = 0.01;
 
 /// The estimator for some recordings.

@@ -252,7 +252,7 @@ impl Jump {
 }
 
 /// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits again;
-/// gives what is left of the residual.
+/// gives the rest of the residual.
 fn settle(jumps: &mut Vec<Jump>, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
     let left = fit_sizes(jumps, residual);
     for jump in jumps.iter_mut() {

@@ -173,7 +173,7 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
     let mut b = vec![0.0; size];
     for (one, places) in fit.prepared.iter().zip(&fit.places) {
         let p = places.len();
-        // Undo the reference: the data as it stands is the residual plus the reference's columns.
+        // Undo the reference: the data itself is the residual plus the reference's columns.
         let mut raw: Vec<f64> = one.reference.clone();
         raw.push(1.0);
         for segment in &one.segments {

@@ -2,7 +2,7 @@
 //! simulation that integrates by Euler's method is half a row early or late. If that explains most of the residual of the nominal model,
 //! every model allows for it, so that no effect has to explain it.
 //!
-//! Large skews shift the commands themselves; what is left is a column of the linear fit, and so is what happens within a row: a
+//! Large skews shift the commands themselves; the rest is a column of the linear fit, and so is what happens within a row: a
 //! command may change there, or act all at once.
 
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -21,7 +21,7 @@ const AT_LIMIT: f64 = 0.98;
 /// Part of the mean square above the noise of the sensor that a skew may leave. Other physics, and commands that a loop makes of noise,
 /// show false skews, which leave most of it.
 const MOST_LEFT: f64 = 0.5;
-/// Rounds of shifting the commands and fitting what is left.
+/// Rounds of shifting the commands and fitting the rest.
 const ROUNDS: usize = 3;
 /// A skew that changes by less is found, rows.
 const FOUND: f64 = 0.01;

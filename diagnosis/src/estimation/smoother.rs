@@ -40,7 +40,7 @@ pub(crate) enum Knows {
     /// Every row of the recording: the fixed-interval smoother, for recordings that are fitted.
     All,
     /// The rows up to the block's own: the filter, for recordings that judge. What knows the rows to come knows the disturbance
-    /// that a force is to be told from.
+    /// from which a force is to be found.
     Past,
 }
 

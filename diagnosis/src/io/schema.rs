@@ -112,7 +112,7 @@ fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Erro
 /// A length under the three models, root mean square; none where there is no such model or simulation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ByModel {
-    /// The rig as it stands.
+    /// The rig as it is.
     pub nominal: Option<f64>,
     /// With its values refitted.
     pub refit: Option<f64>,
@@ -151,7 +151,7 @@ pub struct FitTable {
     pub metric: String,
     /// N·m or N.
     pub unit: String,
-    /// The rig as it stands.
+    /// The rig as it is.
     pub nominal: Both,
     /// With its values refitted.
     pub refit: Both,

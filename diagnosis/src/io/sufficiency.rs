@@ -66,7 +66,7 @@ fn alone(recording: &Recording) -> Option<String> {
         ));
     }
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-    // None at all is a free motion; one that never changes is told from no offset.
+    // None at all is a free motion; one that never changes is distinguished from no offset.
     if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
         return Some(format!("the command of {file} is constant"));
     }

@@ -157,7 +157,7 @@ impl Prior {
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
     pub(crate) x: Vec<f64>,
-    /// True if a coefficient stands at a bound.
+    /// True if a coefficient is at a bound.
     pub(crate) bound: Vec<bool>,
     /// Covariance with the prior, for unit residual variance; zero at bounds.
     pub(crate) covariance: Square,

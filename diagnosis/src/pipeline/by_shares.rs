@@ -28,7 +28,7 @@ use crate::validation::shares::laws::is_by_command;
 use crate::validation::shares::material::Material;
 use crate::validation::shares::select::{Selected, Selection};
 
-/// Part of what is left of the force from which an effect is most of it, so that noise does not limit. On seed 36731 (never looked at
+/// Part of the residual force from which an effect is most of it, so that noise does not limit. On seed 36731 (never looked at
 /// before) it named two effects, both right; on seed 36101 none.
 const MOST_OF_REST: f64 = 0.4;
 /// Factor below which one model leaves clearly less than another.
@@ -36,7 +36,7 @@ const CLEARLY_LESS: f64 = 0.8;
 
 /// The verdict of shares of the force error on the effects that the search found.
 pub(crate) enum ByShares {
-    /// Noise limits, or nothing takes enough: what was found stands as it is.
+    /// Noise limits, or nothing takes enough: what was found stays as it is.
     Nothing,
     /// The model found explains nearly all down to the noise, and shares name these of its effects too.
     Confirmed(Vec<Material>),

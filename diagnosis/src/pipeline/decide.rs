@@ -110,7 +110,7 @@ impl Decision<'_> {
         residual_maps::maps((fit, on_fit), (&holdout.smoothed, on_holdout), turn)
     }
 
-    /// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves.
+    /// The verdict, and the residual where no effect is named; `maps` are of the residual of the whole model.
     fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
         let Assessment { fit, weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
         let form = unnamed.is_some().then_some(Reason::FreeForm);

@@ -26,7 +26,7 @@ pub(crate) enum Diagnosis {
     Complete(Box<Complete>),
 }
 
-/// Why recordings cannot tell, or what is left where no effect is named.
+/// Why recordings cannot tell, or the residual where no effect is named.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Reason {
     /// Something is wrong with the recordings, or they are too short: a sentence from where it was seen.

@@ -35,7 +35,7 @@ pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason
     fits_not.then(|| Reason::Misfit { left: judged.holdout / force.holdout.max(1e-300) })
 }
 
-/// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves,
+/// The verdict, and the residual where no effect is named; `maps` are of the residual of the whole model,
 /// `foreign` what physics without a name alone would explain, `follows` what a plain regression would.
 pub(crate) fn verdict(
     weighed: &WeighedModel,

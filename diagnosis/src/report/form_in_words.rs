@@ -5,9 +5,9 @@ use crate::numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
 const MOST: f64 = 0.85;
-/// Part of the mean square that proportion to speed must explain to be told as such: a square of the speed has 0.94.
+/// Part of the mean square that proportion to speed must explain to be reported as such: a square of the speed has 0.94.
 const PROPORTIONAL: f64 = 0.97;
-/// Part of the mean square that a product of two variables must explain to be told as one.
+/// Part of the mean square that a product of two variables must explain to be reported as one.
 const PRODUCT: f64 = 0.7;
 /// Part of its size over which a form must change to change at all, and part of its range that makes a turn of it.
 const CHANGES: f64 = 0.25;

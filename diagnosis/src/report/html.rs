@@ -112,7 +112,7 @@ fn next(out: &mut String, outcome: &Outcome) {
     }
     if !r.effects.is_empty() || outcome.evidence.form.is_some() {
         items.push(format!(
-            "Simulate with what was found: `patched-rig.toml` beside this page is the rig with it; \
+            "Simulate with what was found: `patched-rig.toml` next to this page is the rig with it; \
              `host-sim simulate --rig patched-rig.toml --recording {holdout} --out simulated` runs it."
         ));
         items.push(

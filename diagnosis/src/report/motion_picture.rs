@@ -1,4 +1,4 @@
-//! The picture of "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
+//! The picture of "simulation and recording differ": the motions side by side, drawn, tabulated and as a file.
 
 use crate::numerics::digits::short;
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
@@ -193,7 +193,7 @@ pub(crate) fn under_reference(out: &mut String, compared: &Comparison, wanted: &
     let Some(feedback) = compared.feedback else { return };
     let _ = write!(
         out,
-        "<h2>Under the recorded reference</h2><p class=note>The loop that ran was told from its reference; it explains {:.0} % of the \
+        "<h2>Under the recorded reference</h2><p class=note>The loop that ran was recognised from its reference; it explains {:.0} % of the \
          command. What else the command held stays as recorded.</p>",
         100.0 * feedback.explained
     );

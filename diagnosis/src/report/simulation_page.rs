@@ -7,7 +7,7 @@ use html_report::{document, plot, safe};
 use std::fmt::Write as _;
 
 /// The length of the windows by which models are compared in a sentence, s, where they were run: short enough that errors of
-/// force do not add up, long enough that the sensor's noise is none.
+/// force do not add up, long enough that the sensor's noise does not matter.
 const JUDGING_S: f64 = 0.5;
 
 /// Returns the position errors of the models as one sentence without its full stop: in windows, or in the free run of a recording
@@ -23,7 +23,7 @@ pub fn sentence(compared: &Comparison) -> String {
         .map(|m| {
             let off = format!("{} {unit}", short(factor * off(m)));
             match m.model.as_str() {
-                "nominal" => format!("{off} as the simulation stands"),
+                "nominal" => format!("{off} with the simulation as it is"),
                 other => format!("{off} {}", words(other)),
             }
         })
@@ -124,7 +124,7 @@ mod tests {
         let said = sentence(&compared);
         assert!(
             said.starts_with("In windows of 1 s of bench.csv, the simulated position is off by ")
-                && said.contains(" as the simulation stands and ")
+                && said.contains(" with the simulation as it is and ")
                 && said.ends_with(" with what was found (root mean square)"),
             "{said}"
         );

@@ -100,7 +100,7 @@ fn weakness(weakest: &Weakness) -> String {
     }
 }
 
-/// Why recordings cannot tell, or what is left where no effect is named; `form` is the force of any form, in words, where there
+/// Why recordings cannot tell, or the residual where no effect is named; `form` is the force of any form, in words, where there
 /// is one.
 pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
     let sentence = match why {

@@ -141,7 +141,7 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<Movable> {
     effect.name.definition().movable(effect, span)
 }
 
-/// True if a drift is at the end of what may be told from something else: what settles at once cannot be told from how a recording begins,
+/// True if a drift is at the end of what may be distinguished from something else: what settles at once cannot be distinguished from how a recording begins,
 /// and what has hardly begun at its end is any slow change.
 pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
     effect.name.definition().drifts()
@@ -212,7 +212,7 @@ mod tests {
         let farthest = |name: N, knows: Knows| {
             let [(a, nominal, total), (b, _, other)] =
                 [false, true].map(|is_mirrored| followed(is_mirrored, knows));
-            // An acceleration takes the neighbours of its block, a second mass those between which its speed lies.
+            // An acceleration takes the neighbours of its block, a second mass those on both sides of its speed.
             let until = a.blocks.start.partition_point(|start| *start < 2.0) - 3;
             let before = |total: &Total| {
                 Gains::new(&a.observed(), &NOISE).innovations(&a.observed(), total)[..until].to_vec()

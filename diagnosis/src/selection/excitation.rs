@@ -1,4 +1,4 @@
-//! The range of speeds and amplitudes in recordings. Effects that look alike within it cannot be told apart.
+//! The range of speeds and amplitudes in recordings. Effects that look alike within it cannot be distinguished.
 
 use crate::effects::definition::Shown;
 use crate::estimation::blocked_recording::BlockedRecording;

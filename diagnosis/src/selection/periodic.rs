@@ -27,7 +27,7 @@ const FEWEST: usize = 6;
 /// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
 const PER_ORDER: f64 = 8.0;
 
-/// Periods that the travel must hold for an order to be told from a shape along the travel, and the part of a turn that shows a mass off
+/// Periods that the travel must hold for an order to be distinguished from a shape along the travel, and the part of a turn that shows a mass off
 /// its centre, whose order is known.
 const PERIODS: f64 = 2.0;
 const MOST_OF_TURN: f64 = 0.6;

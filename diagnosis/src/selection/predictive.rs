@@ -155,7 +155,7 @@ mod tests {
         // Ten times the noise in three stretches of ten blocks.
         let rare = |j: usize| if j % 2000 < 10 { 10.0 } else { 0.0 };
         assert!(score_z(&quiet, &plus(&rare), 0.0) > 6.0);
-        // Half of what is there, in the same blocks: what is left is no noise.
+        // Half of what is there, in the same blocks: the residual is not noise.
         assert!(score_z(&plus(&|j| 0.5 * rare(j)), &plus(&rare), 0.0) < 3.0);
         // A difference that has nothing to do with what is there.
         assert!(score_z(&plus(&|j| 0.2 * (j as f64).sin()), &quiet, 0.0) < 0.0);

@@ -77,7 +77,7 @@ pub(crate) fn project(fit: &Fit, residuals: &[Vec<f64>], terms: &Terms, own: boo
         for j in 0..size {
             let x: f64 = (0..base).map(|b| row[b] * cross[j * base + b]).sum();
             let before = information.at(i, j);
-            // What is left after projection must be more than rounding.
+            // The rest after projection must be more than rounding.
             let left = before - x;
             information.a[i * size + j] = if i == j && left < 1e-7 * before { 0.0 } else { left };
         }

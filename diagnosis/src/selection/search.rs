@@ -112,7 +112,7 @@ impl FitContext<'_> {
         let movable = candidates::movable(&effect, self.span);
         let mut best = gain(&effect);
         for round in 0..2 {
-            // What matters most stands first; the rest is moved where it is fitted.
+            // What matters most comes first; the rest is moved where it is fitted.
             for (key, low, high) in movable.iter().take(if round == 0 { MOVED } else { MOVED_AGAIN }) {
                 let at = effect.shape[*key];
                 let reach = if round == 0 { 2.2_f64 } else { 1.3 };

@@ -50,7 +50,7 @@ impl Block {
     }
 }
 
-/// The place about which a block lies and the travel passed within it, rad or m; none is passed at rest.
+/// The middle of a block's travel and the travel passed within it, rad or m; none is passed at rest.
 pub(crate) fn places(track: &BlockedRecording) -> Vec<(f64, f64)> {
     let passed = |j: usize| match track.motion.rest[j] {
         true => 0.0,

@@ -1,4 +1,4 @@
-//! The position loop that ran while a recording was made, told from its reference: what it takes to simulate under that
+//! The position loop that ran while a recording was made, found from its reference: what it takes to simulate under that
 //! reference rather than under the recorded command.
 
 use super::Motion;

@@ -49,7 +49,7 @@ fn set(rig: &mut Rig, value: &Value, x: f64) {
     }
 }
 
-/// The values that move: the drive's gain stands, because only ratios to it show.
+/// The values that move: the drive's gain is fixed, because only ratios to it show.
 fn values(rig: &Rig) -> Vec<Value> {
     let mut out = vec![Value::Inertia];
     out.extend(rig.model.viscous.map(|_| Value::Viscous));
@@ -73,7 +73,7 @@ fn residuals(rig: &Rig, besides: &[Beside], seconds: f64) -> Vec<f64> {
 /// better.
 const STAGES_S: [f64; 3] = [1.0, 5.0, f64::INFINITY];
 
-/// The rig whose free run is off least on `recordings`, from where `rig` stands; its structure is kept.
+/// The rig whose free run is off least on `recordings`, beginning with `rig`; its structure is kept.
 pub fn fit(rig: &Rig, recordings: &[Recording]) -> Rig {
     let besides: Vec<Beside> = recordings.iter().map(|r| Beside::new(r, rig)).collect();
     let force = rig.actuator.gain.abs()
@@ -84,7 +84,7 @@ pub fn fit(rig: &Rig, recordings: &[Recording]) -> Rig {
 /// One stage: windows of `seconds`. `force` is the largest that the drive was asked for.
 fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
     let moved = values(rig);
-    // A value's natural size: its own, or that of the force it stands beside.
+    // A value's natural size: its own, or that of the force next to it.
     let scale: Vec<f64> = moved
         .iter()
         .map(|value| {

@@ -108,7 +108,7 @@ impl EffectEvidence {
         self.has_sizes_in(&SAME_SIZE)
     }
 
-    /// True if it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
+    /// True if it takes most of the residual, surely, and as much of it everywhere: counts are lost now and then.
     fn recurs(&self) -> bool {
         self.is_same_size() && self.share >= MOST_SHARE && self.holdout.low > 0.0 && self.force.low > 0.0
     }

@@ -30,7 +30,7 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     let log = |x: f64, low: f64, high: f64| x.max(low).min(high).ln();
     let least_share = if found.is_certain() { CERTAIN_SHARE } else { COUNTED_SHARE };
     let unexplained = left.unexplained.min(1.0 - found.share).max(0.0);
-    // What is left and is hardly more than nothing beside the force says little.
+    // A residual that is hardly more than nothing, compared with the force, says little.
     let of_force = log(left.of_force / LEFT_OF_FORCE.0, 1.0, LEFT_OF_FORCE.1 / LEFT_OF_FORCE.0);
     let share = log(found.share, least_share, 1.0);
     let bends = found.effect.name.definition().bends_at_reversals();

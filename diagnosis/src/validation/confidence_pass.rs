@@ -77,7 +77,7 @@ pub(crate) struct WeighedModel {
     /// Frequency at which a force may swing whatever the axis does, and that force if it does.
     hertz: Option<f64>,
     pub(crate) swing: Option<TonalDisturbance>,
-    /// Correlation of what is left between repeats of a motion, where there are any and it is surely more than chance.
+    /// Correlation of the residual between repeats of a motion, where there are any and it is surely more than chance.
     pub(crate) repeats: Option<f64>,
 }
 

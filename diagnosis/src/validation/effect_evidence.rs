@@ -185,7 +185,7 @@ fn score_z_of(
     noise: &Noise,
     holdout: &[BlockedRecording],
 ) -> f64 {
-    // What is left, and what the model pays, on fitted and on held-out recordings.
+    // The residual, and what the model pays, on fitted and on held-out recordings.
     let left = |model: &Model| {
         let fit = Fit::new(model, context.nominal, context.tracks, noise);
         let fitted = FittedModel { model: model.clone(), noise: *noise, fit, merit: 0.0 };

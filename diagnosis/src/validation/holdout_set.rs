@@ -1,5 +1,5 @@
 //! Held-out recordings with the motion that a fitted model sees in them, estimated twice: what judges a name may know no later
-//! row, and how large a force is left is best told from all rows.
+//! row, and how large a force is left is best seen from all rows.
 
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;

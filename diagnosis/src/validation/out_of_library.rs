@@ -1,6 +1,6 @@
 //! Physics that has no name in the library and looks like some that has: a spring that creeps, a load that changes at once,
 //! an inertia that changes along the travel, a gear that loses a part of what it carries. Nothing here is named; it only
-//! speaks against a name. What there is stands with the laws that it is a form of, in `effects`.
+//! speaks against a name. Such forces are defined with the laws that they are a form of, in `effects`.
 
 use crate::effects::definition::Unnamed;
 use crate::effects::{Effect, EffectName};

@@ -8,7 +8,7 @@ use crate::thresholds::SURE_Z;
 use crate::validation::residuals::{Residuals, relative_gain};
 use std::f64::consts::TAU;
 
-/// Part of the mean square of what is left that a regression must predict on held-out recordings.
+/// Part of the residual's mean square that a regression must predict on held-out recordings.
 const PREDICTS: f64 = 0.1;
 /// Delays of the command that are tried, s.
 const DELAYS_S: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.08];
@@ -142,7 +142,7 @@ fn centred(column: &[f64], moving: &[bool]) -> Vec<f64> {
     column.iter().map(|x| x - mean).collect()
 }
 
-/// Least squares of what is left on the columns, over all recordings; none where the columns do not change.
+/// Least squares of the residual on the columns, over all recordings; none where the columns do not change.
 fn solve(left: &Left, columns: &Columns) -> Option<Vec<f64>> {
     let count = columns.first()?.len();
     let (mut information, mut score) = (Square::zero(count), vec![0.0; count]);
@@ -162,7 +162,7 @@ fn solve(left: &Left, columns: &Columns) -> Option<Vec<f64>> {
     (theta.iter().all(|x| x.is_finite()) && theta.iter().any(|x| *x != 0.0)).then_some(theta)
 }
 
-/// Part of the mean square of what is left that coefficients predict; none where that is not sure or is little.
+/// Part of the residual's mean square that coefficients predict; none where that is not sure or is little.
 fn gain(left: &Left, columns: &Columns, theta: &[f64], estimator: &Estimator) -> Option<f64> {
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for ((columns, residual), moving) in columns.iter().zip(left.residual).zip(&left.moving) {

@@ -17,7 +17,7 @@ const SHIFT_S: f64 = 1.0;
 /// Samples per second that are compared: enough for the motion of most machines.
 const RATE_HZ: f64 = 50.0;
 
-/// One recording with what is left of it, evenly sampled: the speed or the reference's, and the residual, zero where not known.
+/// One recording with its residual, evenly sampled: the speed or the reference's, and the residual, zero where not known.
 struct Sampled {
     motion: Vec<f64>,
     left: Vec<f64>,
@@ -47,7 +47,7 @@ fn compared(a: (&[f64], &[f64]), b: (&[f64], &[f64])) -> Option<(f64, f64)> {
     Some((correlation(&a.1[..n], &b.1[..n]), n as f64))
 }
 
-/// Correlation of what is left between repeats of a motion, where the recordings hold any and it is surely more than chance;
+/// Correlation of the residual between repeats of a motion, where the recordings hold any and it is surely more than chance;
 /// `independent_hz` is how many samples a second say something of their own.
 pub(crate) fn correlation_of_repeats(
     tracks: &[BlockedRecording],

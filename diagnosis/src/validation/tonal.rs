@@ -148,7 +148,7 @@ pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
     Some(nearby(coarse, apart, &left))
 }
 
-/// Distance of frequencies that recordings of this length tell apart, halved.
+/// Distance of frequencies that recordings of this length distinguish, halved.
 fn apart(all: &[Samples]) -> f64 {
     0.5 / all.iter().map(Samples::seconds).fold(f64::MIN_POSITIVE, f64::max)
 }

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
 /// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, dry
 /// friction that comes and goes along the travel where the axis is slow, cogging of twelve a turn, a push that follows the time since
-/// the start, the frequency of the belt behind which half of it stands (none where zero), the part of its dry friction that comes
+/// the start, the frequency of the belt behind which half of it is (none where zero), the part of its dry friction that comes
 /// on top while it is cold, for some 3 s, and the part of its drive's force that is lost after that time.
 #[derive(Clone, Copy)]
 pub struct Machine {

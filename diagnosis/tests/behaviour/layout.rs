@@ -69,7 +69,7 @@ fn each_folder_uses_only_those_before_it() {
         }
     }
     assert!(arrows > 100, "only {arrows} uses were seen: the reader of sources is blind");
-    assert!(upward.is_empty(), "folders use what stands above them:\n{}", upward.join("\n"));
+    assert!(upward.is_empty(), "folders use those above them:\n{}", upward.join("\n"));
 }
 
 /// Files outside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.
@@ -81,7 +81,7 @@ fn only_thresholds_stands_beside_the_folders() {
     for entry in fs::read_dir(&root).expect("the folder is there") {
         let name = entry.expect("its entries can be read").file_name();
         let name = name.to_string_lossy();
-        assert!(BESIDE.contains(&&*name) || FLOORS.contains(&&*name), "{name} stands in no folder");
+        assert!(BESIDE.contains(&&*name) || FLOORS.contains(&&*name), "{name} is in no folder");
     }
     let thresholds = fs::read_to_string(root.join("thresholds.rs")).expect("a source can be read");
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
@@ -118,7 +118,7 @@ fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
     code.match_indices("::").any(|(place, _)| {
         let before = code[..place].rsplit(|c| !is_word(c)).next().unwrap_or("");
         let after = code[place + 2..].split(|c| !is_word(c)).next().unwrap_or("");
-        // Nothing but names stands in a list or in a star.
+        // A list or a star holds nothing but names.
         let is_effect = variants.iter().any(|variant| variant == after) || after.is_empty();
         aliases.iter().any(|alias| alias == before) && is_effect
     })

@@ -74,7 +74,7 @@ impl Sectors {
         let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
             // A register written whole begins from its reset value, which locks it (RM0090 3.9.7): whatever came after
             // would be lost without a word.
-            // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
+            // SAFETY: both numbers are sectors of this microcontroller, and no code is in them.
             flash.cr().write(|w| unsafe {
                 w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
             });
@@ -150,7 +150,7 @@ impl ReadNorFlash for Sectors {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
         for (at, place) in (offset..).step_by(4).zip(bytes.chunks_exact_mut(4)) {
-            // SAFETY: an aligned word of flash, within the two sectors, that no variable lies in.
+            // SAFETY: an aligned word of flash, within the two sectors, which hold no variable.
             let word = unsafe { self.address(at).cast::<u32>().read_volatile() };
             place.copy_from_slice(&word.to_le_bytes());
         }
@@ -175,7 +175,7 @@ impl NorFlash for Sectors {
                 // A register written whole begins from its reset value, which locks. 16 bits at a time: 32 ask for 2.7 V, and
                 // the rail may be lower (RM0090 3.6.2).
                 flash.cr().write(|w| w.lock().clear_bit().psize().psize16().pg().set_bit());
-                // SAFETY: an aligned half of a word of flash, within the two sectors, that no variable lies in, open for programming.
+                // SAFETY: an aligned half of a word of flash, within the two sectors, which hold no variable, open for programming.
                 unsafe { address.write_volatile(half) };
                 cortex_m::asm::dsb();
             })?;

@@ -80,14 +80,14 @@ impl ConfigFlash for &mut Flash {
     }
 }
 
-/// A device that is told from others by its travel.
+/// A device that is distinguished from others by its travel.
 fn device(travel: i16) -> Device {
     let mut device = Device::commissioned_virtual();
     device.limits.travel = Millimetres(travel.into());
     device
 }
 
-/// A patient who is told from others by where the outermost layer begins.
+/// A patient who is distinguished from others by where the outermost layer begins.
 fn patient(top: i16) -> Patient {
     let mut patient = Patient::default();
     patient.layers[0].depth = Millimetres(top.into());

@@ -20,7 +20,7 @@ pub struct Shared {
     pub trips: Trips,
     /// The causes that keep the device from being started.
     pub conditions: Conditions,
-    /// Which session's orders the tick carries out: those of a PC that went are none of the next one's. Written by
+    /// Which session's orders the tick carries out: those of a PC that went do not pass to the next one. Written by
     /// telemetry.
     pub session: AtomicU8,
     /// Times of the stages.

@@ -40,7 +40,7 @@ pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Error> {
     toml::from_str(&source.text).map_err(|cause| {
         let before = cause.span().map_or(0, |span| span.start.min(source.text.len()));
         let line = source.text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count() + 1;
-        // Whoever edits a form does not see lines: the key that stands there is named too.
+        // Whoever edits a form does not see lines: the key there is named too.
         let key = source
             .text
             .lines()

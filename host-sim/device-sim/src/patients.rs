@@ -42,7 +42,7 @@ fn about(profile: &Profile) -> Vec<String> {
     std::iter::once(words(&table)).chain(about).filter(|line| !line.is_empty()).collect()
 }
 
-/// Layers from the skin down, a line for every half mm: where each begins stands beside its first line.
+/// Layers from the skin down, a line for every half mm: the beginning of each is next to its first line.
 fn draw(out: &mut String, scene: &Scene) {
     let deepest = scene.layers.iter().map(|l| l.depth_mm).fold(0.0, f64::max) + 1.5;
     let lines = (deepest / MM_PER_LINE).clamp(LINES.0, LINES.1).ceil();

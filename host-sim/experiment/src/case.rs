@@ -92,7 +92,7 @@ impl Case {
             }
         }
         let (left, floor) = (report.fit.patched.holdout, report.noise_floor);
-        // Counting is simulated by itself; what is left beside it disturbs.
+        // Counting is simulated by itself; the rest disturbs.
         let disturbance = (left * left - floor * floor).max(0.01 * floor * floor).sqrt();
         let bandwidth_hz = report.residual_bandwidth_hz.max(1.0);
         Ok(Self { rivals, disturbance, bandwidth_hz, reading_s: shown.reading_s, limits })
@@ -133,7 +133,7 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
     Case::normalise(&mut rivals);
     if rivals.len() < 2 {
         return Err(format!(
-            "{}: no two models contend for a name, so there is nothing to tell apart; the report's own sentence stands",
+            "{}: no two models contend for a name, so there is nothing to distinguish; the report's own sentence holds",
             folder.join("diagnosis.json").display()
         ));
     }

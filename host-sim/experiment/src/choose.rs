@@ -12,7 +12,7 @@ use rayon::prelude::*;
 const ENOUGH_NATS: f64 = 50.0;
 /// Relative growth of the criterion for which a segment is added.
 const PAYS: f64 = 0.1;
-/// Nats below which a pair is not told apart: odds of 20 to 1.
+/// Nats below which a pair is not distinguished: odds of 20 to 1.
 const LEAST_NATS: f64 = 3.0;
 /// Relative differences of the criterion that do not count against a shorter input.
 const NEARLY: f64 = 0.03;

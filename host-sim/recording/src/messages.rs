@@ -145,7 +145,7 @@ pub struct Link {
     pub garbage: u64,
 }
 
-/// Anything that stands in a recording.
+/// Anything that a recording holds.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(missing_docs, reason = "each variant carries the message that it is named after")]
 pub enum Message {

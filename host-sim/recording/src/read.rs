@@ -101,7 +101,7 @@ impl Recording {
     }
 }
 
-/// Ticks beyond this are no device's: it would be 28,000 years old.
+/// Ticks beyond this cannot be a device's: it would be 28,000 years old.
 const LATEST_TICK: u64 = 1 << 53;
 
 fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
@@ -118,8 +118,10 @@ fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
     };
     let message = understood.map_err(|cause| cause.to_string())?;
     match &message {
-        Message::Hello(hello) if !hello.is_plausible() => Err("its scale is no device's".into()),
-        other if other.tick().is_some_and(|tick| tick > LATEST_TICK) => Err("its tick is no device's".into()),
+        Message::Hello(hello) if !hello.is_plausible() => Err("its scale cannot be a device's".into()),
+        other if other.tick().is_some_and(|tick| tick > LATEST_TICK) => {
+            Err("its tick cannot be a device's".into())
+        }
         _ => Ok(Some(message)),
     }
 }

@@ -1,5 +1,5 @@
 //! The three papers on the virtual device: their procedures are run and recorded, and every figure and number that a paper's text gives
-//! stands on a page beside ours. A module for each paper says what it gives and what we measure; none computes a force of its own.
+//! is on a page next to ours. A module for each paper says what it gives and what we measure; none computes a force of its own.
 
 mod measure;
 mod paper_000;

@@ -220,7 +220,7 @@ mod tests {
     use serde_json::json;
 
     fn from_json<T: serde::de::DeserializeOwned>(json: serde_json::Value) -> T {
-        serde_json::from_value(json).expect("it stands in recordings like this")
+        serde_json::from_value(json).expect("recordings hold it like this")
     }
 
     /// A second of poses and blocks from tick 5,000 on with an event in the middle; then the device begins anew.

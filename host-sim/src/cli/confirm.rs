@@ -36,7 +36,7 @@ impl ConsentFlags {
         } else {
             None
         };
-        // Nobody stands beside a virtual device.
+        // Nobody is next to a virtual device.
         Ok(Consent { yes: self.yes || device == "virtual", guide })
     }
 }

@@ -185,7 +185,7 @@ fn damaged_hdf5_is_refused_or_read_and_never_panics() {
     let file = out.join("damaged.h5");
     for i in 0..200 {
         let mut damaged = whole.clone();
-        // The structure stands in the first part; cut the file now and then.
+        // The structure is in the first part; cut the file now and then.
         damaged[8 + (i * 37) % 6000] ^= 1 << (i % 8);
         damaged.truncate(if i % 5 == 0 { whole.len() * (i + 1) / 201 } else { whole.len() });
         std::fs::write(&file, &damaged).expect("written");

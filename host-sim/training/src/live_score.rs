@@ -104,7 +104,7 @@ fn append(stretch: &mut Stretch, tick: u64, sample: Sample) {
     stretch.samples.push(sample);
 }
 
-/// Forgets what was before `tick`, which lies in the stretch or at its end.
+/// Forgets what was before `tick`, which is in the stretch or at its end.
 fn begin_at(stretch: &mut Stretch, tick: u64) {
     let gone = (tick - stretch.first_tick) as usize;
     stretch.samples.drain(..gone.min(stretch.samples.len()));

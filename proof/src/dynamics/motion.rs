@@ -30,7 +30,7 @@ const SLOWEST: f64 = 0.01;
 /// The time over which a low-pass smears a reversal to either side, relative to the inverse of its corner.
 const SMEARED: f64 = 0.35;
 
-/// Rows of which one lies so many before or after that has something about it.
+/// Rows that are so many before or after one that has something about it.
 pub(crate) fn widened(n: usize, before: usize, after: usize, has: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut wide = vec![false; n];
     let mut until = 0;

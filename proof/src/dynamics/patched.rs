@@ -62,7 +62,7 @@ pub(super) fn left(nominal: &Rig, patched: &Rig, band: &Band) -> Result<f64, Str
     Ok(best)
 }
 
-/// Second moments of what is left and the columns of the waves, so that a shift costs no pass over the rows.
+/// Second moments of the residual and the columns of the waves, so that a shift costs no pass over the rows.
 struct Sums {
     rows: f64,
     energy: f64,
@@ -87,7 +87,7 @@ impl Sums {
         }
     }
 
-    /// Rms of what is left once the weighted columns are added.
+    /// Rms of the residual once the weighted columns are added.
     fn left(&self, weights: &[f64]) -> f64 {
         let mut total = self.energy;
         for (i, a) in weights.iter().enumerate() {

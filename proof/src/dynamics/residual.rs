@@ -1,8 +1,8 @@
 //! Force errors on the held-out recording, worked out from the files alone: a refit of the nominal structure by least
-//! squares, and the patched rig as it stands.
+//! squares, and the patched rig as it is.
 //!
 //! Both sides of the equation of motion go through the filters of the key's oracle. What is a nuisance of each recording is
-//! found on it: its bias, where the rig allows one, and where the encoder's zero stands against what is periodic.
+//! found on it: its bias, where the rig allows one, and the encoder's zero against what is periodic.
 
 use std::path::{Path, PathBuf};
 

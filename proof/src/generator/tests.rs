@@ -139,7 +139,7 @@ fn backlash_lets_the_motor_run_free_by_the_gap() {
     plant.viscous = 2.0;
     plant.train =
         Train::Gap { load_share: 0.5, friction_share: 0.5, gap: 0.1, stiffness: 2e5, damping: 200.0 };
-    // The motor creeps over half the gap at 0.02; what is left of the force then, 0.02, the load's friction holds.
+    // The motor creeps over half the gap at 0.02; the load's friction holds the rest of the force, 0.02.
     let rows = play(&plant, &open(1000.0, 30.0, levels(&[(0.05, 60.0)])));
     let rest = rows.last().unwrap();
     assert!((rest.q - 0.05).abs() < 3e-3, "stands at {}", rest.q);

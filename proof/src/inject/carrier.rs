@@ -12,7 +12,7 @@ use crate::tool::Paths;
 pub(crate) struct Place {
     /// Name of the case's folder.
     pub(crate) id: String,
-    /// The machine: what stands before the first hyphen of the name.
+    /// The machine: the name up to its first hyphen.
     pub(crate) machine: String,
     pub(crate) paths: Paths,
 }

@@ -324,7 +324,11 @@ mod tests {
         assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0);
         assert_eq!((array.word(CELL), array.violations.len()), (0, 0));
         array.register_written(FLASH_KEYR, KEY2, 0);
-        assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0, "one key is none");
+        assert_eq!(
+            array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0),
+            0,
+            "one key does not unlock"
+        );
     }
 
     #[test]

@@ -220,7 +220,7 @@ fn a_stop_whose_wire_is_shorted_to_ground() {
     tripped(&mut rig, Fault::EmergencyStop);
 }
 
-/// The enable line is high whatever the device does: the converter at zero torque is what is left.
+/// The enable line is high whatever the device does: only the converter at zero torque remains.
 #[test]
 fn an_enable_line_that_is_stuck_on() {
     let (mut rig, needle) = pressed();

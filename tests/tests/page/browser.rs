@@ -343,7 +343,7 @@ fn zero_and_turn(page: &mut Page) -> Result<(), Error> {
     page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
 }
 
-/// The needle turns; steeper, the same way along the needle goes through the far wall, and is told as that.
+/// The needle turns; steeper, the same way along the needle goes through the far wall, and is reported as that.
 fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     let turn = |degrees: u32| {
         format!(
@@ -362,7 +362,7 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
     page.photograph(&scratch.join("through.png"))?;
     page.wait(
-        "a through-puncture told as one",
+        "a through-puncture reported as one",
         SOON,
         "document.querySelector('#events [data-kind=far_wall]')?.textContent.includes('far wall')",
     )?;

@@ -94,7 +94,7 @@ pub(crate) const PEERS: [(&str, &str); 3] =
 /// The Python packages that the peers need.
 pub(crate) const PEERS_PACKAGES: [&str; 3] = ["numpy==2.4.6", "mujoco==4.0.0", "scipy==1.17.1"];
 
-/// Runs one of them: it prints the row that it stands beside.
+/// Runs one of them: it prints the row that it is next to.
 pub(crate) fn peer(script: &str) -> Result<Values, Error> {
     shell::output(&mut python(script)?).map(|text| values_in(&text))
 }

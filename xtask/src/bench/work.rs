@@ -11,7 +11,7 @@ pub(crate) struct Work {
     taken: Vec<(f64, f64)>,
 }
 
-/// From this on a ratio is told from 1, and its reason is printed.
+/// From this on a ratio is distinguished from 1, and its reason is printed.
 const APART: f64 = 1.2;
 
 /// The subjects, and what makes their cost grow other than their work.

@@ -93,7 +93,7 @@ impl Cells {
         self.is_estimated = self.corners.iter().any(is_missing);
     }
 
-    /// Returns what lies between the values of the cells, Q16; the one of cell `n` is `values[n · stride]`.
+    /// Returns the value between those of the cells, Q16; the one of cell `n` is `values[n · stride]`.
     #[inline(always)]
     pub(super) fn mix(&self, values: &[u16], stride: usize) -> i32 {
         let weighed =
@@ -135,7 +135,7 @@ fn angle_place(table: &ForceTable, gaps: &Gaps, angle: Milliradians) -> Place {
     place(angle_knots(table), &gaps.angle, i32::from(angle.0) << 16)
 }
 
-/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing lies beyond it.
+/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing is beyond it.
 fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N] {
     let mut gaps = [0; N];
     for (gap, (from, to)) in gaps.iter_mut().zip(knots.clone().zip(knots.skip(1))) {

@@ -83,7 +83,7 @@ pub(crate) const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 /// Anything not below zero.
 pub(crate) const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
 
-/// Limits of the recordings that decide whether twins can be told apart.
+/// Limits of the recordings that decide whether twins can be distinguished.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shown {
     /// True if all motion is at one speed, in strokes of one length, within less than a turn, and along a line.
@@ -199,7 +199,7 @@ pub(crate) trait EffectSearch {
         FREE
     }
 
-    /// True if it is in doubt where the coefficient of a term stands at its limit.
+    /// True if it is in doubt where the coefficient of a term is at its limit.
     fn is_in_doubt_at_limit(&self, _term: usize) -> bool {
         true
     }

@@ -83,7 +83,7 @@ pub(super) fn find(name: &str) -> Option<EffectName> {
     u16::try_from(at).ok().map(|at| EffectName::Formula(FormulaId(at)))
 }
 
-/// Numbers that are no one's in particular, for trying a formula.
+/// Arbitrary numbers, for trying a formula.
 fn trials(count: usize) -> impl Iterator<Item = f64> {
     (1..=count).map(|k| (k as f64 * 0.754_877_666).fract())
 }

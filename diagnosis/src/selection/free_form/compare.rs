@@ -135,7 +135,7 @@ mod tests {
         Densities { alone: of(alone), with: vec![(Inputs::Speed, of(with))] }
     }
 
-    /// True if an effect stands that takes `own` where the form takes `form` and both together `both`.
+    /// True if an effect holds that takes `own` where the form takes `form` and both together `both`.
     fn stands(own: f64, form: f64, both: f64) -> bool {
         densities(own, both).standing(&densities(0.0, form), None).against.is_none()
     }

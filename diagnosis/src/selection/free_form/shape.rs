@@ -14,7 +14,7 @@ pub(crate) struct Shape {
     pub(crate) visits: Vec<f64>,
 }
 
-/// Places of a variable that stands alone, of one of two, and of an angle.
+/// Places of a variable that is alone, of one of two, and of an angle.
 const ALONE: usize = 33;
 const OF_TWO: usize = 15;
 const OF_TURN: usize = 241;

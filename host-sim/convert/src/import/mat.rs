@@ -106,7 +106,7 @@ impl Found {
         Ok(())
     }
 
-    /// The columns of an array, which stands column by column; its longer side are the rows.
+    /// The columns of an array, which is stored column by column; its longer side are the rows.
     fn array(&mut self, path: String, dimensions: &[usize], values: &[f64]) {
         let sides: Vec<usize> = dimensions.iter().copied().filter(|n| *n != 1).collect();
         match sides[..] {

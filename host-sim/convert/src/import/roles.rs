@@ -1,4 +1,4 @@
-//! Which column is what: told by `--column`, else from the names that people give.
+//! Which column is what: given by `--column`, else from the names that people give.
 
 use super::table::{Column, Log};
 use super::units::{self, Quantity, Unit};

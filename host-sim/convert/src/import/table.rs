@@ -18,7 +18,7 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// A column whose unit stands in its name.
+    /// A column whose unit is in its name.
     pub(super) fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         let name = name.into();
         let (plain, unit) = units::split_name(&name);

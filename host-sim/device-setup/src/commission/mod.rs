@@ -163,7 +163,7 @@ pub async fn commission(
 ) -> Result<Outcome, Error> {
     let mut bench = Bench::open(line).await?;
     let before = bench.device().await?;
-    // Whatever it was: until it has passed again it is none, and what was found of its forces is another device's.
+    // Whatever it was: until it has passed again it is not commissioned, and the forces that were found are another device's.
     let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 

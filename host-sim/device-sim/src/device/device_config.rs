@@ -1,6 +1,6 @@
 //! The device's part of a configuration as a person or `commission` writes it (TOML, decimal numbers with their unit in the
 //! key), and as the control law takes it ([`Device`], fixed point). It knows nothing of patients. Every key may be left
-//! out: the built-in device's value stands then.
+//! out: the built-in device's value holds then.
 
 use super::compensated::Compensated;
 use super::grip::Grip;

@@ -103,7 +103,7 @@ fn scale_layer(layer: &mut Layer, factor: f64) -> bool {
 /// Returns the compliance at which a wall gives `factor` times the force. One at the softest stays there.
 fn scaled_compliance(compliance_mm2_per_n: f64, factor: f64) -> f64 {
     let scaled = compliance_mm2_per_n / factor;
-    // What is out of range in the file is refused as it stands there.
+    // What is out of range in the file is refused with the value in the file.
     if compliance_mm2_per_n <= SOFTEST_MM2_PER_N { scaled.min(SOFTEST_MM2_PER_N) } else { scaled }
 }
 

@@ -64,7 +64,7 @@ fn after_puncture() -> f64 {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "model", rename_all = "kebab-case")]
 pub(super) enum Table {
-    /// Its friction stands in `[friction]`.
+    /// Its friction is in `[friction]`.
     Jog {},
     /// The polynomials of its walls and the forces of cutting stand in the layers.
     Sparte {
@@ -75,7 +75,7 @@ pub(super) enum Table {
         friction: Bristles,
         fixture: Direction,
     },
-    /// Its table stands in `[force_table]`, as `fit-force` writes it.
+    /// Its table is in `[force_table]`, as `fit-force` writes it.
     Xr { stiffness_n_per_mm: f64, withdrawal: f64 },
 }
 

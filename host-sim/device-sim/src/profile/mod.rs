@@ -1,5 +1,5 @@
 //! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
-//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::device_config`. What the control law
+//! ([`Patient`], fixed point). It holds nothing of the device: that is `crate::device::device_config`. What the control law
 //! refuses is refused here too.
 
 mod beside;
@@ -278,7 +278,7 @@ struct Layer {
     tissue: TissueName,
     /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
     spare: Option<bool>,
-    /// Perpendicular to the skin; in a body it follows from the line and stands in no file.
+    /// Perpendicular to the skin; in a body it follows from the line and is in no file.
     depth_mm: Option<f64>,
     /// The rule for its thickness; the layers below move with it.
     thickness: Option<Thickness>,

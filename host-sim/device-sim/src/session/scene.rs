@@ -25,7 +25,7 @@ pub struct Scene {
     pub force_scale: f64,
     /// Inclination below the horizontal that the procedure begins with, in rad.
     pub tilt_rad: f64,
-    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is what is left of the tilt.
+    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is the rest of the tilt.
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,

@@ -1,5 +1,5 @@
 //! The virtual device with no hand on it: the control core on the plant of a rig file, whatever effects that file has.
-//! The plant's laws are the ones that the diagnosis names, so a patched rig runs here as it stands.
+//! The plant's laws are the ones that the diagnosis names, so a patched rig runs here unchanged.
 
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Device, Patient, Plan, TICK_HZ, TickInput};

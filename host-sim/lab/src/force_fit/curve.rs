@@ -1,6 +1,6 @@
 //! A curve of straight pieces between landmarks, fitted to many noisy points. Depth in mm, force in N.
 //!
-//! Landmarks cut an insertion into pieces: a rise, a fall, a rise … A depth is told by its piece and how far it is along it, so that
+//! Landmarks cut an insertion into pieces: a rise, a fall, a rise … A depth is given by its piece and how far it is along it, so that
 //! insertions whose layers give way at different depths are laid over one another. Only rises are fitted; a fall joins the two.
 
 /// A line of straight pieces.
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn knots_gather_where_a_curve_bends() {
-        // Level, then a rise like the sixth power: most of its bend lies in the last third.
+        // Level, then a rise like the sixth power: most of its bend is in the last third.
         let truth = |x: f64| (x / 10.0).powi(6);
         let points: Vec<_> =
             (0..4_000).map(|n| (f64::from(n) * 0.0025, truth(f64::from(n) * 0.0025))).collect();

@@ -92,7 +92,7 @@ fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>
             && (other.angle_deg - one.angle_deg).abs() < SAME_ANGLE_DEG
     };
     let found = falls(&one.points);
-    // Where a layer was seen that the table does not have, or the other way, peaks cannot be told apart.
+    // Where a layer was seen that the table does not have, or the other way, peaks cannot be distinguished.
     let curve = table.curve(one.speed_mm_s, one.angle_deg);
     let is_same = found.len() == table.gives_way.len();
     let peaks = table.gives_way.iter().map(|knot| curve.forces_n[*knot]);

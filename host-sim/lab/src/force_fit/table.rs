@@ -1,7 +1,7 @@
 //! The force of paper 000 as a table over depth, speed and angle, and what to do with the cells that nobody measured.
 //!
 //! Depth is perpendicular to the skin, so that a layer is met at the same place whatever the angle. Knots of the same number belong
-//! together in all cells: the beginning of a fall, its end, and what lies between in the same proportion. Between the cells depth and force
+//! together in all cells: the beginning of a fall, its end, and what is between in the same proportion. Between the cells depth and force
 //! of a knot are interpolated, as the device does it.
 //!
 //! Cells that were not measured are filled as if speed scaled the force by a factor of its own: the nearest measured curve of that angle

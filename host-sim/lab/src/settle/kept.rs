@@ -17,7 +17,7 @@ pub(super) fn kept(before: &[Name], names: Vec<Name>, contenders: &[(String, f64
         .collect()
 }
 
-/// `name` with what is left of its class, as probable as the contenders of that class together.
+/// `name` with the rest of its class, as probable as the contenders of that class together.
 fn of(name: &Name, leader: &str, contenders: &[(String, f64)]) -> Name {
     let left = || contenders.iter().filter(|(contender, _)| name.class.contains(contender));
     Name {

@@ -6,7 +6,7 @@ use super::Name;
 /// Confidence below which a diagnosis names nothing.
 const LEAST: f64 = 2.0 / 3.0;
 
-/// The part of the error that a run may still make that each of its diagnoses takes: the first half of all, the last what is left.
+/// The part of the error that a run may still make that each of its diagnoses takes: the first half of all, the last the rest.
 const SPENT: f64 = 0.5;
 
 /// Names of the last round with a confidence that counts the looks of a run of at most `most` rounds, and those that are then too unsure

@@ -23,7 +23,7 @@ impl Kind {
     const ALL: [(Self, &str); 4] =
         [(Self::Pose, "pose"), (Self::Event, "event"), (Self::Score, "score"), (Self::About, "about")];
 
-    /// As it stands in a key.
+    /// As a key holds it.
     pub fn as_str(self) -> &'static str {
         Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
     }
