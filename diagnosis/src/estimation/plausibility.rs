@@ -4,6 +4,7 @@
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::numerics::linear::{Factor, Square};
+use crate::numerics::spread::spread;
 use crate::simulation::Motion;
 
 /// Readings of an encoder are whole counts: where more than this part is not, and fewer counts than this are travelled, they are
@@ -15,11 +16,6 @@ const EXPLAINED: f64 = 0.6;
 /// Ratio from which a scale error is taken for a wrong unit, and the largest that is still taken for a factor of a thousand.
 const OFF: f64 = 250.0;
 const FAR: f64 = 4000.0;
-
-fn spread(column: &[f64]) -> f64 {
-    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-    column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
-}
 
 fn broken(column: &[f64]) -> f64 {
     column.iter().filter(|x| x.fract() != 0.0).count() as f64 / column.len().max(1) as f64

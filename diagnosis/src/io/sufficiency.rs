@@ -2,6 +2,7 @@
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
+use crate::numerics::spread::spread;
 
 /// Least of all recordings of a kind together, s and rows: short ones are pooled.
 const SHORTEST_S: f64 = 1.9;
@@ -85,11 +86,6 @@ fn rate_is_off(recording: &Recording) -> Option<String> {
             recording.file
         )
     })
-}
-
-fn spread(column: &[f64]) -> f64 {
-    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-    column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
 }
 
 /// The reason why a recording cannot be used at all: at rest, or of another unit than the rig.
