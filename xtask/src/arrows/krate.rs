@@ -1,7 +1,7 @@
 //! The modules of one crate, and which of its files use which.
 
-use super::Uses;
 use super::source::Source;
+use super::{SKIPPED, Uses};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -135,6 +135,9 @@ fn visit(folder: &Path, path: &str, files: &mut Vec<(String, String)>) -> io::Re
         let Some(name) = name.to_str() else { continue };
         let below = if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") };
         if entry.file_type()?.is_dir() {
+            if SKIPPED.contains(&name) {
+                continue;
+            }
             visit(&entry.path(), &below, files)?;
         } else if name.ends_with(".rs") {
             files.push((below, fs::read_to_string(entry.path())?));
