@@ -24,7 +24,8 @@ pub struct Outline {
 }
 
 impl Body {
-    /// Returns the outlines in the plane of the block's x and z, in the order in which they are laid over one another.
+    /// Returns the outlines in the plane of the block's x and z, in the order in which they are
+    /// laid over one another.
     pub fn outlines(&self, block: &Block) -> Vec<Outline> {
         let parts = self.structures.iter().enumerate();
         let parts = parts.flat_map(|(structure, own)| own.parts.iter().map(move |part| (structure, part)));

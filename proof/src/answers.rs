@@ -1,7 +1,8 @@
 //! Two programs on the same recordings: what differs between their answers, to the digit, by key.
 //!
-//! A change that is meant to leave the diagnosis as it is, is checked by its answers: `diagnosis.json` is compared
-//! value by value, and `patched-rig.toml` as text. Recordings come from the generator, in the short form of the small run.
+//! A change that is meant to leave the diagnosis as it is, is checked by its answers:
+//! `diagnosis.json` is compared value by value, and `patched-rig.toml` as text. Recordings come
+//! from the generator, in the short form of the small run.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -20,7 +21,8 @@ use crate::tool::{Paths, Tool};
 /// Recordings that are compared, unless `--cases` says otherwise.
 pub(crate) const CASES: usize = 100;
 
-/// A value that two answers do not share: its key, with `[]` for the place in a list, and both values.
+/// A value that two answers do not share: its key, with `[]` for the place in a list, and both
+/// values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Difference {
     pub(crate) key: String,
@@ -61,7 +63,8 @@ pub(crate) fn run(
     }
 }
 
-/// Draws a recording, asks both programs and returns its name with what differs; `None` if it cannot be built.
+/// Draws a recording, asks both programs and returns its name with what differs; `None` if it
+/// cannot be built.
 fn compare(
     spec: &Spec,
     seed: u64,
@@ -126,7 +129,8 @@ fn walk(key: &str, before: &Value, after: &Value, found: &mut Vec<Difference>) {
 /// The longest text of a value in the table, in characters.
 const WIDEST: usize = 60;
 
-/// Returns one line for each key that differs: on how many recordings, and the first of them with both values.
+/// Returns one line for each key that differs: on how many recordings, and the first of them with
+/// both values.
 fn table(compared: &[(String, Vec<Difference>)]) -> String {
     let mut keys: BTreeMap<&str, (Vec<&str>, &Difference)> = BTreeMap::new();
     for (name, differences) in compared {

@@ -1,7 +1,8 @@
 //! The blinded benchmark of the diagnosis.
 //!
-//! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
-//! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
+//! A generator with a plant of its own writes recordings; the tool sees these and the rig file and
+//! nothing else; a judge opens the key. Of the tool this crate may use the one entry point and the
+//! files it writes, never its models.
 
 mod answers;
 mod baselines;

@@ -10,7 +10,8 @@ const INPUTS: [&str; 3] = ["designed", "multisines", "characterise"];
 pub struct Options {
     /// Seed of every draw: the same seed gives the same cases to the last byte.
     pub seed: u64,
-    /// Draws of every effect at every strength, with pairs, nulls and the rest in proportion; or effects to conceal in all.
+    /// Draws of every effect at every strength, with pairs, nulls and the rest in proportion; or
+    /// effects to conceal in all.
     pub cases: Option<usize>,
     /// The small fixed run.
     pub quick: bool,
@@ -18,7 +19,8 @@ pub struct Options {
     pub settle: bool,
     /// With `settle`: the folder of plants that are settled instead of drawn ones.
     pub plants_from: Option<PathBuf>,
-    /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion first.
+    /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion
+    /// first.
     pub inputs: Vec<&'static str>,
     /// Cases that run at the same time.
     pub jobs: usize,
@@ -28,7 +30,8 @@ pub struct Options {
     pub write: Option<PathBuf>,
     /// Only cases whose category or hidden physics contains this text.
     pub only: Option<String>,
-    /// Results of earlier runs: find the weights of the tool's confidence from them, and run nothing.
+    /// Results of earlier runs: find the weights of the tool's confidence from them, and run
+    /// nothing.
     pub calibrate: Vec<PathBuf>,
     /// Folders of cases that somebody else made: judge these and draw none.
     pub cases_from: Vec<PathBuf>,
@@ -42,7 +45,8 @@ pub struct Options {
     pub reports: Option<PathBuf>,
     /// Another tool, by its command line.
     pub tool: Option<String>,
-    /// An earlier program, by its command line: compare its answers with those of `tool`, and judge none.
+    /// An earlier program, by its command line: compare its answers with those of `tool`, and judge
+    /// none.
     pub same_as: Option<String>,
     /// Folder for `proof.json` and `proof.md`.
     pub out: PathBuf,

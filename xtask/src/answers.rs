@@ -1,7 +1,9 @@
-//! `cargo xtask answers`: the diagnosis of this commit and of an earlier one, on the same recordings, compared to the digit.
+//! `cargo xtask answers`: the diagnosis of this commit and of an earlier one, on the same
+//! recordings, compared to the digit.
 //!
-//! A commit that changes answers on purpose says so with a line `Answers changed: …` in its message; the comparison
-//! without `--against` begins there, or at the newest commit that is a day old.
+//! A commit that changes answers on purpose says so with a line `Answers changed: …` in its
+//! message; the comparison without `--against` begins there, or at the newest commit that is a day
+//! old.
 
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, built};
@@ -84,8 +86,8 @@ fn commit(revision: &str) -> Result<String, Error> {
     })
 }
 
-/// Returns the newer of the newest commit that is a day old and the newest that changes answers on purpose; `None`
-/// if that is the newest commit of all.
+/// Returns the newer of the newest commit that is a day old and the newest that changes answers on
+/// purpose; `None` if that is the newest commit of all.
 fn last_promise() -> Result<Option<String>, Error> {
     let newest = |of: &str| git(&["rev-list", "--max-count=1", of, "HEAD"]);
     let (old, changed) = (newest(&format!("--before={A_NIGHT}"))?, newest(&format!("--grep={CHANGED}"))?);
@@ -101,7 +103,8 @@ fn last_promise() -> Result<Option<String>, Error> {
     Ok((base != git(&["rev-parse", "HEAD"])?).then_some(base))
 }
 
-/// Returns the program `host-sim` of a commit, built from a clone of its own into a folder of its own.
+/// Returns the program `host-sim` of a commit, built from a clone of its own into a folder of its
+/// own.
 fn built_at(commit: &str) -> Result<PathBuf, Error> {
     let folder = shell::target().join("answers");
     let program = folder.join(format!("host-sim-{commit}"));

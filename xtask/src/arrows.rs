@@ -1,9 +1,10 @@
-//! The arrow check: no files of a crate use each other in a circle, no function is longer than 60 lines, and files are included by `#[path]`
-//! where that has a reason only.
+//! The arrow check: no files of a crate use each other in a circle, no function is longer than 60
+//! lines, and files are included by `#[path]` where that has a reason only.
 //!
-//! A file uses another if its code, tests aside, names something that the other defines. A name that a module only hands on
-//! (`pub use`) belongs to the file that defines it. A module and the modules that it is made of are one house: what it uses of
-//! them is no arrow, what they use of it is one.
+//! A file uses another if its code, tests aside, names something that the other defines. A name
+//! that a module only hands on (`pub use`) belongs to the file that defines it. A module and the
+//! modules that it is made of are one house: what it uses of them is no arrow, what they use of it
+//! is one.
 
 mod included;
 mod krate;

@@ -1,7 +1,8 @@
-//! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask test` and nothing else, and
-//! each of its steps is runnable by hand under its own name.
+//! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask
+//! test` and nothing else, and each of its steps is runnable by hand under its own name.
 //!
-//! Built before everything else, hence no dependencies; it knows which commands to run, and nothing of the crates' insides.
+//! Built before everything else, hence no dependencies; it knows which commands to run, and nothing
+//! of the crates' insides.
 
 mod answers;
 mod arrows;

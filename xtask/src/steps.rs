@@ -16,7 +16,8 @@ const LONG_FUZZ_SECONDS: &str = "600";
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) shows: &'static str,
-    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
+    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and
+    /// does not fail.
     pub(crate) bound_s: f64,
     pub(crate) run: fn() -> Result<(), Error>,
 }
@@ -164,8 +165,8 @@ fn board() -> Result<(), Error> {
     shell::run(tests.args(["--test", "board"]))
 }
 
-/// Checks a page for accessibility (MPL 2.0), and emulates a headset (MIT), each at the version that the page was checked with. They are
-/// used by the tests only and are no part of any product.
+/// Checks a page for accessibility (MPL 2.0), and emulates a headset (MIT), each at the version
+/// that the page was checked with. They are used by the tests only and are no part of any product.
 const IN_PAGES: [&str; 2] = ["axe-core@4.14.1", "iwer@2.5.0"];
 
 fn browser() -> Result<(), Error> {
@@ -273,8 +274,8 @@ fn class() -> Result<(), Error> {
     shell::run(&mut test)
 }
 
-/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the version that the check was
-/// written against.
+/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the
+/// version that the check was written against.
 const FOXGLOVE_CLIENT: [&str; 3] = ["@foxglove/ws-protocol@0.8.0", "ws@8.23.0", "protobufjs@8.8.1"];
 
 /// Foxglove's live stream read by Foxglove's own client; needs a build of its own.

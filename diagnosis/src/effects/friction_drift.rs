@@ -1,4 +1,5 @@
-//! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) + viscous·q̇)·(1 - exp(-t/time_constant))`.
+//! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) +
+//! viscous·q̇)·(1 - exp(-t/time_constant))`.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span,
@@ -75,7 +76,8 @@ impl EffectSearch for Defined {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
     fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        // What warms changes both frictions alike; how much of the friction as it is may go or come is judged where that is known.
+        // What warms changes both frictions alike; how much of the friction as it is may go or come
+        // is judged where that is known.
         let most = match (term, allowed.viscous, allowed.dry) {
             (1.., Some(viscous), _) => viscous,
             (_, _, Some(_)) => allowed.dry_by_uncertainty,

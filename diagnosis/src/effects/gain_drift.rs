@@ -1,7 +1,9 @@
-//! A torque constant that changes over the recording, as magnets and winding heat: `change·drive·h`. Either h follows the time alone,
-//! `1 - exp(-t/time_constant)`, or, with `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
-//! command and h zero at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
-//! `at_once_s` the load changes at once, which has no name and speaks only against others.
+//! A torque constant that changes over the recording, as magnets and winding heat:
+//! `change·drive·h`. Either h follows the time alone, `1 - exp(-t/time_constant)`, or, with
+//! `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
+//! command and h zero at the start, the first-order thermal model of a motor (one thermal
+//! resistance, one capacity). With `at_once_s` the load changes at once, which has no name and
+//! speaks only against others.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
@@ -17,7 +19,8 @@ shape! {
         time_constant: needed,
         /// Time at which the drift comes all at once, s.
         at_once_s: (f64::INFINITY),
-        /// Square of the command under which the heat settles at one; none where it follows the time alone.
+        /// Square of the command under which the heat settles at one; none where it follows the
+        /// time alone.
         mean_square: optional,
     }
 }
@@ -105,7 +108,8 @@ impl EffectSearch for Defined {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
+        // At most this part of the smallest gain that the rig allows: a drive that drifts to
+        // nothing is no drift.
         let least = 0.6 * allowed.gain.abs() / allowed.gain_reach;
         (-least, least)
     }

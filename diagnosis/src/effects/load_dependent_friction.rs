@@ -1,5 +1,6 @@
-//! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with `of_drive` the load is the drive's
-//! own force, as a gear loses it, which has no name and speaks only against others.
+//! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with
+//! `of_drive` the load is the drive's own force, as a gear loses it, which has no name and speaks
+//! only against others.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed,

@@ -1,8 +1,9 @@
-//! One model per effect, written once: the diagnosis evaluates its terms along a recording, the simulator runs it forward.
+//! One model per effect, written once: the diagnosis evaluates its terms along a recording, the
+//! simulator runs it forward.
 //!
-//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. Each effect has a file of
-//! its own with its `Definition`; to add one, write its file and a line in the registry below. Nothing here
-//! may know how an effect is found.
+//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal
+//! state. Each effect has a file of its own with its `Definition`; to add one, write its file and a
+//! line in the registry below. Nothing here may know how an effect is found.
 
 mod bristles;
 mod command;
@@ -147,7 +148,8 @@ impl fmt::Display for EffectName {
     }
 }
 
-/// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients` linearly.
+/// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients`
+/// linearly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "InFile", into = "InFile")]
 pub struct Effect {
@@ -246,7 +248,8 @@ impl Effect {
         effect
     }
 
-    /// One value of the shape. A missing one is what the effect's file declares, and not a number where that declares nothing.
+    /// One value of the shape. A missing one is what the effect's file declares, and not a number
+    /// where that declares nothing.
     pub fn value(&self, key: &str) -> f64 {
         let declared = || match self.shape_key(key).map(|known| known.missing) {
             Some(Missing::Is(value)) => value,
@@ -286,7 +289,8 @@ impl Effect {
         effect
     }
 
-    /// The values of the shape that a fit may have slightly wrong: not the travel of a turn, and not the waves along it.
+    /// The values of the shape that a fit may have slightly wrong: not the travel of a turn, and
+    /// not the waves along it.
     pub fn uncertain_values(&self) -> impl Iterator<Item = (&str, f64)> {
         let is_of_waves =
             |key: &str| key == "turn" || key.starts_with("order_") || key.starts_with("period_");
@@ -294,14 +298,15 @@ impl Effect {
         values.filter(move |(key, value)| !is_of_waves(key) && *value != 0.0)
     }
 
-    /// Returns the largest command that does nothing, in units of command, where a dead band shifts what is beyond it;
-    /// `None` for every other effect.
+    /// Returns the largest command that does nothing, in units of command, where a dead band shifts
+    /// what is beyond it; `None` for every other effect.
     pub fn shifted_dead_band(&self) -> Option<f64> {
         let is_one = self.name == EffectName::CommandDeadband;
         (is_one && self.value("shift") != 0.0).then(|| self.value("half_width"))
     }
 
-    /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of their coefficients.
+    /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of
+    /// their coefficients.
     pub fn waves(&self) -> Vec<(String, f64)> {
         let turn = self.turn().unwrap_or(std::f64::consts::TAU);
         let mut waves: Vec<(String, f64)> = Vec::new();

@@ -1,5 +1,5 @@
-//! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the inertia that follows the travel, which
-//! has no name and speaks only against others.
+//! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the
+//! inertia that follows the travel, which has no name and speaks only against others.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
@@ -14,7 +14,8 @@ struct PositionDependentDampingLaw {
 }
 
 impl PositionDependentDampingLaw {
-    /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and its part of the acceleration.
+    /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and
+    /// its part of the acceleration.
     fn inertia(&self, state: &State, out: &mut [f64]) {
         let step = 1e-3 * 0.5 * (self.profile.high - self.profile.low);
         let mut beyond = vec![0.0; out.len()];

@@ -19,7 +19,8 @@ const NOBODYS_HZ: f64 = 2.0;
 /// Fewest counts of travel.
 const FEWEST_COUNTS: f64 = 100.0;
 
-/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells alone.
+/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells
+/// alone.
 pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
     if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
         let enough = fit.iter().chain(holdout).filter(|recording| alone(recording).is_none());
@@ -114,8 +115,9 @@ pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
     let seconds = recording.duration_s();
     let travel = counts / rig.encoder.counts_per_unit;
     let asked = rig.actuator.gain.abs() * largest / rig.model.inertia;
-    // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is zero, or is
-    // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
+    // Constant acceleration over the whole recording bounds how far the command can bring the axis.
+    // One that is zero, or is weak and lets something else drive the motion, is another matter:
+    // there the motion itself must be possible.
     (largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds).then(|| {
         format!(
             "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: a unit is wrong",

@@ -1,4 +1,5 @@
-//! A rig for other simulators. What a format cannot express is a note in the file; nothing is left out in silence.
+//! A rig for other simulators. What a format cannot express is a note in the file; nothing is left
+//! out in silence.
 
 use crate::effects::Effect;
 use crate::effects::joint_terms::JointTerms;

@@ -1,5 +1,5 @@
-//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; the script of
-//! [`html_report::plot`] shows the values under the pointer.
+//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; the
+//! script of [`html_report::plot`] shows the values under the pointer.
 
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;

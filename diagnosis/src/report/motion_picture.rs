@@ -1,4 +1,5 @@
-//! The picture of "simulation and recording differ": the motions side by side, drawn, tabulated and as a file.
+//! The picture of "simulation and recording differ": the motions side by side, drawn, tabulated and
+//! as a file.
 
 use crate::numerics::digits::short;
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
@@ -33,7 +34,8 @@ pub(crate) fn words(model: &str) -> &str {
     }
 }
 
-/// A line through points; it is interrupted where it leaves the picture and wherever the simulation is started `afresh`, s.
+/// A line through points; it is interrupted where it leaves the picture and wherever the simulation
+/// is started `afresh`, s.
 fn line(
     out: &mut String,
     (class, name): (&str, &str),
@@ -64,8 +66,8 @@ fn bulk(values: &[f64]) -> (f64, f64) {
     (sorted[few], sorted[last - few])
 }
 
-/// The range of a picture: what was recorded with some room, and up to half as much again for the simulations: one that runs
-/// away leaves the picture.
+/// The range of a picture: what was recorded with some room, and up to half as much again for the
+/// simulations: one that runs away leaves the picture.
 fn range(recorded: &[f64], models: &[(&str, &[f64])]) -> (f64, f64) {
     let (low, high) = bulk(recorded);
     let span = (high - low).max(1e-12);
@@ -121,7 +123,8 @@ fn columns<'a>(
     models.filter_map(|m| Some((m.model.as_str(), pick(m)?))).collect()
 }
 
-/// Position of some of the models in short windows started from the measured state, and how far off it is there.
+/// Position of some of the models in short windows started from the measured state, and how far off
+/// it is there.
 pub(crate) fn in_windows(out: &mut String, compared: &Comparison, wanted: &[&str]) {
     let length = compared.kind.length();
     let motion = &compared.motion;
@@ -231,8 +234,8 @@ fn position(off: Off, unit: &str) -> String {
     format!("{} {unit}", short(off.position_rms))
 }
 
-/// Returns the factor and the name of the unit for position errors: thousandths of the unit where some errors are below a
-/// thousandth.
+/// Returns the factor and the name of the unit for position errors: thousandths of the unit where
+/// some errors are below a thousandth.
 pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
     let unit = compared.kind.length();
     let figures = compared.models.iter().map(|m| &m.figures);

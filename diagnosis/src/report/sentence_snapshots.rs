@@ -1,4 +1,5 @@
-//! The sentence of every verdict, word for word: people read them, and whoever changes one sees it here.
+//! The sentence of every verdict, word for word: people read them, and whoever changes one sees it
+//! here.
 
 use crate::effects::EffectName as N;
 use crate::io::rig::{Kind, Rig};

@@ -1,4 +1,5 @@
-//! The page of `simulate`: the sentence, simulated against recorded motion, force, and what to do next.
+//! The page of `simulate`: the sentence, simulated against recorded motion, force, and what to do
+//! next.
 
 use crate::numerics::digits::short;
 use crate::report::motion_picture::{force, free_run, in_windows, scale, table, under_reference, words};
@@ -6,12 +7,13 @@ use crate::simulation::comparison::{Comparison, Simulated};
 use html_report::{document, plot, safe};
 use std::fmt::Write as _;
 
-/// The length of the windows by which models are compared in a sentence, s, where they were run: short enough that errors of
-/// force do not add up, long enough that the sensor's noise does not matter.
+/// The length of the windows by which models are compared in a sentence, s, where they were run:
+/// short enough that errors of force do not add up, long enough that the sensor's noise does not
+/// matter.
 const JUDGING_S: f64 = 0.5;
 
-/// Returns the position errors of the models as one sentence without its full stop: in windows, or in the free run of a recording
-/// too short for any.
+/// Returns the position errors of the models as one sentence without its full stop: in windows, or
+/// in the free run of a recording too short for any.
 pub fn sentence(compared: &Comparison) -> String {
     let (factor, unit) = scale(compared);
     let windows = compared.models.first().map_or(&[][..], |m| &m.figures.windows);
@@ -47,8 +49,8 @@ pub fn sentence(compared: &Comparison) -> String {
     format!("{over}, the simulated position is off by {all} (root mean square)")
 }
 
-/// The page. `notes` are sentences without their full stop that a reader has to mind; `next` says what to do, one item each, as
-/// plain text in which `backticks` mark commands.
+/// The page. `notes` are sentences without their full stop that a reader has to mind; `next` says
+/// what to do, one item each, as plain text in which `backticks` mark commands.
 pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[String]) -> String {
     let mut out = String::with_capacity(400_000);
     let first = compared.first().map_or_else(|| "Nothing was simulated".to_owned(), sentence);

@@ -1,5 +1,6 @@
-//! The search for the joint between a motor and its load: the values of its law go together, have many optima, and lean on
-//! the rest of the machine. What is here moves shapes; it chooses between no effects.
+//! The search for the joint between a motor and its load: the values of its law go together, have
+//! many optima, and lean on the rest of the machine. What is here moves shapes; it chooses between
+//! no effects.
 
 use crate::effects::{Effect, WholeMachine};
 use crate::estimation::filter::Noise;
@@ -46,7 +47,8 @@ fn elsewhere(context: &FitContext, model: &Model) -> Vec<Model> {
     out
 }
 
-/// The best model that ways downhill from other places lead to, with its merit; none where the last effect is no joint.
+/// The best model that ways downhill from other places lead to, with its merit; none where the last
+/// effect is no joint.
 pub(crate) fn search(
     context: &FitContext,
     model: &Model,
@@ -77,8 +79,9 @@ fn on(machine: &WholeMachine, model: &Model) -> Model {
     on
 }
 
-/// Gives the law of a joint the machine and the standing forces that were fitted with it, where it began with others, and moves
-/// its shape again, for as long as that helps; a model without one stays as it is.
+/// Gives the law of a joint the machine and the standing forces that were fitted with it, where it
+/// began with others, and moves its shape again, for as long as that helps; a model without one
+/// stays as it is.
 pub(crate) fn settle(
     context: &FitContext,
     (mut best, mut model): (f64, Model),

@@ -1,4 +1,5 @@
-//! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
+//! The score test of an effect: how much likelihood its terms would add, with everything already in
+//! the model projected out.
 
 use crate::effects::Effect;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -23,8 +24,8 @@ pub(crate) struct Score {
 /// Whitened responses of an effect's terms over each recording: `[recording][term][block]`.
 pub(crate) type Terms = Vec<Vec<Vec<f64>>>;
 
-/// Inputs that an effect would add to a model over one recording; `after` is the effective command with it, where it acts
-/// on the command.
+/// Inputs that an effect would add to a model over one recording; `after` is the effective command
+/// with it, where it acts on the command.
 fn added_inputs(
     model: &Model,
     track: &BlockedRecording,
@@ -40,7 +41,8 @@ fn added_inputs(
     effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
 
-/// Sums that a score test needs: information of the terms with the model projected out, and their score.
+/// Sums that a score test needs: information of the terms with the model projected out, and their
+/// score.
 pub(crate) struct Sums {
     pub(crate) information: Square,
     pub(crate) score: Vec<f64>,

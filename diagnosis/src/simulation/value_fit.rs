@@ -1,6 +1,7 @@
-//! Values of a rig fitted by what its free run is off, rather than by force: Levenberg–Marquardt on the position, first in
-//! windows that a wrong value cannot leave, then over the whole. What is fitted here predicts trajectories; what it says of
-//! physics is weaker, because errors of position add up.
+//! Values of a rig fitted by what its free run is off, rather than by force: Levenberg–Marquardt on
+//! the position, first in windows that a wrong value cannot leave, then over the whole. What is
+//! fitted here predicts trajectories; what it says of physics is weaker, because errors of position
+//! add up.
 
 use super::replay::Beside;
 use crate::io::recording::Recording;
@@ -69,11 +70,12 @@ fn residuals(rig: &Rig, besides: &[Beside], seconds: f64) -> Vec<f64> {
     besides.iter().flat_map(of).collect()
 }
 
-/// Lengths of the windows of one stage after the other, s: a wrong value leads a long run so far astray that nothing near is
-/// better.
+/// Lengths of the windows of one stage after the other, s: a wrong value leads a long run so far
+/// astray that nothing near is better.
 const STAGES_S: [f64; 3] = [1.0, 5.0, f64::INFINITY];
 
-/// The rig whose free run is off least on `recordings`, beginning with `rig`; its structure is kept.
+/// The rig whose free run is off least on `recordings`, beginning with `rig`; its structure is
+/// kept.
 pub fn fit(rig: &Rig, recordings: &[Recording]) -> Rig {
     let besides: Vec<Beside> = recordings.iter().map(|r| Beside::new(r, rig)).collect();
     let force = rig.actuator.gain.abs()
@@ -105,7 +107,8 @@ fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
     at(&least_squares((start, at_start), &off, &usable))
 }
 
-/// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by differences.
+/// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by
+/// differences.
 fn normal_equations(
     theta: &[f64],
     at_theta: &[f64],
@@ -128,8 +131,9 @@ fn normal_equations(
     (information, score)
 }
 
-/// Minimises the sum of squares of residuals by Levenberg–Marquardt, from values with their residuals; `off` gives the residuals
-/// of other values, of which only those that are `usable` are taken.
+/// Minimises the sum of squares of residuals by Levenberg–Marquardt, from values with their
+/// residuals; `off` gives the residuals of other values, of which only those that are `usable` are
+/// taken.
 fn least_squares(
     (mut theta, mut at_theta): (Vec<f64>, Vec<f64>),
     off: &(dyn Fn(&[f64]) -> Vec<f64> + Sync),

@@ -28,7 +28,8 @@ fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Folders of the crate that a line of code names: `crate::folder`, also in `use crate::{a::…, b::…}`.
+/// Folders of the crate that a line of code names: `crate::folder`, also in `use crate::{a::…,
+/// b::…}`.
 fn named(line: &str) -> Vec<usize> {
     let code = line.split("//").next().unwrap_or("");
     let mut out = Vec::new();
@@ -72,7 +73,8 @@ fn each_folder_uses_only_those_before_it() {
     assert!(upward.is_empty(), "folders use those above them:\n{}", upward.join("\n"));
 }
 
-/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.
+/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may
+/// read and which use none.
 const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
 
 #[test]
@@ -87,7 +89,8 @@ fn only_thresholds_stands_beside_the_folders() {
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
 }
 
-/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into its file: ask its `Definition`.
+/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into
+/// its file: ask its `Definition`.
 const MAY_NAME: [(&str, &str); 0] = [];
 
 /// The effects, as the code names them: `stribeck_friction` is `StribeckFriction`.
@@ -167,8 +170,8 @@ fn what_an_effect_is_stands_in_its_file() {
     }
 }
 
-/// Words of other things that are spelled like a key of a shape, by file, and why. A value of an effect is asked of the effect:
-/// `Effect::turn`, or a method of its `Definition`.
+/// Words of other things that are spelled like a key of a shape, by file, and why. A value of an
+/// effect is asked of the effect: `Effect::turn`, or a method of its `Definition`.
 const OTHER_WORDS: [(&str, &[&str], &str); 8] = [
     ("src/io/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
     ("src/report/exports.rs", &["damping", "limit"], "keys of an exported joint"),
@@ -180,7 +183,8 @@ const OTHER_WORDS: [(&str, &[&str], &str); 8] = [
     ("device-setup/src/compensate/coefficients.rs", &["viscous", "weight"], "coefficients"),
 ];
 
-/// The keys of shapes, as the files of the effects declare them: by `shape!`, or by `ShapeKey::new`.
+/// The keys of shapes, as the files of the effects declare them: by `shape!`, or by
+/// `ShapeKey::new`.
 fn shape_keys(text: &str) -> Vec<String> {
     let mut keys = Vec::new();
     let mut is_declaration = false;
@@ -195,7 +199,8 @@ fn shape_keys(text: &str) -> Vec<String> {
     keys
 }
 
-/// The keys that a line of code spells: a string that is one, or that begins with one of numbered ones.
+/// The keys that a line of code spells: a string that is one, or that begins with one of numbered
+/// ones.
 fn spelled<'a>(line: &str, keys: &'a [String]) -> Vec<&'a str> {
     let code = line.split("//").next().unwrap_or("");
     let strings: Vec<&str> = code.split('"').skip(1).step_by(2).collect();

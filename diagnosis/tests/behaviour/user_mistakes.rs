@@ -1,4 +1,5 @@
-//! Mistakes that people make with units, signs, columns and files: each gets the sentence that helps, and none a name.
+//! Mistakes that people make with units, signs, columns and files: each gets the sentence that
+//! helps, and none a name.
 
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;

@@ -1,4 +1,5 @@
-//! The power is cut at every single write and erasure; every single bit of a stored configuration is flipped.
+//! The power is cut at every single write and erasure; every single bit of a stored configuration
+//! is flipped.
 
 use super::*;
 use control_core::units::Millimetres;
@@ -140,8 +141,8 @@ fn a_full_slot_moves_over_while_it_is_in_use() {
     assert_eq!(load(&mut flash), Stored::Found(device(9 + 4 * CELLS as i16)));
 }
 
-/// From every fill of the slot: power lost in the middle of every write of saving, and in every write and erasure of the
-/// start that follows, which is then repeated.
+/// From every fill of the slot: power lost in the middle of every write of saving, and in every
+/// write and erasure of the start that follows, which is then repeated.
 #[test]
 fn losing_power_anywhere_leaves_the_old_or_the_new() {
     let mut cuts = 0;

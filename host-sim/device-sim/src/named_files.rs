@@ -1,4 +1,5 @@
-//! Files that a person names: one of those that come with the program, by its name, or any file, by its path.
+//! Files that a person names: one of those that come with the program, by its name, or any file, by
+//! its path.
 
 use crate::error::Error;
 use serde::de::DeserializeOwned;
@@ -13,7 +14,8 @@ pub struct Text {
     pub text: String,
 }
 
-/// Finds `wanted` among `built_in` (name, text), else reads it as a path. `what` names the kind in errors.
+/// Finds `wanted` among `built_in` (name, text), else reads it as a path. `what` names the kind in
+/// errors.
 pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text, Error> {
     if let Some((name, text)) = built_in.iter().find(|(name, _)| *name == wanted) {
         return Ok(Text { origin: format!("{what} {name}"), text: (*text).to_owned() });

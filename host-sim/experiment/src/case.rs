@@ -55,15 +55,16 @@ pub struct Case {
     pub disturbance: f64,
     /// Bandwidth over which it was measured, Hz.
     pub bandwidth_hz: f64,
-    /// Time between two readings that the diagnosis takes apart, s: a row of the recordings, or a block of a few if they are faster.
+    /// Time between two readings that the diagnosis takes apart, s: a row of the recordings, or a
+    /// block of a few if they are faster.
     pub reading_s: f64,
     /// The machine's limits.
     pub limits: Limits,
 }
 
 impl Case {
-    /// Reads the folder that `diagnose` wrote. A limit that is not given is the most that the report's recordings did (speed,
-    /// travel) or the rig allows (force).
+    /// Reads the folder that `diagnose` wrote. A limit that is not given is the most that the
+    /// report's recordings did (speed, travel) or the rig allows (force).
     ///
     /// # Errors
     /// One sentence: the file, what is wrong with it, what to do.

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 /// Most ticks of an axis.
 const MOST_TICKS: usize = 20;
 
-/// Returns the distance of ticks: 1, 2 or 5 times a power of ten, not below `wanted`; 1 if that is no distance.
+/// Returns the distance of ticks: 1, 2 or 5 times a power of ten, not below `wanted`; 1 if that is
+/// no distance.
 pub(crate) fn round_step(wanted: f64) -> f64 {
     if !(wanted > 0.0 && wanted.is_finite()) {
         return 1.0;

@@ -1,6 +1,7 @@
-//! Pages to read and to print: one HTML file each, with everything inside, drawn as SVG. It knows text, tables
-//! and curves, and nothing of needles; the content of a page is its caller's. [`Sheet`] and [`chart`] are a page
-//! in one style; a page with a style of its own is a [`document`], which may have [`plot`]s.
+//! Pages to read and to print: one HTML file each, with everything inside, drawn as SVG. It knows
+//! text, tables and curves, and nothing of needles; the content of a page is its caller's.
+//! [`Sheet`] and [`chart`] are a page in one style; a page with a style of its own is a
+//! [`document`], which may have [`plot`]s.
 
 pub mod chart;
 pub mod drawing;
@@ -120,7 +121,8 @@ impl Sheet {
     }
 }
 
-/// Returns a whole page with everything inside: `body` is its markup, `style` its CSS and `script` its JavaScript.
+/// Returns a whole page with everything inside: `body` is its markup, `style` its CSS and `script`
+/// its JavaScript.
 pub fn document(title: &str, style: &str, body: &str, script: Option<&str>) -> String {
     let script = script.map_or_else(String::new, |script| format!("<script>{script}</script>"));
     format!(

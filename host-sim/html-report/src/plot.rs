@@ -1,12 +1,13 @@
-//! A plot that shows its values under the pointer: its frame with round ticks and units, and the mapping of
-//! values to places. Plain SVG; without [`SCRIPT`] it shows the same curves.
+//! A plot that shows its values under the pointer: its frame with round ticks and units, and the
+//! mapping of values to places. Plain SVG; without [`SCRIPT`] it shows the same curves.
 
 use crate::drawing::{decimals, round_step, ticks};
 use crate::safe;
 use std::fmt::Write as _;
 
-/// Shows the values of the paths that have a `data-name` under the pointer, and a stretch alone once it
-/// is dragged over. For the end of a page's body; the page's style gives colours to `.cursor` and `.chosen`.
+/// Shows the values of the paths that have a `data-name` under the pointer, and a stretch alone
+/// once it is dragged over. For the end of a page's body; the page's style gives colours to
+/// `.cursor` and `.chosen`.
 pub const SCRIPT: &str = include_str!("plot.js");
 
 /// Size of a plot and its margins, in its own units.
@@ -32,8 +33,9 @@ fn label(value: f64, step: f64) -> String {
     format!("{:.*}", decimals(step), value + 0.0)
 }
 
-/// A frame with its ticks, under the title of its upright axis; returns the mapping of values to places. [`close`] ends it.
-/// `plot.js` reads the ranges and shows the values of the paths that have a `data-name`.
+/// A frame with its ticks, under the title of its upright axis; returns the mapping of values to
+/// places. [`close`] ends it. `plot.js` reads the ranges and shows the values of the paths that
+/// have a `data-name`.
 pub fn frame(
     out: &mut String,
     x: (f64, f64),

@@ -1,4 +1,5 @@
-//! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is said.
+//! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is
+//! said.
 
 use super::mcap_repair::intact;
 use super::messages::{Message, Setup};
@@ -20,7 +21,8 @@ pub struct Recording {
     pub messages: Vec<Message>,
     /// The reason why it ends early, if it does.
     pub cut: Option<String>,
-    /// Time of tick 0 in nanoseconds since 1970, by the clock of the computer that recorded; 0 if that had none.
+    /// Time of tick 0 in nanoseconds since 1970, by the clock of the computer that recorded; 0 if
+    /// that had none.
     pub begun_ns: u64,
 }
 
@@ -36,7 +38,8 @@ fn with_extension(path: &Path) -> Cow<'_, Path> {
 }
 
 impl Recording {
-    /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap` unless there is a file of that name.
+    /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap`
+    /// unless there is a file of that name.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let path = with_extension(path);
         let shown = path.display().to_string();

@@ -1,4 +1,5 @@
-//! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen like those of the program.
+//! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen
+//! like those of the program.
 
 use device_sim::error::Error;
 use device_sim::named_files::Text;

@@ -1,4 +1,5 @@
-//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the guide says that they print.
+//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the
+//! guide says that they print.
 
 use crate::common::{folder, text};
 use diagnosis::rig::Rig;

@@ -1,5 +1,5 @@
-//! The guide in the page: it waits for a person before each step, takes nonsense for nothing, shows what came of it, and ends where
-//! the person or the program does.
+//! The guide in the page: it waits for a person before each step, takes nonsense for nothing, shows
+//! what came of it, and ends where the person or the program does.
 
 use device_sim::error::Error;
 use serde_json::{Value, json};

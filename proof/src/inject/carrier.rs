@@ -25,7 +25,8 @@ pub(crate) struct Carrier {
     pub(crate) holdouts: Vec<Recording>,
 }
 
-/// Finds the cases of the folders, in the order of their names. A folder that is a case itself counts.
+/// Finds the cases of the folders, in the order of their names. A folder that is a case itself
+/// counts.
 ///
 /// # Errors
 /// One sentence: what cannot be read, and where.

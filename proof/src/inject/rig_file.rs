@@ -1,4 +1,5 @@
-//! The rig file of a carrier: the numbers that the concealing needs, and its text, in which single values can be changed.
+//! The rig file of a carrier: the numbers that the concealing needs, and its text, in which single
+//! values can be changed.
 
 use toml::{Table, Value};
 

@@ -7,8 +7,9 @@ use std::path::Path;
 /// The list of the plants in their folder.
 pub(super) const KEY: &str = "key.json";
 
-/// Reads the plants of a folder. `key.json` holds `plants`, each with its `file`, its `kind` (twins, singles, pairs, nulls or outside) and
-/// the `names` that are right, none where nothing is to be named.
+/// Reads the plants of a folder. `key.json` holds `plants`, each with its `file`, its `kind`
+/// (twins, singles, pairs, nulls or outside) and the `names` that are right, none where nothing is
+/// to be named.
 ///
 /// # Errors
 /// One sentence: the file, the plant, and what is wrong with it.

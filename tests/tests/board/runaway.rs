@@ -1,5 +1,5 @@
-//! It cannot run away: what is wired wrongly, breaks or is pressed takes the amplifier off before a hand is hurt. Each on
-//! the flash image with a plant that does it.
+//! It cannot run away: what is wired wrongly, breaks or is pressed takes the amplifier off before a
+//! hand is hurt. Each on the flash image with a plant that does it.
 
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
@@ -144,7 +144,8 @@ fn an_encoder_unplugged_while_friction_is_rendered() {
     tripped(&mut rig, Fault::EncoderWire);
 }
 
-/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let go runs free meanwhile.
+/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let
+/// go runs free meanwhile.
 #[test]
 fn an_encoder_that_loses_its_power() {
     let supply_off = Wires { supply_off: true, ..Wires::default() };

@@ -1,5 +1,6 @@
-//! `settle` on the flash image: the emulated board plays the excitations on a mechanism that the diagnosis did not write
-//! (`tests::mechanism`: a law and an integrator of its own), and the diagnosis names what is concealed in it.
+//! `settle` on the flash image: the emulated board plays the excitations on a mechanism that the
+//! diagnosis did not write (`tests::mechanism`: a law and an integrator of its own), and the
+//! diagnosis names what is concealed in it.
 
 use std::io;
 use std::path::Path;
@@ -17,10 +18,12 @@ use tests::scenario::board;
 /// The rotor's angle at the beginning and the board's tilt, rad.
 const ROTOR: f64 = 1.234;
 const TILT: f64 = std::f64::consts::FRAC_PI_6;
-/// The most that the board moves on between two readings, so that a slow computer makes a slow device and not a silent one.
+/// The most that the board moves on between two readings, so that a slow computer makes a slow
+/// device and not a silent one.
 const BURST_MS: u64 = 5;
 
-/// The board at the end of its cable. It moves on only while the cable is read, and no faster than a clock.
+/// The board at the end of its cable. It moves on only while the cable is read, and no faster than
+/// a clock.
 struct Plugged(Arc<Mutex<Board>>);
 
 struct Cable {

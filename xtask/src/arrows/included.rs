@@ -1,5 +1,5 @@
-//! Sources that are compiled in a second place by `#[path]`: a reader does not expect them there, and the compiler reads them twice. The few that
-//! remain are listed with the reason.
+//! Sources that are compiled in a second place by `#[path]`: a reader does not expect them there,
+//! and the compiler reads them twice. The few that remain are listed with the reason.
 
 use super::krate;
 use std::io;
@@ -25,7 +25,8 @@ const SIMULATOR: &str =
 const IMAGE: &str =
     "the image's own modules, which exist on a board only: the library is built for the PC too";
 
-/// Returns a sentence for every `#[path]` below `top` that is not listed, and for every one listed that is gone.
+/// Returns a sentence for every `#[path]` below `top` that is not listed, and for every one listed
+/// that is gone.
 pub(super) fn unlisted(top: &Path) -> io::Result<Vec<String>> {
     let mut found = Vec::new();
     for (file, text) in krate::sources(top)? {

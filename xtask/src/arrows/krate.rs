@@ -27,7 +27,8 @@ impl Crate {
         Ok(Self::of(files.iter().map(|(name, text)| (name.clone(), text.as_str()))))
     }
 
-    /// A crate of sources by their paths below `src`. A program beside a library is the same crate's root.
+    /// A crate of sources by their paths below `src`. A program beside a library is the same
+    /// crate's root.
     pub(super) fn of<'a>(files: impl Iterator<Item = (String, &'a str)>) -> Self {
         let mut modules = BTreeMap::new();
         for (file, text) in files {
@@ -42,8 +43,8 @@ impl Crate {
         Self { modules }
     }
 
-    /// The uses of every file, also of one that a macro declares; files that only tests declare are left out, and so is what a module
-    /// uses of the modules that it is made of.
+    /// The uses of every file, also of one that a macro declares; files that only tests declare are
+    /// left out, and so is what a module uses of the modules that it is made of.
     pub(super) fn uses(&self) -> Uses {
         let used = self.modules.keys().filter(|path| !self.is_for_tests(path));
         used.map(|path| (self.modules[path].file.clone(), self.uses_of(path))).collect()

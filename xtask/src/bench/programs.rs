@@ -38,7 +38,8 @@ pub(crate) fn test_modules() -> Result<Vec<TestModule>, Error> {
 }
 
 impl TestModule {
-    /// True if the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
+    /// True if the tests print rows, of which their text names one as a word or in JSON, or lines
+    /// of the board's own table.
     pub(crate) fn measures(&self, wants: impl Fn(&str) -> bool) -> bool {
         let text = &self.text;
         (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))

@@ -26,7 +26,8 @@ const REASONS: [(&str, &str); 4] = [
 ];
 
 impl Work {
-    /// Time per work at the largest amount over that at the smallest: 1 where the cost grows as the work does.
+    /// Time per work at the largest amount over that at the smallest: 1 where the cost grows as the
+    /// work does.
     fn growth(&self) -> Option<f64> {
         let ((least, short), (most, long)) = (self.taken.first()?, self.taken.last()?);
         (most > least && *short > 0.0).then(|| (long / most) / (short / least))

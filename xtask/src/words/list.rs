@@ -1,7 +1,8 @@
 //! The phrases that the project does not use, what it writes instead, and why.
 //!
-//! A phrase is added once it is gone from the repository, and only where it is wrong in every sentence: a needle
-//! stands upright, a vein lies in fat and a device is told what to do, so that these words are not listed by themselves.
+//! A phrase is added once it is gone from the repository, and only where it is wrong in every
+//! sentence: a needle stands upright, a vein lies in fat and a device is told what to do, so that
+//! these words are not listed by themselves.
 
 /// A phrase: words in lower case, one blank apart. `*'s` is any word that ends in 's.
 pub(super) struct Phrase {
@@ -82,5 +83,6 @@ pub(super) const PHRASES: &[Phrase] = &[
     phrase("in their place", "instead, replaces them", "shorter, and not a place"),
 ];
 
-/// Words that do not open the first sentence of a doc comment: it says what is returned, true or stored.
+/// Words that do not open the first sentence of a doc comment: it says what is returned, true or
+/// stored.
 pub(super) const OPENINGS: &[&str] = &["What", "Whether", "How", "Where", "Of"];

@@ -142,7 +142,8 @@ impl<'a> State<'a> {
         columns(effect, &self.on.sights, self.on.context.nominal, &self.asked)
     }
 
-    /// The shape of an effect that takes most on stretches left out of the fit; none for a joint, whose shape only the search finds.
+    /// The shape of an effect that takes most on stretches left out of the fit; none for a joint,
+    /// whose shape only the search finds.
     fn best_shape(&self, name: N) -> Option<Columns> {
         let on = self.on;
         if name.definition().coupling().is_some() {

@@ -1,5 +1,6 @@
-//! The waves of an effect that repeats along the travel: those that stand out under the noise, and the whole orders of a known turn
-//! by their own shares, since other physics may hide them from a likelihood.
+//! The waves of an effect that repeats along the travel: those that stand out under the noise, and
+//! the whole orders of a known turn by their own shares, since other physics may hide them from a
+//! likelihood.
 
 use super::laws::Columns;
 use super::state::State;
@@ -17,7 +18,8 @@ const FURTHER: f64 = 0.02;
 type Tried = (f64, Columns);
 
 impl State<'_> {
-    /// The waves that take most on stretches left out of the fit, as those of one effect; `found` stand out under the noise.
+    /// The waves that take most on stretches left out of the fit, as those of one effect; `found`
+    /// stand out under the noise.
     pub(super) fn best_waves(&self, name: N, found: &[Effect]) -> Option<Columns> {
         let standing = found.iter().filter_map(|one| self.tried(Effect { name, ..one.clone() }));
         let best = standing.chain(self.best_orders(name)).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -29,7 +31,8 @@ impl State<'_> {
         Some((self.on_fit(&columns), columns))
     }
 
-    /// The whole orders of the turn that take most together, one after another; none where the turn is not known.
+    /// The whole orders of the turn that take most together, one after another; none where the turn
+    /// is not known.
     fn best_orders(&self, name: N) -> Option<Tried> {
         let span = self.on.context.span;
         let turn = span.rig.turn?;

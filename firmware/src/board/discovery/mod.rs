@@ -40,8 +40,8 @@ impl Wiring for Discovery {
     type Enable = PD7<Output>;
     type Tilt = BoardTilt;
 
-    /// 10 N at a roller of 10 mm, the most that Paper 002 asks for, and 0.6 m/s, half as fast again as the overspeed trip of a usual
-    /// encoder. Another motor is another image.
+    /// 10 N at a roller of 10 mm, the most that Paper 002 asks for, and 0.6 m/s, half as fast again
+    /// as the overspeed trip of a usual encoder. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
 
     fn init(

@@ -1,5 +1,6 @@
-//! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`): arrays and structures of
-//! arrays. The layout is that of MathWorks' "MAT-File Format": tagged elements, compressed ones within zlib.
+//! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`):
+//! arrays and structures of arrays. The layout is that of MathWorks' "MAT-File Format": tagged
+//! elements, compressed ones within zlib.
 
 use super::table::{Column, Log, join};
 use device_sim::error::Error;

@@ -7,7 +7,8 @@ use diagnosis::report::{Report, Verdict};
 use experiment::{Case, design};
 use std::path::Path;
 
-/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers, to judge.
+/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers,
+/// to judge.
 const INPUT_S: f64 = 16.0;
 /// A round that is shorter than this, s, shows nothing new.
 const LEAST_ROUND_S: f64 = 10.0;

@@ -1,12 +1,13 @@
-//! The simulation with what was settled: what the device feeds forward, and what its author takes over.
+//! The simulation with what was settled: what the device feeds forward, and what its author takes
+//! over.
 
 use super::Name;
 use diagnosis::Outcome;
 use diagnosis::effects::EffectName;
 use diagnosis::rig::Rig;
 
-/// The rig of the last diagnosis with the settled effects and no others. A name that a round kept is not in the patched rig of a
-/// diagnosis that names nothing; it is in the rig of its contender.
+/// The rig of the last diagnosis with the settled effects and no others. A name that a round kept
+/// is not in the patched rig of a diagnosis that names nothing; it is in the rig of its contender.
 pub(super) fn patched(last: &Outcome, names: &[Name]) -> Rig {
     let is_settled = |name: EffectName| names.iter().any(|settled| settled.name == name.as_str());
     let holds_all = |rig: &Rig| {

@@ -12,7 +12,8 @@ use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
 use fixed::types::I16F16;
 
-/// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640 and 680 mm/s.
+/// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640
+/// and 680 mm/s.
 const SPEED_MM_PER_S: f64 = 650.0;
 
 /// Strokes before random multisines, s.
@@ -182,7 +183,8 @@ mod tests {
         assert!((seconds - 24.0).abs() < 0.01, "{seconds} s");
     }
 
-    /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step, with `effects` concealed in it.
+    /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step,
+    /// with `effects` concealed in it.
     fn played(input: &Input, gain: f64, effects: &str) -> Result<(), String> {
         let text = format!(
             "format = 1\nname = \"concealed\"\nkind = \"rotary\"\n\
@@ -204,7 +206,8 @@ mod tests {
 
     const GAIN: f64 = 1.4e-5;
 
-    /// The motor stops at a reversal, its load flies on through the gap and knocks the motor on against its torque.
+    /// The motor stops at a reversal, its load flies on through the gap and knocks the motor on
+    /// against its torque.
     #[test]
     fn a_load_that_knocks_in_its_gap_is_no_swapped_lead() {
         for (coast, contact, ratio) in [(237.8, 186.5, 0.87), (150.0, 100.0, 1.0), (240.0, 250.0, 0.4)] {
@@ -222,7 +225,8 @@ mod tests {
         }
     }
 
-    /// A torque that swings faster than its delay drives the motor against what is asked for at that moment.
+    /// A torque that swings faster than its delay drives the motor against what is asked for at
+    /// that moment.
     #[test]
     fn a_motor_that_obeys_late_is_no_swapped_lead() {
         let frequencies = [5, 8, 11, 17, 24, 36, 59, 76, 116, 177, 286, 421];
@@ -232,7 +236,8 @@ mod tests {
         }
     }
 
-    /// An unbalanced roller rests where sines of up to half a kilohertz shake it over one edge of the encoder.
+    /// An unbalanced roller rests where sines of up to half a kilohertz shake it over one edge of
+    /// the encoder.
     #[test]
     fn a_motor_shaken_over_one_count_is_no_dead_channel() {
         let late = "[[effect]]\nname = \"command_delay\"\nshape = { delay = 0.00186 }\n\
@@ -242,7 +247,8 @@ mod tests {
         assert_eq!(played(&multisine(1.31e-3, frequencies), GAIN, late), Ok(()));
     }
 
-    /// Every kind of signal with the servo that follows it: the motor runs away from where it should be.
+    /// Every kind of signal with the servo that follows it: the motor runs away from where it
+    /// should be.
     #[test]
     fn swapped_leads_end_an_input_as_what_they_are() {
         let limited = limited();
